@@ -1,0 +1,1 @@
+"""What stored runs say: comparisons and figures. Imports ``coartic`` and reads records."""

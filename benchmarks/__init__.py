@@ -1,0 +1,1 @@
+"""Suites, the runner, and the records it keeps. Imports ``coartic`` and ``baselines``."""

@@ -1,0 +1,56 @@
+"""coartic: computational motor control, from one kinematic robot to scored solutions.
+
+The dual-process learner of Shah, Barto & Fagg (2013), *A Dual Process Account of
+Coarticulation in Motor Skill Acquisition*, and everything its alternatives share
+with it: robot, tasks, movement, corrective process, execution and scoring.
+"""
+
+from coartic.corrective import Correction, correct
+from coartic.errors import CoarticError, NotApplicableError, TaskError
+from coartic.exploration import CONDITIONS, ExplorationCondition
+from coartic.frames import learning_frame, runs_frame, solutions_frame
+from coartic.initial import corrective_trial, hand_sequences, initial_hands
+from coartic.learner import Counters, LearningRun, learn, learn_many
+from coartic.model import PAPER, MotionModel
+from coartic.movement import MoveResult, move
+from coartic.robot import Arm, Hand, Robot
+from coartic.solution import Execution, Movement, execute
+from coartic.task import Provenance, Start, Task, builtin_tasks, load_task, parse_task
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CONDITIONS",
+    "PAPER",
+    "Arm",
+    "CoarticError",
+    "Correction",
+    "Counters",
+    "Execution",
+    "ExplorationCondition",
+    "Hand",
+    "LearningRun",
+    "MotionModel",
+    "MoveResult",
+    "Movement",
+    "NotApplicableError",
+    "Provenance",
+    "Robot",
+    "Start",
+    "Task",
+    "TaskError",
+    "builtin_tasks",
+    "correct",
+    "corrective_trial",
+    "execute",
+    "hand_sequences",
+    "initial_hands",
+    "learn",
+    "learn_many",
+    "learning_frame",
+    "load_task",
+    "move",
+    "parse_task",
+    "runs_frame",
+    "solutions_frame",
+]

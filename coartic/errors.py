@@ -1,0 +1,17 @@
+"""Errors meant for the person at the keyboard.
+
+Every message says what was wrong, where, and what would be right. The command
+line prints it as it stands and exits with code 2.
+"""
+
+
+class CoarticError(Exception):
+    """Something the user can put right."""
+
+
+class TaskError(CoarticError):
+    """A task file or task definition that cannot be used."""
+
+
+class NotApplicableError(CoarticError):
+    """A method asked to run on a task it does not apply to."""

@@ -1,0 +1,101 @@
+"""Runs as tidy data frames: one row a run, a movement, or a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic.learner import LearningRun
+from coartic.solution import Movement
+from coartic.task import Task
+
+
+def run_row(run: LearningRun) -> dict[str, Any]:
+    """One run as a flat record; rewards and hands are None where there are none."""
+    return {
+        "task": run.task.name,
+        "method": run.method,
+        "seed": run.seed,
+        "status": run.status,
+        "reason": run.reason,
+        "hands": run.hands,
+        "reward": run.reward,
+        "replay_reward": run.replay_reward,
+        "replay_hands": run.replay_hands,
+        "initial_reward": run.initial_reward,
+        "initial_hands": run.first_hands,
+        "best_trial": run.best_trial,
+        **asdict(run.counters),
+        "wall_s": run.wall_s,
+        "cpu_s": run.cpu_s,
+    }
+
+
+def movement_rows(task: Task, movements: Iterable[Movement]) -> list[dict[str, Any]]:
+    """One record per movement: order, goal, hand, kind, ticks and target by joint name."""
+    rows = []
+    for order, movement in enumerate(movements):
+        row: dict[str, Any] = {
+            "order": order,
+            "goal": movement.goal,
+            "hand": movement.hand,
+            "kind": movement.kind,
+            "ticks": movement.ticks,
+        }
+        if movement.target is not None:
+            row.update(zip(task.robot.joint_names, movement.target.tolist(), strict=True))
+        rows.append(row)
+    return rows
+
+
+def movements_from(task: Task, rows: pd.DataFrame) -> tuple[Movement, ...]:
+    """The movements of one run read back from rows as :func:`movement_rows` makes them."""
+    names = list(task.robot.joint_names)
+    return tuple(
+        Movement(
+            goal=int(row["goal"]),
+            hand=row["hand"],
+            kind=row["kind"],
+            target=np.array([row[name] for name in names], dtype=np.float64),
+            ticks=int(row["ticks"]),
+        )
+        for row in rows.sort_values("order").to_dict("records")
+    )
+
+
+def runs_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
+    """One row a run, in the order given; column ``run`` counts them from 0."""
+    frame = pd.DataFrame([run_row(run) for run in runs])
+    frame.insert(2, "run", range(len(frame)))
+    integers = ["reward", "replay_reward", "initial_reward", "best_trial"]
+    return frame.astype(dict.fromkeys(integers, "Int64"))
+
+
+def solutions_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
+    """One row a movement of each run's best trial."""
+    return pd.DataFrame(
+        [
+            {"run": index, **row}
+            for index, run in enumerate(runs)
+            for row in movement_rows(run.task, run.solution)
+        ]
+    )
+
+
+def learning_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
+    """One row a trial of each run: its total reward, missing where the trial failed."""
+    parts = [
+        pd.DataFrame(
+            {
+                "run": index,
+                "trial": np.arange(len(run.rewards)),
+                "reward": pd.arrays.IntegerArray(run.rewards, ~run.completed),
+            }
+        )
+        for index, run in enumerate(runs)
+    ]
+    return pd.concat(parts, ignore_index=True)

@@ -1,0 +1,187 @@
+"""The model written as the paper prints it: one step at a time, in plain NumPy.
+
+Slow and obvious. It shares the robot with the rest of the package and nothing else:
+the compiled kernels are tested against it, trial by trial, and timed against it
+(benchmarks/speed.py). It draws from its generator in the same order as the learner.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.corrective import Correction
+from coartic.exploration import ExplorationCondition
+from coartic.initial import initial_hands
+from coartic.model import PAPER, MotionModel
+from coartic.movement import MoveResult
+from coartic.robot import HANDS, Array, Hand, Robot
+from coartic.task import Task, hands_of
+
+State = tuple[int, Hand | None]
+
+
+class ReferenceRun(NamedTuple):
+    """What the slow learner found."""
+
+    rewards: NDArray[np.int64]
+    completed: NDArray[np.bool_]
+    values: dict[tuple[State, Hand], float]
+    targets: dict[tuple[State, Hand], Array]
+
+
+def move(
+    robot: Robot,
+    q: Array,
+    target: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    radius: float,
+    *,
+    stop_on_arrival: bool = True,
+    model: MotionModel = PAPER,
+) -> MoveResult:
+    """:func:`coartic.movement.move`, visiting every step."""
+    start, end = np.array(q), np.array(target)
+    difference = end - start
+    distance = math.sqrt(_sum_of_squares(difference))
+    last = math.ceil(distance / model.step)
+    expected = robot.forward_kinematics(end, hand)
+    for k in range(last + 1):
+        point = end if k == last else start + (k * model.step / distance) * difference
+        position = robot.forward_kinematics(point, hand)
+        hit = _distance(position, goal) <= radius
+        arrived = stop_on_arrival and _distance(position, expected) <= model.arrival_tolerance
+        if hit or arrived or k == last:
+            return MoveResult(np.array(point), k + 1, hit, k + 2)
+    raise AssertionError("a movement ends at its target at the latest")
+
+
+def correct(
+    robot: Robot,
+    q: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    *,
+    locked_base: tuple[str, ...] = (),
+    model: MotionModel = PAPER,
+) -> Correction:
+    """:func:`coartic.corrective.correct`, with the Jacobian as a matrix."""
+    free = np.ones(robot.dof)
+    free[:2] = ["x" not in locked_base, "y" not in locked_base]
+    q = np.array(q)
+    for iteration in range(model.max_iterations):
+        error = goal - robot.forward_kinematics(q, hand)
+        if math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance:
+            return Correction(q, True, iteration)
+        q = q + model.gain * free * (robot.jacobian(q, hand).T @ error)
+    error = goal - robot.forward_kinematics(q, hand)
+    converged = math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance
+    return Correction(q, converged, model.max_iterations)
+
+
+def learn(
+    task: Task,
+    condition: ExplorationCondition,
+    *,
+    seed: int,
+    trials: int,
+    model: MotionModel = PAPER,
+) -> ReferenceRun:
+    """:func:`coartic.learner.learn`, after Figure 3 line by line."""
+    rng = np.random.default_rng(seed)
+    first_hands = hands_of(initial_hands(task, condition.hands, model=model))
+    values: dict[tuple[State, Hand], float] = {}
+    targets: dict[tuple[State, Hand], Array] = {}
+    rewards = np.zeros(trials, dtype=np.int64)
+    completed = np.zeros(trials, dtype=np.bool_)
+    for trial in range(trials):
+        q = np.array(task.q0)
+        total = 0
+        previous: Hand | None = None
+        visited: list[tuple[State, Hand, Array]] = []
+        for number, goal in enumerate(task.goals):
+            state: State = (number, previous)
+            if trial == 0:
+                hand = first_hands[number]
+            else:
+                hand = _choose(task, condition, q, goal, state, values, rng)
+            if (state, hand) in targets:
+                target = _explore(task, condition, q, hand, targets[state, hand], rng)
+                result = move(task.robot, q, target, hand, goal, task.radius, model=model)
+                q, total, hit = result.q, total - result.ticks, result.hit
+            else:
+                hit = _distance(task.robot.forward_kinematics(q, hand), goal) <= task.radius
+            if not hit:
+                found = correct(
+                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model
+                )
+                if not found.converged:
+                    break
+                result = move(
+                    task.robot, q, found.q, hand, goal, task.radius,
+                    stop_on_arrival=False, model=model,
+                )  # fmt: skip
+                q, total = result.q, total - result.ticks
+            visited.append((state, hand, q))
+            previous = hand
+        rewards[trial] = total
+        completed[trial] = len(visited) == len(task.goals)
+        if completed[trial]:
+            for state, hand, reached in visited:
+                if total > values.get((state, hand), -math.inf):
+                    values[state, hand] = total
+                    targets[state, hand] = reached
+    return ReferenceRun(rewards, completed, values, targets)
+
+
+def _choose(
+    task: Task,
+    condition: ExplorationCondition,
+    q: Array,
+    goal: tuple[float, float],
+    state: State,
+    values: dict[tuple[State, Hand], float],
+    rng: np.random.Generator,
+) -> Hand:
+    hands = [hand for hand in HANDS if hand in condition.hands]
+    if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
+        if condition.hand_exploration == "closest":
+            near = [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
+            if abs(max(near) - min(near)) > 1e-9:
+                return hands[int(np.argmin(near))]
+        return hands[int(rng.random() * len(hands))]
+    return max(hands, key=lambda hand: values.get((state, hand), -math.inf))
+
+
+def _explore(
+    task: Task,
+    condition: ExplorationCondition,
+    q: Array,
+    hand: Hand,
+    stored: Array,
+    rng: np.random.Generator,
+) -> Array:
+    other: Hand = "left" if hand == "right" else "right"
+    target = np.array(stored)
+    explored = np.full(task.robot.dof, condition.modify_chosen)
+    explored[task.robot.joints(other)] = condition.modify_other
+    explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
+    if not condition.modify_other:
+        target[task.robot.joints(other)] = q[task.robot.joints(other)]
+    target[explored] += condition.noise_sd * rng.standard_normal(int(explored.sum()))
+    return target
+
+
+def _distance(a: Array, b: Array | tuple[float, float]) -> float:
+    return math.sqrt(_sum_of_squares(np.asarray(a) - b))
+
+
+def _sum_of_squares(vector: Array) -> float:
+    total = 0.0
+    for value in vector:
+        total += float(value) * float(value)
+    return total

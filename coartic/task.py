@@ -1,0 +1,313 @@
+"""Tasks: a start, a sequence of goals, and what is known about each figure.
+
+A task is read from a TOML file, one of those shipped in ``coartic/tasks`` or the
+user's own in the same form. Anything that cannot be right is refused with the file,
+the key and what would be right.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from coartic.errors import TaskError
+from coartic.model import PAPER
+from coartic.robot import HANDS, Array, Finite, Hand, Robot
+
+InitialPolicy = Literal["best-single-hand", "best-of-all"]
+INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
+LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
+TASK_FOLDER = Path(__file__).parent / "tasks"
+
+Point = tuple[Finite, Finite]
+
+
+def hands_of(letters: str) -> tuple[Hand, ...]:
+    """``"RL"`` as ``("right", "left")``; KeyError for any other letter."""
+    return tuple(LETTERS[letter] for letter in letters)
+
+
+def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
+    """``("right", "left")`` as ``"RL"``, the paper's way of naming a hand sequence."""
+    return "".join(hand[0].upper() for hand in hands)
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+class Provenance(_Frozen):
+    """Where a figure of a task comes from."""
+
+    status: Literal["printed", "inferred", "chosen"]
+    """Printed in the paper, inferred from it, or chosen by the task's author."""
+    source: str
+
+
+class Start(_Frozen):
+    """Starting configuration q_0: base in length units, joint angles in rad."""
+
+    base: Point = (0.0, 0.0)
+    left: tuple[Finite, ...]
+    right: tuple[Finite, ...]
+
+
+class Task(_Frozen):
+    """A sequence of spatial goals to be hit, each with one of the robot's hands."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=64)]
+    title: str = ""
+    description: str = ""
+    hands: Annotated[tuple[Hand, ...], Field(min_length=1)] = HANDS
+    """Hands the robot has."""
+    goals: Annotated[tuple[Point, ...], Field(min_length=1)]
+    """Goal centres x_g in the order in which they are to be hit, length unit."""
+    radius: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = 0.1
+    """θ^g: radius of every goal, length unit."""
+    locked_base: tuple[Literal["x", "y"], ...] = ()
+    """Base coordinates that cannot move."""
+    initial_hands: str
+    """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one with
+    the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
+    start: Start
+    robot: Robot = Robot()
+    provenance: dict[str, Provenance] = {}
+    """Source and status of the figures, by key."""
+
+    @cached_property
+    def q0(self) -> Array:
+        """Starting configuration, shape ``(dof,)``, read-only."""
+        q = np.array([*self.start.base, *self.start.left, *self.start.right], dtype=np.float64)
+        q.setflags(write=False)
+        return q
+
+    @cached_property
+    def goal_array(self) -> Array:
+        """Goal centres, shape ``(G, 2)``, read-only."""
+        goals = np.array(self.goals, dtype=np.float64)
+        goals.setflags(write=False)
+        return goals
+
+    @property
+    def initial_is_policy(self) -> bool:
+        """Whether the initial hands are found by a policy instead of being named."""
+        return self.initial_hands in INITIAL_POLICIES
+
+    @property
+    def label(self) -> str:
+        """The title, or the name where there is none."""
+        return self.title or self.name
+
+    @property
+    def reconstructed(self) -> tuple[str, ...]:
+        """Keys whose figures were inferred, not printed."""
+        return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Task:
+        for check in (
+            self._check_hands,
+            self._check_start,
+            self._check_initial_hands,
+            self._check_radius,
+            self._check_reach,
+            self._check_provenance,
+        ):
+            problem = check()
+            if problem is not None:
+                key, message = problem
+                raise PydanticCustomError("task", "{text}", {"key": key, "text": message})
+        return self
+
+    def _check_hands(self) -> tuple[str, str] | None:
+        for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
+            if len(set(values)) < len(values):
+                return key, f"names the same entry twice: {', '.join(values)}"
+        return None
+
+    def _check_start(self) -> tuple[str, str] | None:
+        for hand, angles, links in (
+            ("left", self.start.left, self.robot.left_links),
+            ("right", self.start.right, self.robot.right_links),
+        ):
+            if len(angles) != len(links):
+                return (
+                    f"start.{hand}",
+                    f"has {len(angles)} joint angles; the {hand} arm has {len(links)} joints",
+                )
+        return None
+
+    def _check_initial_hands(self) -> tuple[str, str] | None:
+        if self.initial_is_policy:
+            return None
+        key, text = "initial_hands", self.initial_hands
+        if not text or set(text) - set(LETTERS):
+            return key, (
+                f"is {text!r}; it must be a sequence of L and R such as 'RRRR', "
+                f"or one of {', '.join(INITIAL_POLICIES)}"
+            )
+        if len(text) != len(self.goals):
+            return key, f"{text!r} names {len(text)} hands for {len(self.goals)} goals"
+        absent = sorted({LETTERS[letter] for letter in text} - set(self.hands))
+        if absent:
+            return key, f"{text!r} uses the {absent[0]} hand, which is not among hands"
+        return None
+
+    def _check_radius(self) -> tuple[str, str] | None:
+        tolerance = PAPER.correction_tolerance
+        if self.radius <= tolerance:
+            return "radius", (
+                f"is {self.radius:g}; it must exceed {tolerance:g}, the accuracy "
+                "of the corrective process"
+            )
+        return None
+
+    def _check_reach(self) -> tuple[str, str] | None:
+        named = None if self.initial_is_policy else hands_of(self.initial_hands)
+        for index, goal in enumerate(self.goals):
+            excess = {hand: self._beyond_reach(hand, goal) for hand in self.hands}
+            locked = " and ".join(self.locked_base)
+            where = f"({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked in {locked}"
+            if all(value > 0 for value in excess.values()):
+                return f"goals[{index}]", f"{where}: {min(excess.values()):.3g} too far"
+            if named is not None and excess[named[index]] > 0:
+                return f"goals[{index}]", (
+                    f"{where} for the {named[index]} hand that initial_hands "
+                    f"{self.initial_hands!r} gives it: {excess[named[index]]:.3g} too far"
+                )
+        return None
+
+    def _beyond_reach(self, hand: Hand, goal: Point) -> float:
+        """How far the corrective process must end short of a goal, at least."""
+        arm = self.robot.arm(hand)
+        near, far = self.robot.reach(hand)
+        dx = goal[0] - self.start.base[0] - arm.shoulder_x if "x" in self.locked_base else 0.0
+        dy = goal[1] - self.start.base[1] - arm.shoulder_y if "y" in self.locked_base else 0.0
+        distance = math.hypot(dx, dy)
+        # A base that is free in one coordinate can always back away.
+        inside = near - distance if len(self.locked_base) == 2 else 0.0
+        return max(distance - far, inside) - PAPER.correction_tolerance
+
+    def _check_provenance(self) -> tuple[str, str] | None:
+        for key in self.provenance:
+            if key not in type(self).model_fields:
+                return f"provenance.{key}", f"is not a key of a task{_hint(key)}"
+        return None
+
+
+def builtin_tasks() -> tuple[str, ...]:
+    """Names of the tasks shipped with the package, in the paper's order."""
+    return tuple(task.name for task in _shipped())
+
+
+def load_task(name_or_path: str | Path) -> Task:
+    """A shipped task by name, or a task file by path.
+
+    Raises TaskError, naming the file and the key, where it cannot be used.
+    """
+    if isinstance(name_or_path, str) and not name_or_path.endswith(".toml"):
+        for task in _shipped():
+            if task.name == name_or_path:
+                return task
+        close = difflib.get_close_matches(name_or_path, builtin_tasks(), n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise TaskError(
+            f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
+            "A task file's name ends in .toml."
+        )
+    return _read(Path(name_or_path))
+
+
+_cache: list[Task] = []
+
+
+def _shipped() -> list[Task]:
+    if not _cache:
+        _cache.extend(_read(path) for path in sorted(TASK_FOLDER.glob("*.toml")))
+    return _cache
+
+
+def _read(path: Path) -> Task:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TaskError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise TaskError(f"{path}: is not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise TaskError(f"{path}: is not valid TOML: {error}") from None
+    return parse_task(content, str(path))
+
+
+def parse_task(content: dict[str, Any], source: str) -> Task:
+    """A task from the content of a TOML file; ``source`` names it in errors.
+
+    Raises TaskError with one line per problem.
+    """
+    try:
+        return Task.model_validate(content)
+    except ValidationError as error:
+        lines = dict.fromkeys(f"{source}: {_explain(detail)}" for detail in error.errors())
+        raise TaskError("\n".join(lines)) from None
+
+
+def _hint(key: str) -> str:
+    known = [*Task.model_fields, *Start.model_fields, "left_links", "right_links"]
+    known += ["left_shoulder", "right_shoulder", "base_size", *Provenance.model_fields]
+    close = difflib.get_close_matches(key, known, n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _key(location: tuple[int | str, ...]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text or "the file"
+
+
+def _explain(detail: ErrorDetails) -> str:
+    """One sentence for one validation error."""
+    context = detail.get("ctx", {})
+    if detail["type"] == "task":
+        return f"{context['key']} {context['text']}"
+    key, value = _key(detail["loc"]), detail["input"]
+    match detail["type"]:
+        case "missing":
+            return f"{key} is missing"
+        case "extra_forbidden" | "unexpected_keyword_argument":
+            return f"{key} is an unknown key{_hint(str(detail['loc'][-1]))}"
+        case "finite_number":
+            return f"{key} is {value}; it must be a finite number"
+        case "float_type":
+            return f"{key} is {value!r} ({type(value).__name__}); it must be a number"
+        case "greater_than":
+            return f"{key} is {value}; it must be greater than 0"
+        case "literal_error":
+            return f"{key} is {value!r}; it must be {context['expected']}"
+        case "string_type":
+            return f"{key} is {value!r} ({type(value).__name__}); it must be a text"
+        case "string_pattern_mismatch":
+            return f"{key} is {value!r}; use letters, digits, '.', '_' and '-' only"
+        case "too_short" if key == "goals":
+            return "goals is empty; a task needs at least one goal"
+        case "too_short":
+            return f"{key} has too few entries; it needs at least {context['min_length']}"
+        case "too_long":
+            return (
+                f"{key} has {context['actual_length']} entries; it takes {context['max_length']}"
+            )
+        case "tuple_type":
+            return f"{key} is {value!r} ({type(value).__name__}); it must be a list"
+        case "model_type" | "model_attributes_type" | "dataclass_type" | "dict_type":
+            return f"{key} is {value!r}; it must be a table"
+        case _:
+            message = detail["msg"]
+            return f"{key}: {message[0].lower()}{message[1:]} (found {value!r})"

@@ -1,0 +1,25 @@
+"""Hypothesis strategies and small tasks shared by several test modules."""
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from coartic import Robot, parse_task
+
+UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9), left_shoulder=(-0.3, 0.2))
+
+
+def configurations(robot, low=-4.0, high=4.0):
+    return arrays(np.float64, robot.dof, elements=st.floats(low, high))
+
+
+def tiny_task(**changes):
+    """A two-goal task for the paper's robot; keyword arguments replace its keys."""
+    content = {
+        "name": "tiny",
+        "goals": [[5.0, 1.0], [5.0, 2.0]],
+        "initial_hands": "RR",
+        "start": {"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.0] * 4},
+    }
+    content.update(changes)
+    return parse_task({key: value for key, value in content.items() if value is not None}, "tiny")

@@ -1,0 +1,161 @@
+"""Movement: the kernel against the loop that visits every step, and against geometry."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from coartic import PAPER, MotionModel, Robot, move, reference
+from coartic.robot import HANDS
+
+from .strategies import UNEVEN, configurations
+
+ROBOT = Robot()
+
+
+def assert_same(fast, slow):
+    """Same ticks, same outcome, same configuration to the last bit; fewer evaluations."""
+    assert fast.ticks == slow.ticks
+    assert fast.hit == slow.hit
+    np.testing.assert_array_equal(fast.q, slow.q)
+    assert fast.evaluations <= slow.evaluations
+
+
+def random_movement(rng, robot, hand):
+    """A movement with a goal that is, in turn, anywhere, near its path, or near its end."""
+    q = rng.uniform(-3, 3, robot.dof)
+    target = q + rng.normal(size=robot.dof) * rng.choice([0.01, 0.1, 0.5])
+    place = rng.random()
+    point = q + place * (target - q) if place < 0.7 else target
+    spread = rng.choice([0.02, 0.1, 0.15, 1.0])
+    goal = robot.forward_kinematics(point, hand) + rng.normal(size=2) * spread
+    return q, target, tuple(goal)
+
+
+@pytest.mark.parametrize("robot", [ROBOT, UNEVEN], ids=["paper", "uneven"])
+@pytest.mark.parametrize("stop_on_arrival", [True, False])
+def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
+    """Thousands of random movements of all kinds."""
+    rng = np.random.default_rng(6)
+    hits = 0
+    for index in range(1000):
+        hand = HANDS[index % 2]
+        q, target, goal = random_movement(rng, robot, hand)
+        arguments = (robot, q, target, hand, goal, 0.1)
+        fast = move(*arguments, stop_on_arrival=stop_on_arrival)
+        slow = reference.move(*arguments, stop_on_arrival=stop_on_arrival)
+        assert_same(fast, slow)
+        hits += fast.hit
+    assert 200 < hits < 900  # both outcomes are well represented
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    q=configurations(ROBOT),
+    target=configurations(ROBOT),
+    hand=st.sampled_from(HANDS),
+    fraction=st.floats(0, 1),
+    offset=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)),
+    scale=st.floats(1e-4, 0.3),
+    radius=st.floats(0.011, 0.5),
+    stop_on_arrival=st.booleans(),
+)
+@example(
+    q=np.zeros(10), target=np.zeros(10), hand="right", fraction=0.0, offset=(1.0, 0.0),
+    scale=1.0, radius=0.1, stop_on_arrival=True,
+)  # fmt: skip
+def test_equals_the_loop_for_any_movement(
+    q, target, hand, fraction, offset, scale, radius, stop_on_arrival
+):
+    target = q + scale * (target - q)
+    point = q + fraction * (target - q)
+    goal = tuple(ROBOT.forward_kinematics(point, hand) + offset)
+    arguments = (ROBOT, q, target, hand, goal, radius)
+    assert_same(
+        move(*arguments, stop_on_arrival=stop_on_arrival),
+        reference.move(*arguments, stop_on_arrival=stop_on_arrival),
+    )
+
+
+@given(step=st.sampled_from([0.003, 0.01, 0.07]), tolerance=st.sampled_from([0.001, 0.01, 0.1]))
+@settings(max_examples=20, deadline=None)
+def test_equals_the_loop_under_other_constants(step, tolerance):
+    model = MotionModel(step=step, arrival_tolerance=tolerance)
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        q, target, goal = random_movement(rng, ROBOT, "left")
+        arguments = (ROBOT, q, target, "left", goal, 0.1)
+        assert_same(move(*arguments, model=model), reference.move(*arguments, model=model))
+
+
+def test_grazing_a_goal():
+    """Goals whose rim the hand's path only just touches, or only just misses."""
+    rng = np.random.default_rng(8)
+    outcomes = set()
+    for _ in range(150):
+        q = rng.uniform(-2, 2, 10)
+        target = q + rng.normal(size=10) * 0.3
+        middle = q + rng.uniform(0.2, 0.8) * (target - q)
+        velocity = ROBOT.jacobian(middle, "right") @ (target - q)
+        normal = np.array([-velocity[1], velocity[0]]) / np.hypot(*velocity)
+        reach = 0.1 + rng.choice([-1e-6, -1e-12, 1e-12, 1e-6, 1e-4])
+        goal = tuple(ROBOT.forward_kinematics(middle, "right") + reach * normal)
+        arguments = (ROBOT, q, target, "right", goal, 0.1)
+        fast = move(*arguments)
+        assert_same(fast, reference.move(*arguments))
+        outcomes.add(fast.hit)
+    assert outcomes == {True, False}
+
+
+def test_ticks_of_a_plain_translation():
+    """The base alone carries the hand 1.0 along x in 100 steps of 0.01."""
+    q = np.zeros(10)
+    target = np.zeros(10)
+    target[0] = 1.0
+    far = (100.0, 0.0)
+    # Arrives once within θ^a = 0.01 of the end: after 99 steps, seen on tick 100.
+    assert move(ROBOT, q, target, "right", far, 0.1).ticks == 100
+    # A corrective movement goes all the way: 100 steps and the tick that ends it.
+    assert move(ROBOT, q, target, "right", far, 0.1, stop_on_arrival=False).ticks == 101
+    # Goal ahead: the hand starts at (4.5, 0.1), the rim is at 4.895: 40 steps.
+    ahead = move(ROBOT, q, target, "right", (4.995, 0.1), 0.1)
+    assert (ahead.ticks, ahead.hit) == (41, True)
+    assert ahead.q[0] == pytest.approx(0.40)
+
+
+def test_movement_already_there():
+    q = np.zeros(10)
+    assert move(ROBOT, q, q, "right", (9.0, 9.0), 0.1)[1:3] == (1, False)
+    assert move(ROBOT, q, q, "right", (4.5, 0.1), 0.1)[1:3] == (1, True)
+
+
+def test_last_step_is_exact_and_shorter():
+    q, target = np.zeros(10), np.zeros(10)
+    target[3] = 0.0255  # 3 steps, the last one of 0.0055
+    result = move(ROBOT, q, target, "right", (50.0, 0.0), 0.1, stop_on_arrival=False)
+    assert result.ticks == math.ceil(0.0255 / PAPER.step) + 1
+    np.testing.assert_array_equal(result.q, target)
+
+
+def test_skips_most_steps():
+    rng = np.random.default_rng(9)
+    evaluations = ticks = 0
+    for _ in range(100):
+        q, target, _ = random_movement(rng, ROBOT, "right")
+        result = move(ROBOT, q, target, "right", (30.0, 0.0), 0.1)
+        evaluations += result.evaluations
+        ticks += result.ticks
+    assert evaluations < ticks / 4
+
+
+def test_inputs_are_left_alone_and_checked():
+    q, target = np.zeros(10), np.ones(10)
+    move(ROBOT, q, target, "right", (1.0, 1.0), 0.1)
+    assert not q.any()
+    assert (target == 1).all()
+    with pytest.raises(ValueError, match=r"shape \(3,\)"):
+        move(ROBOT, np.zeros(3), target, "right", (1.0, 1.0), 0.1)
+    with pytest.raises(ValueError, match="not finite"):
+        move(ROBOT, q, np.full(10, np.nan), "right", (1.0, 1.0), 0.1)

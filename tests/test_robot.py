@@ -1,0 +1,210 @@
+"""The kinematic module against analytic poses, finite differences and its own laws."""
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from coartic.compiled import entry, joint_chain, joint_lever
+from coartic.robot import HANDS, Robot
+
+PAPER_ROBOT = Robot()
+UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9), left_shoulder=(-0.3, 0.2))
+ROBOTS = [PAPER_ROBOT, UNEVEN]
+
+
+def configurations(robot, low=-10.0, high=10.0):
+    return arrays(np.float64, robot.dof, elements=st.floats(low, high))
+
+
+@pytest.mark.parametrize(
+    ("q", "hand", "expected"),
+    [
+        # Arms straight along +x: shoulder plus four unit links.
+        (np.zeros(10), "right", (4.5, 0.1)),
+        (np.zeros(10), "left", (3.5, 0.1)),
+        # Right arm straight up, base moved.
+        ([1, 2, 0, 0, 0, 0, np.pi / 2, 0, 0, 0], "right", (1.5, 6.1)),
+        # Right arm folded into a square: four links back to the shoulder.
+        ([0, 0, 0, 0, 0, 0, 0, np.pi / 2, np.pi / 2, np.pi / 2], "right", (0.5, 0.1)),
+        # Relative angles: the second link turns back against the first.
+        ([0, 0, np.pi / 2, -np.pi / 2, 0, 0, 0, 0, 0, 0], "left", (2.5, 1.1)),
+    ],
+)
+def test_analytic_poses(q, hand, expected):
+    np.testing.assert_allclose(PAPER_ROBOT.forward_kinematics(q, hand), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("hand", HANDS)
+def test_forward_kinematics_against_complex_exponentials(robot, hand):
+    rng = np.random.default_rng(1)
+    q = rng.uniform(-4, 4, (50, robot.dof))
+    shoulder = complex(*(robot.left_shoulder if hand == "left" else robot.right_shoulder))
+    links = np.array(robot.left_links if hand == "left" else robot.right_links)
+    angles = np.cumsum(q[:, robot.joints(hand)], axis=1)
+    tips = q[:, 0] + 1j * q[:, 1] + shoulder + (links * np.exp(1j * angles)).sum(axis=1)
+    position = robot.forward_kinematics(q, hand)
+    np.testing.assert_allclose(position, np.stack([tips.real, tips.imag], axis=1), atol=1e-13)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("hand", HANDS)
+def test_leading_axes_are_vectorised(robot, hand):
+    q = np.random.default_rng(2).uniform(-4, 4, (3, 5, robot.dof))
+    positions = robot.joint_positions(q, hand)
+    jacobians = robot.jacobian(q, hand)
+    links = robot.left_links if hand == "left" else robot.right_links
+    assert positions.shape == (3, 5, len(links) + 1, 2)
+    assert jacobians.shape == (3, 5, 2, robot.dof)
+    for index in np.ndindex(3, 5):
+        np.testing.assert_array_equal(positions[index], robot.joint_positions(q[index], hand))
+        np.testing.assert_array_equal(jacobians[index], robot.jacobian(q[index], hand))
+
+
+@pytest.mark.parametrize("hand", HANDS)
+@given(q=configurations(UNEVEN))
+def test_jacobian_against_finite_differences(hand, q):
+    step = 1e-6
+    numeric = np.empty((2, UNEVEN.dof))
+    for joint in range(UNEVEN.dof):
+        delta = np.zeros(UNEVEN.dof)
+        delta[joint] = step
+        ahead = UNEVEN.forward_kinematics(q + delta, hand)
+        behind = UNEVEN.forward_kinematics(q - delta, hand)
+        numeric[:, joint] = (ahead - behind) / (2 * step)
+    np.testing.assert_allclose(UNEVEN.jacobian(q, hand), numeric, atol=1e-8)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("hand", HANDS)
+def test_three_worlds_agree(robot, hand):
+    """NumPy, CasADi (its own automatic differentiation included) and the kernels."""
+    symbol = casadi.SX.sym("q", robot.dof)
+    position = robot.symbolic_hand(symbol, hand)
+    symbolic = casadi.Function(
+        "f",
+        [symbol],
+        [position, robot.symbolic_jacobian(symbol, hand), casadi.jacobian(position, symbol)],
+    )
+
+    @entry
+    def compiled(q, arm, xs, ys, jacobian):
+        joint_chain(q, arm, xs, ys)
+        tip = len(arm.links)
+        for k in range(tip):
+            jacobian[0, arm.first + k], jacobian[1, arm.first + k] = joint_lever(xs, ys, k, tip)
+
+    arm = robot.arm(hand)
+    for q in np.random.default_rng(3).uniform(-20, 20, (200, robot.dof)):
+        expected, jacobian = robot.forward_kinematics(q, hand), robot.jacobian(q, hand)
+        f, j, automatic = (np.array(value) for value in symbolic(q))
+        np.testing.assert_allclose(f.ravel(), expected, atol=1e-12, rtol=0)
+        np.testing.assert_allclose(j, jacobian, atol=1e-12, rtol=0)
+        np.testing.assert_allclose(automatic, jacobian, atol=1e-12, rtol=0)
+        xs, ys, columns = (
+            np.empty(len(arm.links) + 1),
+            np.empty(len(arm.links) + 1),
+            np.zeros_like(j),
+        )
+        columns[0, 0] = columns[1, 1] = 1
+        compiled(q, arm, xs, ys, columns)
+        np.testing.assert_allclose([xs[-1], ys[-1]], expected, atol=1e-12, rtol=0)
+        np.testing.assert_allclose(columns, jacobian, atol=1e-12, rtol=0)
+
+
+def test_casadi_matrix_symbols_and_no_warnings():
+    """MX works as SX does; the suite turns CasADi's warnings into errors."""
+    symbol = casadi.MX.sym("q", 10)
+    function = casadi.Function("f", [symbol], [PAPER_ROBOT.symbolic_hand(symbol, "left")])
+    q = np.linspace(-1, 1, 10)
+    np.testing.assert_allclose(
+        np.array(function(q)).ravel(), PAPER_ROBOT.forward_kinematics(q, "left"), atol=1e-14
+    )
+
+
+@given(q=configurations(PAPER_ROBOT), shift=arrays(np.float64, 2, elements=st.floats(-5, 5)))
+def test_moving_the_base_moves_both_hands_alike(q, shift):
+    moved = q.copy()
+    moved[:2] += shift
+    for hand in HANDS:
+        travel = PAPER_ROBOT.forward_kinematics(moved, hand) - PAPER_ROBOT.forward_kinematics(
+            q, hand
+        )
+        np.testing.assert_allclose(travel, shift, atol=1e-13)
+
+
+@pytest.mark.parametrize("hand", HANDS)
+@given(q=configurations(PAPER_ROBOT), angle=st.floats(-7, 7))
+def test_turning_the_first_joint_turns_the_arm(hand, q, angle):
+    turned = q.copy()
+    turned[PAPER_ROBOT.arm(hand).first] += angle
+    before = PAPER_ROBOT.joint_positions(q, hand)
+    after = PAPER_ROBOT.joint_positions(turned, hand)
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    np.testing.assert_allclose(after - after[0], (before - before[0]) @ rotation.T, atol=1e-12)
+
+
+@given(q=configurations(PAPER_ROBOT))
+def test_hand_does_not_depend_on_the_other_arm(q):
+    other = q.copy()
+    other[PAPER_ROBOT.joints("left")] += 1.0
+    np.testing.assert_array_equal(
+        PAPER_ROBOT.forward_kinematics(q, "right"), PAPER_ROBOT.forward_kinematics(other, "right")
+    )
+
+
+@pytest.mark.parametrize("hand", HANDS)
+@given(q=configurations(PAPER_ROBOT, -3, 3))
+def test_nullspace_projector_laws(hand, q):
+    projector = PAPER_ROBOT.nullspace_projector(q, hand)
+    jacobian = PAPER_ROBOT.jacobian(q, hand)
+    np.testing.assert_allclose(jacobian @ projector, 0, atol=1e-10)
+    np.testing.assert_allclose(projector @ projector, projector, atol=1e-10)
+    np.testing.assert_allclose(projector, projector.T, atol=1e-10)
+    assert np.trace(projector) == pytest.approx(8)  # 10 degrees of freedom, 2 constraints
+
+
+def test_nullspace_with_locked_base():
+    q = np.random.default_rng(4).uniform(-1, 1, 10)
+    free = np.ones(10, bool)
+    free[:2] = False
+    projector = PAPER_ROBOT.nullspace_projector(q, "right", free)
+    assert not projector[:2].any()
+    assert not projector[:, :2].any()
+    np.testing.assert_allclose(PAPER_ROBOT.jacobian(q, "right") @ projector, 0, atol=1e-12)
+    assert np.trace(projector) == pytest.approx(6)
+
+
+def test_nullspace_at_a_singular_posture():
+    """A straight arm on a locked base controls one direction only."""
+    free = np.ones(10, bool)
+    free[:2] = False
+    projector = PAPER_ROBOT.nullspace_projector(np.zeros(10), "right", free)
+    assert np.trace(projector) == pytest.approx(7)
+
+
+def test_reach():
+    assert PAPER_ROBOT.reach("left") == (0.0, 4.0)
+    assert UNEVEN.reach("left") == (0.7, 0.7)
+    assert Robot(right_links=(3.0, 1.0)).reach("right") == (2.0, 4.0)
+
+
+def test_base_outline():
+    outline = PAPER_ROBOT.base_outline(np.array([1.0, 2.0, *np.zeros(8)]))
+    np.testing.assert_allclose(outline, [[0.5, 1.9], [1.5, 1.9], [1.5, 2.1], [0.5, 2.1]])
+    # The shoulders sit on its top corners.
+    q = np.zeros(10)
+    np.testing.assert_allclose(
+        PAPER_ROBOT.base_outline(q)[2], PAPER_ROBOT.joint_positions(q, "right")[0]
+    )
+
+
+def test_names_and_shapes():
+    assert UNEVEN.joint_names == ("base_x", "base_y", "left_1", "right_1", "right_2", "right_3")
+    with pytest.raises(ValueError, match=r"shape \(9,\).*needs \(\.\.\., 10\)"):
+        PAPER_ROBOT.forward_kinematics(np.zeros(9), "left")
+    with pytest.raises(ValueError, match="unknown hand 'middle'"):
+        PAPER_ROBOT.forward_kinematics(np.zeros(10), "middle")

@@ -1,0 +1,52 @@
+"""The kernels' cosine and sine against arbitrary precision."""
+
+from decimal import Decimal, getcontext
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from numba import njit
+
+from coartic import trigonometry
+from coartic.trigonometry import LARGEST, cosine, sine
+
+
+@njit
+def _evaluate(angles):
+    out = np.empty((2, len(angles)))
+    for i in range(len(angles)):
+        out[0, i] = cosine(angles[i])
+        out[1, i] = sine(angles[i])
+    return out
+
+
+def test_parts_of_half_pi():
+    getcontext().prec = 60
+    half_pi = Decimal("1.57079632679489661923132169163975144209858469968755291")
+    parts = [trigonometry._HIGH, trigonometry._MIDDLE, trigonometry._LOW]
+    assert abs(sum(map(Decimal, parts)) - half_pi) < Decimal("1e-36")
+    largest_multiple = int(LARGEST / float(half_pi)) + 1
+    for part in parts[:2]:  # their products with any quarter count fit into 53 bits
+        assert Fraction(part * largest_multiple) == Fraction(part) * largest_multiple
+
+
+@pytest.mark.parametrize("span", [1e-3, 1.0, 7.0, 1e3, LARGEST * 0.999])
+def test_error_below_two_tenths_of_a_femto(span):
+    angles = np.random.default_rng(5).uniform(-span, span, 200_000)
+    exact = angles.astype(np.longdouble)
+    computed = _evaluate(angles)
+    assert np.max(np.abs(computed[0] - np.cos(exact))) < 2e-16
+    assert np.max(np.abs(computed[1] - np.sin(exact))) < 2e-16
+
+
+def test_quadrants_and_edges():
+    quarter = np.pi / 2
+    angles = np.array([k * quarter + e for k in range(-9, 10) for e in (-1e-9, 0.0, 1e-9)])
+    np.testing.assert_allclose(_evaluate(angles), [np.cos(angles), np.sin(angles)], atol=3e-16)
+    np.testing.assert_array_equal(_evaluate(np.array([0.0])), [[1.0], [0.0]])
+
+
+def test_huge_angles_and_non_numbers_go_to_the_library():
+    angles = np.array([LARGEST, -1e9, 1e300])
+    np.testing.assert_array_equal(_evaluate(angles), [np.cos(angles), np.sin(angles)])
+    assert np.isnan(_evaluate(np.array([np.nan]))).all()
