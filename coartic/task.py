@@ -255,8 +255,22 @@ def parse_task(content: dict[str, Any], source: str) -> Task:
     try:
         return Task.model_validate(content)
     except ValidationError as error:
-        lines = dict.fromkeys(f"{source}: {_explain(detail)}" for detail in error.errors())
+        lines = dict.fromkeys(f"{source}: {_explain(detail)}" for detail in _causes(error))
         raise TaskError("\n".join(lines)) from None
+
+
+def _causes(error: ValidationError) -> list[ErrorDetails]:
+    """The errors, without a list counted too short because of its bad entries."""
+    details = error.errors()
+    return [
+        detail
+        for detail in details
+        if detail["type"] != "too_short"
+        or not any(
+            other["loc"] != detail["loc"] and other["loc"][: len(detail["loc"])] == detail["loc"]
+            for other in details
+        )
+    ]
 
 
 def _hint(key: str) -> str:

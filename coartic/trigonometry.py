@@ -35,14 +35,16 @@ def _reduced(angle: float) -> tuple[float, float, int]:
     """Sine and cosine of the angle less k quarter turns, and k modulo 4."""
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
+    # Estrin's order: short chains of dependent operations.
     z = x * x
-    sine = x + x * z * (
-        _S3 + z * (_S5 + z * (_S7 + z * (_S9 + z * (_S11 + z * (_S13 + z * (_S15 + z * _S17))))))
-    )
-    cosine = 1.0 - (
-        0.5 * z
-        - z * z * (_C4 + z * (_C6 + z * (_C8 + z * (_C10 + z * (_C12 + z * (_C14 + z * _C16))))))
-    )
+    z2 = z * z
+    z4 = z2 * z2
+    odd = (_S3 + z * _S5) + z2 * (_S7 + z * _S9)
+    odd += z4 * ((_S11 + z * _S13) + z2 * (_S15 + z * _S17))
+    even = (_C4 + z * _C6) + z2 * (_C8 + z * _C10)
+    even += z4 * ((_C12 + z * _C14) + z2 * _C16)
+    sine = x + (x * z) * odd
+    cosine = 1.0 - (0.5 * z - z2 * even)
     return sine, cosine, int(quarters) & 3
 
 

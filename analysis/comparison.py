@@ -1,0 +1,330 @@
+"""Published against ours: the comparison table of a results folder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from analysis.published import (
+    PublishedCell,
+    Summary,
+    published_cell,
+    published_exhaustive,
+    published_initial,
+)
+from analysis.results import Results
+
+MARGIN = 0.01
+"""Differences up to this share of the published reward count as equivalent."""
+CONFIDENCE = 0.95
+NONE = "–"
+Rewards = Sequence[float] | NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Our mean reward less the published one."""
+
+    value: float
+    low: float
+    high: float
+    margin: float
+
+    @property
+    def verdict(self) -> str:
+        """Equivalent where the interval lies within the margin, different where it
+        lies outside, undecided where it does neither."""
+        if math.isnan(self.low):
+            return "undecided"
+        if -self.margin <= self.low and self.high <= self.margin:
+            return "equivalent"
+        if self.low > self.margin or self.high < -self.margin:
+            return "different"
+        return "undecided"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text, ready for a terminal or for Markdown."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All tables of a comparison, and the notes that belong to them."""
+
+    title: str
+    tables: tuple[Table, ...]
+    notes: tuple[str, ...]
+
+    def to_markdown(self) -> str:
+        """The comparison as a Markdown page."""
+        parts = [f"# {self.title}"]
+        for table in self.tables:
+            parts.append(f"## {table.title}")
+            parts.append(_markdown(table))
+        parts.append("## Notes")
+        parts.append("\n".join(f"- {note}" for note in self.notes))
+        return "\n\n".join(parts) + "\n"
+
+
+def difference(ours: Rewards, published: Summary) -> Difference:
+    """Difference of means with its interval (Welch, from the printed mean, SD and n).
+
+    Where no SD is printed the published mean is taken as exact. The interval is NaN
+    with fewer than two runs of our own.
+    """
+    values = np.asarray(ours, dtype=np.float64)
+    value = float(values.mean()) - published.mean
+    margin = MARGIN * abs(published.mean)
+    if len(values) < 2:
+        return Difference(value, math.nan, math.nan, margin)
+    variances = [float(values.var(ddof=1)) / len(values)]
+    freedoms = [len(values) - 1]
+    if published.sd is not None and published.runs > 1:
+        variances.append(published.sd**2 / published.runs)
+        freedoms.append(published.runs - 1)
+    total = sum(variances)
+    if total == 0.0:
+        return Difference(value, value, value, margin)
+    freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * math.sqrt(total)
+    return Difference(value, value - half, value + half, margin)
+
+
+def compare(results: Results) -> Comparison:
+    """Compare every cell of a results folder with what the paper prints."""
+    cells = [
+        (task, method, results.runs[(results.runs.task == task) & (results.runs.method == method)])
+        for task, method in results.cells
+    ]
+    tables = [
+        _cells_table(cells),
+        _sequences_table(cells),
+        _initial_table(results),
+    ]
+    return Comparison(
+        title="Published and ours",
+        tables=tuple(table for table in tables if table.rows),
+        notes=tuple(_notes(results)),
+    )
+
+
+_CellRuns = tuple[str, str, pd.DataFrame]
+
+
+def _cells_table(cells: Iterable[_CellRuns]) -> Table:
+    rows = []
+    for task, method, runs in cells:
+        paper = _published(task, method)
+        good = runs[runs.status == "ok"]
+        rewards = good.reward.to_numpy(dtype=np.float64)
+        rows.append(
+            (
+                task,
+                method,
+                _published_text(paper),
+                _mean_sd(rewards),
+                _difference_text(rewards, paper.summary if paper else None),
+                _verdict(rewards, paper.summary if paper else None),
+                f"{_distinct(runs.initial_reward)} ({_initial_text(task)})",
+                f"{_counts(good.hands)} ({_published_hands(paper)})",
+            )
+        )
+    columns = (
+        "task",
+        "method",
+        "published",
+        "ours: mean ± SD (n)",
+        f"difference [{CONFIDENCE:.0%} CI]",
+        f"within ±{MARGIN:.0%}",
+        "initial (published)",
+        "hands: runs (published)",
+    )
+    return Table("Learned reward", columns, tuple(rows))
+
+
+def _sequences_table(cells: Iterable[_CellRuns]) -> Table:
+    """Rewards by hand sequence, where the paper tells them apart."""
+    rows = []
+    for task, method, runs in cells:
+        paper = _published(task, method)
+        good = runs[runs.status == "ok"]
+        printed = {s.hands: s for s in paper.sequences} if paper else {}
+        if not printed and good.hands.nunique() < 2:
+            continue
+        found = list(good.hands.value_counts().index)
+        for hands in dict.fromkeys([*printed, *found]):
+            rewards = good[good.hands == hands].reward.to_numpy(dtype=np.float64)
+            summary = printed[hands].summary if hands in printed else None
+            rows.append(
+                (
+                    task,
+                    method,
+                    hands,
+                    _summary_text(summary),
+                    _share(printed[hands].runs) if hands in printed else "0",
+                    _mean_sd(rewards),
+                    _difference_text(rewards, summary),
+                )
+            )
+    columns = (
+        "task",
+        "method",
+        "hands",
+        "published reward",
+        "published runs",
+        "ours: mean ± SD (n)",
+        f"difference [{CONFIDENCE:.0%} CI]",
+    )
+    return Table("By hand sequence", columns, tuple(rows))
+
+
+def _initial_table(results: Results) -> Table:
+    """The corrective process alone: the best hand sequences of every task."""
+    rows = []
+    for task in results.tasks:
+        trials = results.sequences[results.sequences.task == task]
+        if len(trials) < 2:
+            continue
+        paper = published_exhaustive(task)
+        best = trials.dropna(subset=["reward"]).head(4)
+        rows.append(
+            (
+                task,
+                f"{paper[0]} {paper[1]}" if paper else NONE,
+                ", ".join(f"{row.hands} {row.reward}" for row in best.itertuples()) or NONE,
+                f"{len(trials)} ({trials.reward.isna().sum()} failed)",
+            )
+        )
+    columns = ("task", "best, published", "best four, ours", "sequences tried")
+    return Table("Corrective process alone, every hand sequence", columns, tuple(rows))
+
+
+def _notes(results: Results) -> list[str]:
+    specification = results.manifest["specification"]
+    environment = results.manifest["environment"]
+    notes = [
+        "Published: Shah, Barto & Fagg (2013). A dual process account of coarticulation in "
+        "motor skill acquisition. *Journal of Motor Behavior*. Rewards are -1 per control "
+        "tick; printed means are rounded to the digits shown.",
+        "Learned reward of a run: the highest total reward of any of its trials. "
+        f"Difference: ours less published, with a {CONFIDENCE:.0%} interval (Welch, from the "
+        "printed mean, SD and number of runs; where no SD is printed, the printed mean is "
+        f"taken as exact). It is equivalent where the interval lies within ±{MARGIN:.0%} of "
+        "the published reward, different where it lies outside, undecided otherwise. The "
+        "intervals are for each row alone; they are not adjusted for their number.",
+    ]
+    if any(_starred(task, method) for task, method in results.cells):
+        notes.append("\\* derived from other printed numbers, not printed itself.")
+    for name, task in results.tasks.items():
+        if task.reconstructed:
+            what = " and ".join(task.reconstructed)
+            notes.append(
+                f"Reconstructed: {what} of **{name}** are not printed; they are inferred from "
+                "what is (docs/model.md), and rewards on it depend on them."
+            )
+    failed = results.runs[results.runs.status != "ok"]
+    for reason, runs in failed.groupby(["task", "method", "status", "reason"]).run.count().items():
+        task, method, status, text = reason if isinstance(reason, tuple) else (reason,)
+        notes.append(f"{runs} runs of {task} x {method} are {status}: {text}")
+    commit = environment["commit"]
+    version = f"coartic {environment['coartic']}"
+    if commit:
+        version += f", commit {commit['id'][:12]}{' with changes' if commit['dirty'] else ''}"
+    notes.append(
+        f"Suite `{specification['suite']}`, {specification['runs']} runs of "
+        f"{specification['trials']} trials, seed {specification['seed']}; {version}, model code "
+        f"{environment['model_code']}; Python {environment['python']}, "
+        f"{environment['platform']}; {environment['date']}."
+    )
+    return notes
+
+
+def _published(task: str, method: str) -> PublishedCell | None:
+    return published_cell(task, method.rpartition("/")[2])
+
+
+def _starred(task: str, method: str) -> bool:
+    paper, initial = _published(task, method), published_initial(task)
+    return bool((paper and paper.summary and paper.summary.derived) or (initial and initial[2]))
+
+
+def _published_text(paper: PublishedCell | None) -> str:
+    if paper is None:
+        return NONE
+    if paper.summary is None:
+        return f"not printed ({paper.remark})" if paper.remark else "not printed"
+    return _summary_text(paper.summary)
+
+
+def _summary_text(summary: Summary | None) -> str:
+    if summary is None:
+        return NONE
+    text = f"{summary.mean:.1f}" if summary.derived else f"{summary.mean:g}"
+    if summary.sd is not None:
+        text += f" ± {summary.sd:.1f}" if summary.derived else f" ± {summary.sd:g}"
+    return f"{text} ({summary.runs}){'*' if summary.derived else ''}"
+
+
+def _mean_sd(rewards: Rewards) -> str:
+    if len(rewards) == 0:
+        return f"{NONE} (0)"
+    spread = f" ± {np.std(rewards, ddof=1):.1f}" if len(rewards) > 1 else ""
+    return f"{np.mean(rewards):.1f}{spread} ({len(rewards)})"
+
+
+def _difference_text(rewards: Rewards, published: Summary | None) -> str:
+    if published is None or len(rewards) == 0:
+        return NONE
+    found = difference(rewards, published)
+    if math.isnan(found.low):
+        return f"{found.value:+.1f}"
+    return f"{found.value:+.1f} [{found.low:+.1f}, {found.high:+.1f}]"
+
+
+def _verdict(rewards: Rewards, published: Summary | None) -> str:
+    if published is None or len(rewards) == 0:
+        return NONE
+    return difference(rewards, published).verdict
+
+
+def _published_hands(paper: PublishedCell | None) -> str:
+    if paper is None or not paper.sequences:
+        return NONE
+    return ", ".join(f"{s.hands} {_share(s.runs)}" for s in paper.sequences)
+
+
+def _share(runs: int | None) -> str:
+    return "(runs not printed)" if runs is None else str(runs)
+
+
+def _counts(values: pd.Series) -> str:
+    return ", ".join(f"{value} {count}" for value, count in values.value_counts().items()) or NONE
+
+
+def _initial_text(task: str) -> str:
+    initial = published_initial(task)
+    return f"{initial[1]}{'*' if initial[2] else ''}" if initial else NONE
+
+
+def _distinct(values: pd.Series) -> str:
+    return ", ".join(str(value) for value in sorted(values.dropna().unique())) or NONE
+
+
+def _markdown(table: Table) -> str:
+    def line(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    return "\n".join(
+        [line(table.columns), line(["---"] * len(table.columns)), *map(line, table.rows)]
+    )

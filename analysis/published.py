@@ -1,0 +1,103 @@
+"""The numbers printed in Shah, Barto & Fagg (2013), from ``published.toml``."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+RUNS = 20  # runs of every experiment (printed, section *Initial Solution and Learning*)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A printed mean reward with what is printed about its spread."""
+
+    mean: float
+    sd: float | None
+    runs: int
+    derived: bool = False
+    """Computed from other printed numbers rather than printed itself."""
+
+
+@dataclass(frozen=True)
+class SequenceResult:
+    """A hand sequence the paper reports for a cell."""
+
+    hands: str
+    summary: Summary | None
+    runs: int | None
+
+
+@dataclass(frozen=True)
+class PublishedCell:
+    """What the paper prints about one task under one condition."""
+
+    summary: Summary | None
+    sequences: tuple[SequenceResult, ...]
+    remark: str = ""
+
+
+def published_initial(task: str) -> tuple[str, int, bool] | None:
+    """Hands, reward and whether derived, of a task's initial solution."""
+    entry = _published().get(_key(task), {}).get("initial")
+    if entry is None:
+        return None
+    return entry["hands"], entry["reward"], bool(entry.get("derived", False))
+
+
+def published_exhaustive(task: str) -> tuple[str, int] | None:
+    """Best hands and reward of the corrective process alone over all sequences."""
+    entry = _published().get(_key(task), {}).get("exhaustive")
+    return None if entry is None else (entry["hands"], entry["reward"])
+
+
+def published_cell(task: str, condition: str) -> PublishedCell | None:
+    """What is printed about a cell; None for a cell that the paper does not have."""
+    entry = _published().get(_key(task), {}).get(condition)
+    if entry is None:
+        return None
+    sequences = tuple(
+        SequenceResult(
+            item["hands"],
+            Summary(item["reward"], item.get("sd"), item.get("runs", RUNS)),
+            item.get("runs"),
+        )
+        for item in entry.get("sequences", ())
+    )
+    remark = f"higher than {entry['better_than']}" if "better_than" in entry else ""
+    if "reward" in entry:
+        summary: Summary | None = Summary(entry["reward"], entry.get("sd"), RUNS)
+    else:
+        summary = pooled([s.summary for s in sequences if s.summary is not None])
+    return PublishedCell(summary, sequences, remark)
+
+
+def pooled(parts: list[Summary]) -> Summary | None:
+    """Mean and SD over all runs of several groups, from each group's own."""
+    if not parts:
+        return None
+    if len(parts) == 1:
+        return parts[0]
+    runs = sum(part.runs for part in parts)
+    mean = sum(part.runs * part.mean for part in parts) / runs
+    if any(part.sd is None for part in parts):
+        return Summary(mean, None, runs, derived=True)
+    squares = sum(
+        (part.runs - 1) * (part.sd or 0.0) ** 2 + part.runs * (part.mean - mean) ** 2
+        for part in parts
+    )
+    return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
+
+
+@cache
+def _published() -> dict[str, Any]:
+    path = Path(__file__).parent / "published.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _key(task: str) -> str:
+    return task.replace("-", "_")

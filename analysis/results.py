@@ -1,0 +1,58 @@
+"""A results folder, read back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from coartic import CoarticError, Task, parse_task
+
+
+@dataclass(frozen=True)
+class Results:
+    """The tables of one results folder; their columns are listed in docs/results.md."""
+
+    folder: Path
+    manifest: dict[str, Any]
+    runs: pd.DataFrame
+    sequences: pd.DataFrame
+
+    @property
+    def tasks(self) -> dict[str, Task]:
+        """The tasks as they were run, by name."""
+        source = str(self.folder / "manifest.json")
+        content = self.manifest["specification"]["tasks"]
+        return {name: parse_task(task, source) for name, task in content.items()}
+
+    @property
+    def cells(self) -> list[tuple[str, str]]:
+        """Task and method of every cell, in the order in which they were run."""
+        cells = self.manifest["specification"]["cells"]
+        return [(cell["task"], cell["method"]) for cell in cells]
+
+    def solutions(self) -> pd.DataFrame:
+        """Movements of every run's best trial."""
+        return pd.read_parquet(self.folder / "solutions.parquet")
+
+    def learning(self) -> pd.DataFrame:
+        """Reward of every trial."""
+        return pd.read_parquet(self.folder / "learning.parquet", dtype_backend="numpy_nullable")
+
+
+def load_results(folder: Path) -> Results:
+    """Read a results folder. Raises CoarticError where it is not one or is damaged."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        runs = pd.read_parquet(folder / "runs.parquet", dtype_backend="numpy_nullable")
+        sequences = pd.read_parquet(folder / "sequences.parquet", dtype_backend="numpy_nullable")
+    except FileNotFoundError as error:
+        raise CoarticError(
+            f"{folder} is not a results folder: {error.filename} is missing"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise CoarticError(f"{folder}: results cannot be read: {error}") from None
+    return Results(folder, manifest, runs, sequences)

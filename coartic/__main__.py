@@ -1,0 +1,5 @@
+"""``python -m coartic``: the command line."""
+
+from coartic.cli import main
+
+main()

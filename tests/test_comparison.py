@@ -1,0 +1,131 @@
+"""The comparison with the paper: its statistics against independent ones."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.comparison import Comparison, Table, compare, difference
+from analysis.published import (
+    Summary,
+    pooled,
+    published_cell,
+    published_exhaustive,
+    published_initial,
+)
+from analysis.results import Results
+from benchmarks.suites import load_suite, select_cells
+
+
+def test_published_numbers():
+    assert published_cell("ascending", "EC1").summary == Summary(-303, 2.9, 20)
+    assert published_initial("descending") == ("RRR", -333, True)
+    assert published_initial("two-armed-1") == ("RRRR", -675, False)
+    assert published_exhaustive("two-armed-1") == ("LRLR", -532)
+    assert published_exhaustive("two-armed-2") == ("RRRR", -357)
+    assert published_cell("two-armed-2", "EC4").summary is None
+    assert published_cell("two-armed-2", "EC4").remark == "higher than EC3"
+    assert published_cell("ascending", "EC4") is None
+    assert published_cell("own", "EC1") is published_initial("own") is None
+
+
+def test_every_cell_of_the_suite_is_published():
+    for cell in select_cells(load_suite("paper")):
+        assert published_cell(cell.task.name, cell.condition.id) is not None
+
+
+def test_pooling_groups_gives_mean_and_sd_of_all():
+    rng = np.random.default_rng(12)
+    groups = [rng.normal(-520, 8, 11), rng.normal(-609, 17, 9)]
+    summary = pooled([Summary(g.mean(), g.std(ddof=1), len(g)) for g in groups])
+    together = np.concatenate(groups)
+    assert summary.mean == pytest.approx(together.mean())
+    assert summary.sd == pytest.approx(together.std(ddof=1))
+    assert summary.runs == 20
+    assert summary.derived
+
+
+def test_interval_is_welchs():
+    rng = np.random.default_rng(13)
+    ours, theirs = rng.normal(-505, 5, 20), rng.normal(-502, 3, 15)
+    found = difference(ours, Summary(theirs.mean(), theirs.std(ddof=1), 15))
+    expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
+    assert found.value == pytest.approx(ours.mean() - theirs.mean())
+
+
+def test_interval_against_an_exact_value_is_students():
+    ours = np.random.default_rng(14).normal(-484, 4, 12)
+    found = difference(ours, Summary(-484, None, 20))
+    expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((expected.low + 484, expected.high + 484))
+
+
+@pytest.mark.parametrize(
+    ("shift", "spread", "verdict"),
+    [(0.0, 1.0, "equivalent"), (-30.0, 1.0, "different"), (0.0, 80.0, "undecided")],
+)
+def test_verdicts(shift, spread, verdict):
+    ours = -500 + shift + spread * np.linspace(-1, 1, 20)
+    assert difference(ours, Summary(-500, 1.0, 20)).verdict == verdict
+
+
+def test_edge_cases_of_the_difference():
+    assert difference([-500.0], Summary(-500, 1.0, 20)).verdict == "undecided"
+    same = difference([-500.0, -500.0], Summary(-500, None, 20))
+    assert (same.low, same.high, same.verdict) == (0.0, 0.0, "equivalent")
+
+
+def fake_results(tmp_path, runs):
+    manifest = {
+        "specification": {
+            "suite": "paper", "runs": 3, "trials": 10, "seed": 0, "tasks": {},
+            "cells": [{"task": "two-armed-1", "method": "dual-process/EC2"}],
+        },
+        "environment": {
+            "coartic": "0", "commit": {"id": "abc", "dirty": True}, "model_code": "code",
+            "python": "3", "platform": "here", "date": "today",
+        },
+    }  # fmt: skip
+    frame = pd.DataFrame(runs).assign(task="two-armed-1", method="dual-process/EC2")
+    frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
+    sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
+    return Results(tmp_path, manifest, frame, sequences)
+
+
+def test_cells_and_sequences(tmp_path):
+    page = compare(
+        fake_results(
+            tmp_path,
+            {
+                "run": [0, 1, 2],
+                "status": ["ok", "ok", "infeasible"],
+                "reason": ["", "", "planted"],
+                "reward": [-520, -610, None],
+                "hands": ["RRLR", "RRRR", None],
+                "initial_reward": [-671, -671, None],
+            },
+        )
+    )
+    cells, sequences = page.tables
+    row = dict(zip(cells.columns, cells.rows[0], strict=True))
+    assert row["published"] == "-560.0 ± 47.1 (20)*"
+    assert row["ours: mean ± SD (n)"] == "-565.0 ± 63.6 (2)"
+    assert row["initial (published)"] == "-671 (-675)"
+    assert row["hands: runs (published)"] == "RRLR 1, RRRR 1 (RRLR 11, RRRR 9)"
+    assert [r[2] for r in sequences.rows] == ["RRLR", "RRRR"]
+    assert any("1 runs of two-armed-1 x dual-process/EC2 are infeasible: planted" in note
+               for note in page.notes)  # fmt: skip
+    assert "commit abc with changes" in page.to_markdown()
+
+
+def test_no_run_at_all(tmp_path):
+    columns = {"status": ["crashed"], "reason": ["x"], "run": [0]}
+    nothing = {"reward": [None], "hands": [None], "initial_reward": [None]}
+    cells = compare(fake_results(tmp_path, columns | nothing)).tables[0]
+    assert cells.rows[0][3:5] == ("– (0)", "–")
+
+
+def test_markdown():
+    page = Comparison("T", (Table("A", ("x", "y"), (("1", "a|b"),)),), ("note",)).to_markdown()
+    assert page == "# T\n\n## A\n\n| x | y |\n| --- | --- |\n| 1 | a\\|b |\n\n## Notes\n\n- note\n"

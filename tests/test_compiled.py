@@ -1,0 +1,35 @@
+"""Compiled code is never older than the sources it comes from."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PROGRAM = """
+import coartic
+print(coartic.move(coartic.Robot(), [0.0] * 10, [1.0] + [0.0] * 9, "right", (9, 0), 0.1).ticks)
+"""
+
+
+def test_a_change_in_a_called_module_is_noticed(tmp_path):
+    """Another file than the cached function's changes; the result follows."""
+    copy = tmp_path / "coartic"
+    shutil.copytree(ROOT / "coartic", copy, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def ticks():
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM],
+            capture_output=True, text=True, check=True, cwd=tmp_path, env={"PYTHONPATH": "."},
+        )  # fmt: skip
+        return int(done.stdout)
+
+    assert ticks() == ticks() == 100
+    robot = copy / "robot.py"
+    text = robot.read_text(encoding="utf-8")
+    assert "x = q[0] + arm.shoulder_x" in text
+    robot.write_text(
+        text.replace("x = q[0] + arm.shoulder_x", "x = 0.5 * q[0] + arm.shoulder_x"),
+        encoding="utf-8",
+    )
+    assert ticks() == 99  # half the travel: within θ^a of the end one step earlier

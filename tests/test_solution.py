@@ -1,0 +1,151 @@
+"""Executing and scoring solutions, whoever made them."""
+
+import numpy as np
+import pytest
+
+from coartic import (
+    PAPER,
+    CoarticError,
+    Movement,
+    corrective_trial,
+    execute,
+    hand_sequences,
+    learn,
+    load_task,
+)
+
+from .strategies import tiny_task
+
+CELLS = [
+    ("ascending", "EC1"),
+    ("descending", "EC1"),
+    ("two-armed-1", "EC2"),
+    ("two-armed-1", "EC3"),
+    ("two-armed-1", "EC4"),
+    ("two-armed-2", "EC3"),
+    ("two-armed-2", "EC4"),
+]
+
+
+@pytest.mark.parametrize(("name", "condition"), CELLS)
+def test_best_trials_re_execute_exactly(name, condition):
+    for seed in range(4):
+        run = learn(load_task(name), condition, seed=seed, trials=1500)
+        again = execute(run.task, run.solution)
+        assert again.reward == run.reward
+        assert again.hands == run.hands
+        assert [m.ticks for m in again.movements] == [m.ticks for m in run.solution]
+        assert sum(again.ticks_by_goal()) == -run.reward
+        for q, goal, letter in zip(again.configurations, run.task.goals, run.hands, strict=True):
+            hand = {"L": "left", "R": "right"}[letter]
+            miss = run.task.robot.forward_kinematics(q, hand) - goal
+            assert np.hypot(*miss) <= run.task.radius
+
+
+def test_corrective_process_alone():
+    """Rewards of the best hand sequences; -533 and -357 are published as -532 and -357."""
+    best = {"two-armed-1": [-533, -586, -631, -634], "two-armed-2": [-357, -357, -401, -406]}
+    for name, rewards in best.items():
+        task = load_task(name)
+        found = sorted(
+            (corrective_trial(task, h).reward for h in hand_sequences(task)), reverse=True
+        )
+        assert found[:4] == rewards
+        assert len(found) == 16
+    task = load_task("two-armed-1")
+    assert corrective_trial(task, "LRLR").reward == -533
+    assert corrective_trial(task, "RRRR").reward == -671
+    assert corrective_trial(task, "LLLL").reward == -727
+
+
+def test_first_printed_initial_solution_step_by_step():
+    execution = corrective_trial(load_task("ascending"), "RRR")
+    assert execution.reward == -319
+    assert execution.corrections == 3
+    assert [movement.kind for movement in execution.movements] == ["corrective"] * 3
+    assert sum(execution.ticks_by_goal()) == 319
+
+
+def planned(*targets, hand="right"):
+    return [
+        Movement(number, hand, "planned", np.array(target, dtype=float))
+        for number, target in enumerate(targets, 1)
+    ]
+
+
+def posture(x, y=0.0):
+    """Arms straight along +x, base at (x, y): the right hand is at (x + 4.5, y + 0.1)."""
+    return [x, y, *[0.0] * 8]
+
+
+def test_a_plan_that_hits():
+    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
+    execution = execute(task, planned(posture(1.0), posture(2.0)))
+    # 1.0 less the radius of 0.1 is 90 steps and the arrival tick; then 1.0 more.
+    assert execution.ticks_by_goal() == (91, 101)
+    assert execution.reward == -192
+    assert execution.corrections == 0
+    assert execution.completed
+
+
+def test_a_plan_that_misses_is_corrected_and_pays():
+    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
+    execution = execute(task, planned(posture(0.8), posture(2.0)))
+    assert execution.completed
+    assert execution.corrections == 1
+    assert [movement.kind for movement in execution.movements] == [
+        "planned",
+        "corrective",
+        "planned",
+    ]
+    assert execution.reward < -192
+
+
+def test_aiming_at_the_rim_stops_short_of_it():
+    """Within θ^a of a rim target the movement ends without a hit; 0.09 inside it hits."""
+    task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")
+    on_rim = execute(task, planned(posture(0.9 - 1e-9)))
+    assert on_rim.corrections == 1
+    safe = task.radius - PAPER.arrival_tolerance
+    assert execute(task, planned(posture(1.0 - safe + 1e-9))).corrections == 0
+
+
+def test_a_planned_movement_is_always_made():
+    task = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
+    assert execute(task, planned(posture(0.0))).reward == -1
+    corrective = execute(task, [Movement(1, "right", "corrective")])
+    assert corrective.reward == 0
+    assert corrective.hands == "R"
+
+
+def test_uncorrectable_plan_has_a_reason():
+    task = tiny_task(
+        locked_base=["x", "y"], goals=[[2.5, 0.1]], hands=["right"], initial_hands="R"
+    )
+    execution = execute(task, [Movement(1, "right", "corrective")])
+    assert not execution.completed
+    assert execution.reward is None
+    assert execution.reason.startswith("goal 1: the corrective process did not converge")
+
+
+@pytest.mark.parametrize(
+    ("movements", "words"),
+    [
+        ([], "movements for goals [], wanted [1, 2]"),
+        (planned(posture(1.0)), "movements for goals [1], wanted [1, 2]"),
+        (planned(posture(1.0), posture(1.0), posture(1.0)), "wanted [1, 2]"),
+        (planned([0.0] * 9, posture(1.0)), "goal 1: configuration has shape (9,)"),
+        (planned(posture(np.nan), posture(1.0)), "goal 1: configuration"),
+        (planned(posture(0.0, 1.0), posture(1.0)), "goal 1: the target moves a locked base"),
+        (planned(posture(1.0), posture(2.0), hand="left"), "the robot has no left hand"),
+        ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
+        ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
+    ],
+)
+def test_solutions_that_break_the_rules(movements, words):
+    task = tiny_task(
+        hands=["right"], locked_base=["y"], goals=[[5.5, 0.1], [6.5, 0.1]], initial_hands="RR"
+    )
+    with pytest.raises(CoarticError) as caught:
+        execute(task, movements)
+    assert words in str(caught.value)
