@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -12,13 +13,16 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.published import (
+    RUNS,
+    TRIALS,
     PublishedCell,
+    SequenceResult,
     Summary,
     published_cell,
     published_exhaustive,
     published_initial,
 )
-from analysis.results import Results
+from analysis.results import CellRuns, Results
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -77,6 +81,11 @@ class Comparison:
         return "\n\n".join(parts) + "\n"
 
 
+def plain(note: str) -> str:
+    """A note without Markdown, for a terminal."""
+    return re.sub(r"(?<!\\)[*`]", "", note).replace("\\*", "*")
+
+
 def difference(ours: Rewards, published: Summary) -> Difference:
     """Difference of means with its interval (Welch, from the printed mean, SD and n).
 
@@ -103,13 +112,9 @@ def difference(ours: Rewards, published: Summary) -> Difference:
 
 def compare(results: Results) -> Comparison:
     """Compare every cell of a results folder with what the paper prints."""
-    cells = [
-        (task, method, results.runs[(results.runs.task == task) & (results.runs.method == method)])
-        for task, method in results.cells
-    ]
     tables = [
-        _cells_table(cells),
-        _sequences_table(cells),
+        _cells_table(results),
+        _sequences_table(results.cells),
         _initial_table(results),
     ]
     return Comparison(
@@ -119,24 +124,22 @@ def compare(results: Results) -> Comparison:
     )
 
 
-_CellRuns = tuple[str, str, pd.DataFrame]
-
-
-def _cells_table(cells: Iterable[_CellRuns]) -> Table:
+def _cells_table(results: Results) -> Table:
+    same_length = results.manifest["specification"]["trials"] in (0, TRIALS)
+    tasks = results.tasks
     rows = []
-    for task, method, runs in cells:
-        paper = _published(task, method)
-        good = runs[runs.status == "ok"]
+    for cell in results.cells:
+        paper, good = _published(cell), cell.good
         rewards = good.reward.to_numpy(dtype=np.float64)
         rows.append(
             (
-                task,
-                method,
+                f"{cell.task} †" if tasks[cell.task].reconstructed else cell.task,
+                cell.label,
                 _published_text(paper),
                 _mean_sd(rewards),
                 _difference_text(rewards, paper.summary if paper else None),
-                _verdict(rewards, paper.summary if paper else None),
-                f"{_distinct(runs.initial_reward)} ({_initial_text(task)})",
+                _verdict(rewards, paper.summary if paper and same_length else None),
+                f"{_distinct(cell.runs.initial_reward)} ({_initial_text(cell.task)})",
                 f"{_counts(good.hands)} ({_published_hands(paper)})",
             )
         )
@@ -153,12 +156,11 @@ def _cells_table(cells: Iterable[_CellRuns]) -> Table:
     return Table("Learned reward", columns, tuple(rows))
 
 
-def _sequences_table(cells: Iterable[_CellRuns]) -> Table:
+def _sequences_table(cells: Iterable[CellRuns]) -> Table:
     """Rewards by hand sequence, where the paper tells them apart."""
     rows = []
-    for task, method, runs in cells:
-        paper = _published(task, method)
-        good = runs[runs.status == "ok"]
+    for cell in cells:
+        paper, good = _published(cell), cell.good
         printed = {s.hands: s for s in paper.sequences} if paper else {}
         if not printed and good.hands.nunique() < 2:
             continue
@@ -168,11 +170,11 @@ def _sequences_table(cells: Iterable[_CellRuns]) -> Table:
             summary = printed[hands].summary if hands in printed else None
             rows.append(
                 (
-                    task,
-                    method,
+                    cell.task,
+                    cell.label,
                     hands,
                     _summary_text(summary),
-                    _share(printed[hands].runs) if hands in printed else "0",
+                    _printed_runs(printed, hands),
                     _mean_sd(rewards),
                     _difference_text(rewards, summary),
                 )
@@ -224,19 +226,37 @@ def _notes(results: Results) -> list[str]:
         "the published reward, different where it lies outside, undecided otherwise. The "
         "intervals are for each row alone; they are not adjusted for their number.",
     ]
-    if any(_starred(task, method) for task, method in results.cells):
+    if any(_starred(cell) for cell in results.cells):
         notes.append("\\* derived from other printed numbers, not printed itself.")
     for name, task in results.tasks.items():
         if task.reconstructed:
             what = " and ".join(task.reconstructed)
             notes.append(
-                f"Reconstructed: {what} of **{name}** are not printed; they are inferred from "
+                f"† Reconstructed: {what} of **{name}** are not printed; they are inferred from "
                 "what is (docs/model.md), and rewards on it depend on them."
             )
+    for cell in results.cells:
+        trials, lost = cell.runs.trials.sum(), cell.runs.failed_trials.sum()
+        if trials and lost:
+            notes.append(
+                f"{cell.task} x {cell.label}: {lost} of {trials} trials failed (the corrective "
+                "process did not converge); they taught nothing."
+            )
     failed = results.runs[results.runs.status != "ok"]
-    for reason, runs in failed.groupby(["task", "method", "status", "reason"]).run.count().items():
-        task, method, status, text = reason if isinstance(reason, tuple) else (reason,)
-        notes.append(f"{runs} runs of {task} x {method} are {status}: {text}")
+    for key, runs in failed.groupby(["task", "method", "status", "reason"]).run.count().items():
+        name, method, status, text = key if isinstance(key, tuple) else (key,)
+        notes.append(f"{runs} runs of {name} x {method} are {status}: {text}")
+    commits = results.runs["commit"].nunique(dropna=False)
+    if commits > 1:
+        notes.append(
+            f"The runs were made at {commits} commits; the code behind each method's results "
+            "is the same in all of them."
+        )
+    if specification["trials"] not in (0, TRIALS):
+        notes.append(
+            f"The published runs have {TRIALS} trials, these {specification['trials']}: learned "
+            "rewards are not comparable, so no verdict is given."
+        )
     commit = environment["commit"]
     version = f"coartic {environment['coartic']}"
     if commit:
@@ -250,12 +270,16 @@ def _notes(results: Results) -> list[str]:
     return notes
 
 
-def _published(task: str, method: str) -> PublishedCell | None:
-    return published_cell(task, method.rpartition("/")[2])
+def _published(cell: CellRuns) -> PublishedCell | None:
+    """What the paper prints about a cell: about its own learner as it stands."""
+    family, _, condition = cell.method.partition("/")
+    if family != "dual-process" or cell.variant:
+        return None
+    return published_cell(cell.task, condition)
 
 
-def _starred(task: str, method: str) -> bool:
-    paper, initial = _published(task, method), published_initial(task)
+def _starred(cell: CellRuns) -> bool:
+    paper, initial = _published(cell), published_initial(cell.task)
     return bool((paper and paper.summary and paper.summary.derived) or (initial and initial[2]))
 
 
@@ -298,14 +322,18 @@ def _verdict(rewards: Rewards, published: Summary | None) -> str:
     return difference(rewards, published).verdict
 
 
+def _printed_runs(printed: dict[str, SequenceResult], hands: str) -> str:
+    """Printed number of runs with a hand sequence; 0 only where all others are printed."""
+    if hands in printed:
+        return NONE if printed[hands].runs is None else str(printed[hands].runs)
+    complete = sum(result.runs or 0 for result in printed.values()) == RUNS
+    return "0" if complete else NONE
+
+
 def _published_hands(paper: PublishedCell | None) -> str:
     if paper is None or not paper.sequences:
         return NONE
-    return ", ".join(f"{s.hands} {_share(s.runs)}" for s in paper.sequences)
-
-
-def _share(runs: int | None) -> str:
-    return "(runs not printed)" if runs is None else str(runs)
+    return ", ".join(f"{s.hands} {s.runs or ''}".strip() for s in paper.sequences)
 
 
 def _counts(values: pd.Series) -> str:

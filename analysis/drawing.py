@@ -71,15 +71,13 @@ def draw_tasks(tasks: Sequence[Task], path: Path) -> None:
     scale = min(_INCH, 14 / (width * columns), 14 / (height * rows))
     # A fixed salt and no date: the same tasks give the same file.
     with rc_context({"svg.hashsalt": "coartic"}):
-        size = (scale * width * columns + 0.8, (scale * height + 0.75) * rows)
+        size = (scale * width * columns + 0.8, (scale * height + 0.75) * rows + 0.4)
         figure = Figure(figsize=size, layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for axes, task, box in zip(panels, tasks, boxes, strict=False):
             draw_robot(axes, task, task.q0)
             draw_goals(axes, task)
-            rail = f", base locked in {' and '.join(task.locked_base)}" if task.locked_base else ""
-            status = " (goals reconstructed)" if "goals" in task.reconstructed else ""
-            axes.set_title(f"{task.label}{status}{rail}", fontsize=10, loc="left")
+            axes.set_title(_title(task), fontsize=9, loc="left", parse_math=False, wrap=True)
             centre = (box[0] + box[1]) / 2
             axes.set_xlim(centre[0] - width / 2, centre[0] + width / 2)
             axes.set_ylim(centre[1] - height / 2, centre[1] + height / 2)
@@ -90,8 +88,31 @@ def draw_tasks(tasks: Sequence[Task], path: Path) -> None:
             axes.set_ylabel("y (length unit)", fontsize=8)
         for axes in panels[len(tasks) :]:
             axes.set_axis_off()
-        date = {"Date": None} if path.suffix in (".svg",) else None
+        _legend(figure)
+        date = {"Date": None} if path.suffix.lower() == ".svg" else None
         figure.savefig(path, dpi=150, metadata=date)
+
+
+def _title(task: Task) -> str:
+    """Name, what is reconstructed, and what is locked; two lines where there is more."""
+    remarks = []
+    if task.reconstructed:
+        remarks.append(f"{' and '.join(task.reconstructed)} reconstructed")
+    if task.locked_base:
+        remarks.append(f"base locked in {' and '.join(task.locked_base)}")
+    return "\n".join([task.label, "; ".join(remarks)]).strip()
+
+
+def _legend(figure: Any) -> None:
+    from matplotlib.lines import Line2D
+
+    entries = [
+        Line2D([], [], color="black", markeredgecolor="black", label=f"{hand} arm", **style)
+        for hand, style in MARKERS.items()
+    ]
+    goal: dict[str, Any] = {"marker": "o", "markersize": 6, "markerfacecolor": "none"}
+    entries.append(Line2D([], [], linestyle="", markeredgecolor="black", label="goal", **goal))
+    figure.legend(handles=entries, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
 
 
 def _box(task: Task) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 RUNS = 20  # runs of every experiment (printed, section *Initial Solution and Learning*)
+TRIALS = 10_000  # trials of every run (printed there too)
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class PublishedCell:
 
 def published_initial(task: str) -> tuple[str, int, bool] | None:
     """Hands, reward and whether derived, of a task's initial solution."""
-    entry = _published().get(_key(task), {}).get("initial")
+    entry = _published().get(task, {}).get("initial")
     if entry is None:
         return None
     return entry["hands"], entry["reward"], bool(entry.get("derived", False))
@@ -51,13 +52,13 @@ def published_initial(task: str) -> tuple[str, int, bool] | None:
 
 def published_exhaustive(task: str) -> tuple[str, int] | None:
     """Best hands and reward of the corrective process alone over all sequences."""
-    entry = _published().get(_key(task), {}).get("exhaustive")
+    entry = _published().get(task, {}).get("exhaustive")
     return None if entry is None else (entry["hands"], entry["reward"])
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
     """What is printed about a cell; None for a cell that the paper does not have."""
-    entry = _published().get(_key(task), {}).get(condition)
+    entry = _published().get(task, {}).get(condition)
     if entry is None:
         return None
     sequences = tuple(
@@ -97,7 +98,3 @@ def pooled(parts: list[Summary]) -> Summary | None:
 def _published() -> dict[str, Any]:
     path = Path(__file__).parent / "published.toml"
     return tomllib.loads(path.read_text(encoding="utf-8"))
-
-
-def _key(task: str) -> str:
-    return task.replace("-", "_")

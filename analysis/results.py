@@ -13,6 +13,26 @@ from coartic import CoarticError, Task, parse_task
 
 
 @dataclass(frozen=True)
+class CellRuns:
+    """One method with parameters on one task, and its runs."""
+
+    task: str
+    method: str
+    variant: str
+    runs: pd.DataFrame
+
+    @property
+    def label(self) -> str:
+        """The method with its variant."""
+        return f"{self.method} {self.variant}".strip()
+
+    @property
+    def good(self) -> pd.DataFrame:
+        """The runs that have a solution."""
+        return self.runs[self.runs["status"] == "ok"]
+
+
+@dataclass(frozen=True)
 class Results:
     """The tables of one results folder; their columns are listed in docs/results.md."""
 
@@ -29,14 +49,29 @@ class Results:
         return {name: parse_task(task, source) for name, task in content.items()}
 
     @property
-    def cells(self) -> list[tuple[str, str]]:
-        """Task and method of every cell, in the order in which they were run."""
-        cells = self.manifest["specification"]["cells"]
-        return [(cell["task"], cell["method"]) for cell in cells]
+    def cells(self) -> list[CellRuns]:
+        """The cells with their runs, in the order of the plan."""
+        return [
+            CellRuns(
+                cell["task"],
+                cell["method"],
+                cell["variant"],
+                self.runs[
+                    (self.runs["task"] == cell["task"])
+                    & (self.runs["method"] == cell["method"])
+                    & (self.runs["variant"] == cell["variant"])
+                ],
+            )
+            for cell in self.manifest["specification"]["cells"]
+        ]
 
     def solutions(self) -> pd.DataFrame:
         """Movements of every run's best trial."""
         return pd.read_parquet(self.folder / "solutions.parquet")
+
+    def paths(self) -> pd.DataFrame:
+        """Waypoints of the movements that follow a path."""
+        return pd.read_parquet(self.folder / "paths.parquet")
 
     def learning(self) -> pd.DataFrame:
         """Reward of every trial."""

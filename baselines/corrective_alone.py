@@ -1,53 +1,72 @@
-"""The corrective process alone, with every hand sequence.
+"""The corrective process alone: with given hands, and with every hand sequence.
 
-The paper's exhaustive strategy (section *Exploration Condition 3*): try all 2^G hand
-sequences, each target from **A**, and no further exploration. It is told the goals,
-forward kinematics and Jacobian of the robot, and the reward of each trial.
+Every sequence is the paper's exhaustive strategy (section *Exploration Condition 3*):
+try all 2^G hand sequences, each target from **A**, and no further exploration.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+import itertools
 
-from coartic import (
-    PAPER,
-    Execution,
-    MotionModel,
-    NotApplicableError,
-    Task,
-    corrective_trial,
-    hand_sequences,
+from coartic import Execution, Movement, Task, initial_hands
+from coartic.initial import changes_of_hand, too_many_sequences
+from coartic.method import Information, Method, MethodError, Result, Session
+from coartic.robot import Hand
+from coartic.task import hands_of
+
+CITATION = (
+    "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "
+    "prostheses. IEEE Transactions on Man-Machine Systems; as used by Shah, Barto & Fagg (2013)."
 )
 
-MOST_SEQUENCES = 4096
+
+def _corrective(hands: tuple[Hand, ...]) -> tuple[Movement, ...]:
+    return tuple(Movement(number, hand, "corrective") for number, hand in enumerate(hands, 1))
 
 
-@dataclass(frozen=True)
-class SequenceTrial:
-    """One trial of the corrective process alone."""
+class GivenHands(Method):
+    """The corrective process with the task's initial hands: trial 0 of the learner."""
 
-    hands: str
-    execution: Execution
+    name = "corrective-alone/given"
+    title = "Corrective process alone, the task's hands"
+    citation = CITATION
+    told = frozenset({Information.CORRECTIVE_PROCESS})
+    stochastic = False
+
+    def solve(self, session: Session) -> Result:
+        """One movement per goal, its target found by **A** when the time comes."""
+        task = session.hand_over(Information.CORRECTIVE_PROCESS)
+        return Result(_corrective(hands_of(initial_hands(task))))
 
 
-def every_sequence(task: Task, *, model: MotionModel = PAPER) -> list[SequenceTrial]:
-    """One trial per hand sequence, best first, failed ones last.
+class EverySequence(Method):
+    """The corrective process with every hand sequence; the best one is kept."""
 
-    Deterministic. Raises NotApplicableError above ``MOST_SEQUENCES`` sequences.
-    """
-    count = len(task.hands) ** len(task.goals)
-    if count > MOST_SEQUENCES:
-        raise NotApplicableError(
-            f"task {task.name!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
-        )
-    trials = [
-        SequenceTrial(hands, corrective_trial(task, hands, model=model))
-        for hands in hand_sequences(task)
-    ]
+    name = "corrective-alone/every"
+    title = "Corrective process alone, every hand sequence"
+    citation = CITATION
+    told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+    stochastic = False
 
-    def cost(trial: SequenceTrial) -> float:
-        reward = trial.execution.reward
-        return math.inf if reward is None else -reward
+    def why_not(self, task: Task) -> str | None:
+        """More sequences than can be tried one by one."""
+        return too_many_sequences(task, len(task.hands))
 
-    return sorted(trials, key=cost)
+    def solve(self, session: Session) -> Result:
+        """One trial per sequence; of equal ones the one with the fewest changes of hand."""
+        session.hand_over(Information.CORRECTIVE_PROCESS)  # **A** acts in the trials
+        found: list[tuple[int, int, Execution]] = []
+        ordered: list[Hand] = sorted(session.hands)
+        for hands in itertools.product(ordered, repeat=session.goals_count):
+            if session.trials_left == 0:
+                break
+            execution = session.trial(_corrective(hands))
+            if execution.reward is not None:
+                changes = changes_of_hand(execution.hands)
+                found.append((-execution.reward, changes, execution))
+        if not found:
+            raise MethodError("infeasible", "the corrective process completes no hand sequence")
+        return Result(min(found, key=lambda entry: entry[:2])[2].movements)
+
+
+METHODS: tuple[type[Method], ...] = (GivenHands, EverySequence)

@@ -1,21 +1,207 @@
-"""Methods by id."""
+"""Methods by id: those of this project, of installed plug-ins, and of the user's files."""
 
 from __future__ import annotations
 
+import ast
 import difflib
-from collections.abc import Iterable
+import hashlib
+import inspect
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-from coartic import CONDITIONS, CoarticError, ExplorationCondition
-from coartic.learner import METHOD_PREFIX
+from pydantic import ValidationError
 
-METHODS: dict[str, ExplorationCondition] = {
-    f"{METHOD_PREFIX}{name}": condition for name, condition in CONDITIONS.items()
-}
+import baselines.corrective_alone
+from coartic import CoarticError
+from coartic.compiled import model_source
+from coartic.dual_process import DUAL_PROCESS
+from coartic.method import Method
+
+ENTRY_POINTS = "coartic.methods"
+BUILT_IN: tuple[type[Method], ...] = (*DUAL_PROCESS, *baselines.corrective_alone.METHODS)
+
+
+class MethodFileError(CoarticError):
+    """A method file or plug-in that cannot be used."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """Source of a method file, so that any worker on any machine can run it."""
+
+    filename: str
+    source: str
+
+    @property
+    def digest(self) -> str:
+        """Hash of the source."""
+        return hashlib.sha256(self.source.encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One method as the harness knows it."""
+
+    method: type[Method]
+    origin: str
+    """``built in``, the distribution of a plug-in, or the path of a method file."""
+    code: str
+    """Hash of the code that produces its results."""
+    plugin: Plugin | None = None
+
+
+Registry = Mapping[str, Entry]
+
+
+def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
+    """Every known method by id.
+
+    Raises MethodFileError for a file or plug-in that cannot be loaded, holds no method,
+    or takes an id that is already there.
+    """
+    found: dict[str, Entry] = {}
+
+    def add(method: type[Method], entry: Entry) -> None:
+        name = _checked_name(method, entry.origin)
+        if name in found:
+            raise MethodFileError(
+                f"{entry.origin}: method id {name!r} is already taken ({found[name].origin})"
+            )
+        found[name] = entry
+
+    for method in BUILT_IN:
+        add(method, Entry(method, "built in", code_hash(_module_source(method))))
+    for point in metadata.entry_points(group=ENTRY_POINTS):
+        origin = f"plug-in {point.dist.name if point.dist else point.value}"
+        try:
+            target = point.load()
+        except Exception as error:
+            raise MethodFileError(
+                f"{origin}: entry point {point.name!r} cannot be loaded: {_brief(error)}"
+            ) from None
+        for method in _methods_of(target, origin):
+            add(method, Entry(method, origin, code_hash(_module_source(method))))
+    for path in method_files:
+        plugin = read_plugin(path)
+        for method in plugin_methods(plugin):
+            add(method, Entry(method, str(path), code_hash(plugin.source), plugin))
+    return found
+
+
+def read_plugin(path: Path) -> Plugin:
+    """The text of a method file."""
+    try:
+        return Plugin(path.name, path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise MethodFileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise MethodFileError(f"{path}: is not a text file in UTF-8") from None
+
+
+def plugin_methods(plugin: Plugin) -> list[type[Method]]:
+    """The methods that a method file defines; the file is run to find them."""
+    return list(_load_plugin(plugin))
+
+
+@cache
+def _load_plugin(plugin: Plugin) -> tuple[type[Method], ...]:
+    module = ModuleType(f"coartic_method_{plugin.digest}")
+    module.__file__ = plugin.filename
+    sys.modules[module.__name__] = module  # typing looks annotations up there
+    try:
+        exec(compile(plugin.source, plugin.filename, "exec"), module.__dict__)
+    except Exception as error:
+        raise MethodFileError(f"{plugin.filename}: cannot be run: {_brief(error)}") from None
+    return tuple(_methods_of(module, plugin.filename))
+
+
+def _methods_of(target: Any, origin: str) -> list[type[Method]]:
+    """A method class itself, or those that a module defines."""
+    if inspect.isclass(target) and issubclass(target, Method):
+        return [target]
+    found = [
+        value
+        for value in vars(target).values()
+        if inspect.isclass(value)
+        and issubclass(value, Method)
+        and not inspect.isabstract(value)
+        and value.__module__ == getattr(target, "__name__", None)
+    ]
+    if not found:
+        raise MethodFileError(f"{origin}: defines no subclass of coartic.method.Method")
+    return found
+
+
+def _checked_name(method: type[Method], origin: str) -> str:
+    for attribute in ("name", "title", "citation", "told"):
+        if not hasattr(method, attribute):
+            raise MethodFileError(f"{origin}: {method.__name__} does not declare {attribute!r}")
+    name = method.name
+    if not isinstance(name, str) or not name or any(c in ", \t\n" for c in name):
+        raise MethodFileError(
+            f"{origin}: {method.__name__}.name is {name!r}; an id is text without spaces or commas"
+        )
+    return name
+
+
+def build(entry: Entry, parameters: Mapping[str, Any]) -> Method:
+    """A method with parameters; raises CoarticError naming the ones that are wrong."""
+    try:
+        return entry.method(entry.method.Parameters(**parameters))
+    except ValidationError as error:
+        known = ", ".join(entry.method.Parameters.model_fields) or "none"
+        problems = "; ".join(
+            f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].lower()} "
+            f"(found {detail['input']!r})"
+            for detail in error.errors()
+        )
+        raise CoarticError(
+            f"method {entry.method.name!r}: {problems}. Its parameters: {known}."
+        ) from None
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     """An error for a name that is not among the known ones, with the nearest of them."""
     names = list(known)
     close = difflib.get_close_matches(name, names, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ";"
+    hint = f"; did you mean {close[0]!r}?" if close else "."
     return CoarticError(f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}.")
+
+
+def _module_source(method: type[Method]) -> str:
+    """Source of a method's module and of what it imports from its own package."""
+    package = method.__module__.partition(".")[0]
+    sources: dict[str, str] = {}
+    waiting = [method.__module__]
+    while waiting:
+        name = waiting.pop()
+        module = sys.modules.get(name)
+        if name in sources or module is None or name.partition(".")[0] != package:
+            continue
+        try:
+            sources[name] = inspect.getsource(module)
+        except (OSError, TypeError):
+            continue
+        for node in ast.walk(ast.parse(sources[name])):
+            if isinstance(node, ast.Import):
+                waiting += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                waiting += [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
+    return "".join(f"{name}\n{sources[name]}" for name in sorted(sources) if package != "coartic")
+
+
+def code_hash(source: str) -> str:
+    """Hash of the model's code and one method's source: what its results come from."""
+    digest = hashlib.sha256(model_source())
+    digest.update(source.encode())
+    return digest.hexdigest()[:12]
+
+
+def _brief(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"

@@ -9,15 +9,25 @@ the paper has 1 to 30 % fewer ticks than the first).
 from __future__ import annotations
 
 import math
+import tempfile
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 
-from benchmarks.runner import Plan, execute_plan
-from benchmarks.suites import load_suite, select_cells
+from benchmarks.executors import Local
+from benchmarks.harness import perform_plan
+from benchmarks.methods import registry
+from benchmarks.specification import Limits
+from benchmarks.store import Store
+from benchmarks.suites import Suite, load_suite, run_specs, select_cells
+from benchmarks.tables import write_tables
 from coartic import Robot, learn, reference
 from coartic.compiled import entry, inner, joint_chain
+from coartic.dual_process import DualProcess
+from coartic.learner import TRIALS, warm_up
 from coartic.robot import chain
 
 SLOW_TRIALS = 60
@@ -26,43 +36,71 @@ SLOW_TRIALS = 60
 def main() -> None:
     """Measure and print."""
     suite = load_suite("paper")
-    cells = select_cells(suite)
-    for cell in cells:  # compile before any clock runs
-        learn(cell.task, cell.condition, seed=0, trials=1)
+    trials = suite.trials or TRIALS
+    cells = [
+        (cell.task, cell.entry.method.condition)
+        for cell in select_cells(suite, registry())
+        if issubclass(cell.entry.method, DualProcess)
+    ]
+    warm_up()
 
     print(f"{'cell':32}{'NumPy, ms/trial':>17}{'compiled, ms/trial':>20}{'ratio, one core':>17}")
     slow_total = fast_total = 0.0
-    for cell in cells:
+    for task, condition in cells:
+        name = f"{task.name} {condition.id}"
         clock = time.perf_counter()
-        slow = reference.learn(cell.task, cell.condition, seed=0, trials=SLOW_TRIALS)
+        slow = reference.learn(task, condition, seed=0, trials=SLOW_TRIALS)
         slow_trial = (time.perf_counter() - clock) / SLOW_TRIALS
-        run = learn(cell.task, cell.condition, seed=0, trials=suite.trials)
+        run = learn(task, condition, seed=0, trials=trials)
         if not np.array_equal(run.rewards[:SLOW_TRIALS], slow.rewards):
-            raise SystemExit(f"{cell.task.name} {cell.method}: the two sides disagree")
-        fast_trial = run.wall_s / suite.trials
-        slow_total += slow_trial * suite.trials * suite.runs
+            raise SystemExit(f"{name}: the two sides disagree")
+        fast_trial = run.wall_s / trials
+        slow_total += slow_trial * trials * suite.runs
         fast_total += run.wall_s * suite.runs
-        name = f"{cell.task.name} {cell.method}"
-        print(
-            f"{name:32}{slow_trial * 1e3:17.2f}{fast_trial * 1e3:20.4f}"
-            f"{slow_trial / fast_trial:17.0f}"
-        )
+        ratio = slow_trial / fast_trial
+        print(f"{name:32}{slow_trial * 1e3:17.2f}{fast_trial * 1e3:20.4f}{ratio:17.0f}")
 
-    plan = Plan(suite.name, tuple(cells), suite.runs, suite.trials, seed=0)
-    clock = time.perf_counter()
-    runs = sum(1 for _ in execute_plan(plan))
-    wall = time.perf_counter() - clock
+    bare, harness = _suite(suite, trials)
     print(
-        f"\nSuite paper, {runs} runs of {suite.trials} trials: {wall:.1f} s on all cores; "
-        f"step by step about {slow_total / 3600:.1f} h\n"
+        f"\nSuite paper, {len(cells) * suite.runs} runs of {trials} trials, all cores: "
+        f"{bare:.1f} s; step by step about {slow_total / 3600:.1f} h\n"
         f"(extrapolated from {SLOW_TRIALS} trials a cell, rewards equal). "
-        f"Ratio {slow_total / wall:.0f} on all cores, {slow_total / fast_total:.0f} on one."
+        f"Ratio {slow_total / bare:.0f} on all cores, {slow_total / fast_total:.0f} on one.\n"
+        f"Through the harness (processes, records on disk, tables): {harness:.1f} s, "
+        f"{harness / bare:.2f} times the bare kernels."
     )
     library, own = _kinematics()
     print(
         f"Forward kinematics in the kernels: {own:.0f} ns; with the C library's cosine and "
         f"sine {library:.0f} ns (ratio {library / own:.1f})."
     )
+
+
+def _suite(suite: Suite, trials: int) -> tuple[float, float]:
+    """Seconds for the whole suite: kernels on threads, and everything the harness does."""
+    chosen = select_cells(suite, registry())
+    planned = run_specs(chosen, runs=suite.runs, seed=0, trials=trials, limits=Limits(600.0))
+    work = [
+        (spec.task, cell.entry.method.condition, spec.seed)
+        for cell, spec in planned
+        if issubclass(cell.entry.method, DualProcess)
+    ]
+    clock = time.perf_counter()
+    runs = Parallel(n_jobs=-1, prefer="threads")(
+        delayed(learn)(task, condition, seed=seed, trials=trials) for task, condition, seed in work
+    )
+    bare = time.perf_counter() - clock
+    with tempfile.TemporaryDirectory() as folder:
+        store = Store(Path(folder))
+        clock = time.perf_counter()
+        perform_plan([spec for _, spec in planned], store, Local())
+        records = [(cell, store.read(spec.run_id)) for cell, spec in planned]
+        write_tables(Path(folder), suite.name, records, {})
+        harness = time.perf_counter() - clock
+    for run, (_, record) in zip(runs, records, strict=True):
+        if record["score"]["reward"] != run.reward:
+            raise SystemExit(f"{record['run_id']}: the two sides disagree")
+    return bare, harness
 
 
 _chain = inner(chain)

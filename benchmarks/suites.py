@@ -1,25 +1,35 @@
-"""Suites: which methods run on which tasks, how often. Data in ``benchmarks/suites``."""
+"""Suites: methods x tasks x parameters x runs. Data in ``benchmarks/suites``."""
 
 from __future__ import annotations
 
+import itertools
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from benchmarks.methods import METHODS, unknown
-from coartic import CoarticError, ExplorationCondition, Task, builtin_tasks, load_task
+from benchmarks.methods import Entry, Registry, build, unknown
+from benchmarks.specification import UNLIMITED, Limits, RunSpec, run_seed
+from coartic import CONDITIONS, CoarticError, Task, builtin_tasks, load_task
+from coartic.learner import METHOD_PREFIX
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
+ALL = "*"
+Scalar = bool | int | float | str
 
 
-class _Entry(BaseModel):
+class _Block(BaseModel):
+    """Some methods on some tasks, under all combinations of some parameters."""
+
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    task: str
-    methods: tuple[str, ...]
+    tasks: Annotated[tuple[str, ...], Field(min_length=1)]
+    methods: Annotated[tuple[str, ...], Field(min_length=1)]
+    parameters: dict[str, Scalar] = {}
+    grid: dict[str, Annotated[tuple[Scalar, ...], Field(min_length=1)]] = {}
 
 
 class Suite(BaseModel):
@@ -30,43 +40,72 @@ class Suite(BaseModel):
     name: str
     title: str
     description: str
-    runs: int = Field(gt=0)
-    trials: int = Field(gt=0)
-    cells: tuple[_Entry, ...]
+    runs: Annotated[int, Field(gt=0)]
+    """Runs per cell of a stochastic method; the others are run once."""
+    trials: Annotated[int, Field(gt=0)] | None = None
+    """Trials per run, for methods that have this parameter."""
+    time_limit_s: Annotated[float, Field(gt=0)] | None = 600.0
+    cells: Annotated[tuple[_Block, ...], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One method on one task."""
+    """One method with parameters on one task."""
 
     task: Task
-    method: str
+    entry: Entry
+    parameters: tuple[tuple[str, Scalar], ...] = ()
+    variant: str = ""
+    """The grid's parameters in words, such as ``noise_sd=0.1``; empty without a grid."""
 
     @property
-    def condition(self) -> ExplorationCondition:
-        """The exploration condition behind the method id."""
-        return METHODS[self.method]
+    def method(self) -> str:
+        """Id of the method."""
+        return self.entry.method.name
+
+    @property
+    def label(self) -> str:
+        """The method with its variant."""
+        return f"{self.method} {self.variant}".strip()
 
 
 def suites() -> dict[str, Suite]:
     """The shipped suites by name."""
-    found = {}
-    for path in sorted(SUITE_FOLDER.glob("*.toml")):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        found[path.stem] = Suite(name=path.stem, **content)
-    return found
+    return {path.stem: _read(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
 def load_suite(name: str) -> Suite:
-    """A shipped suite; raises CoarticError for an unknown name."""
+    """A shipped suite by name, or a suite file by path (``.toml``).
+
+    Raises CoarticError for an unknown name or a file that cannot be used.
+    """
+    if name.endswith(".toml"):
+        return _read(Path(name))
     known = suites()
     if name not in known:
         raise unknown("suite", name, known)
     return known[name]
 
 
+def _read(path: Path) -> Suite:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return Suite(**{"name": path.stem, **content})
+    except OSError as error:
+        raise CoarticError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise CoarticError(f"{path}: is not valid TOML: {error}") from None
+    except ValidationError as error:
+        lines = [
+            f"{path}: {'.'.join(map(str, detail['loc']))}: {detail['msg'].lower()}"
+            for detail in error.errors()
+        ]
+        raise CoarticError("\n".join(lines)) from None
+
+
 def select_cells(
     suite: Suite,
+    known: Registry,
     *,
     tasks: Sequence[str] = (),
     methods: Sequence[str] = (),
@@ -74,34 +113,48 @@ def select_cells(
 ) -> list[Cell]:
     """The cells of a suite, plus those of the user's own tasks, narrowed by name.
 
-    A task from a file runs under every applicable method of ``methods``, or of all
-    methods where none are named. Raises CoarticError for unknown names, for a task
-    file whose name is taken, and where nothing is left to run.
+    A method of ``methods`` that the suite does not have runs on all of the suite's
+    tasks that it applies to. A task from a file runs under every applicable method of
+    ``methods``, or of all methods of the suite where none are named. Raises CoarticError
+    for unknown names, for a task file whose name is taken, for parameters that a method
+    does not take, and where nothing is left to run.
     """
+    methods = [f"{METHOD_PREFIX}{name}" if name in CONDITIONS else name for name in methods]
     for name in methods:
-        if name not in METHODS:
-            raise unknown("method", name, METHODS)
-    cells = [
-        Cell(load_task(entry.task), method) for entry in suite.cells for method in entry.methods
-    ]
+        if name not in known:
+            raise unknown("method", name, known)
+    cells: list[Cell] = []
+    for block in suite.cells:
+        cells += _block_cells(suite, block, known)
+    suite_methods = list(dict.fromkeys(cell.method for cell in cells))
+    suite_tasks = list({cell.task.name: cell.task for cell in cells}.values())
+    refused: list[str] = []
+
+    def add(task: Task, names: Iterable[str]) -> None:
+        for name in names:
+            reason = _why_not(known[name], task)
+            if reason is None:
+                cells.append(Cell(task, known[name]))
+            else:
+                refused.append(reason)
+
+    for task in suite_tasks:
+        add(task, [name for name in methods if name not in suite_methods])
     own: dict[str, Path] = {}
-    inapplicable: list[str] = []
     for path in task_files:
         task = load_task(Path(path))
         taken = "a shipped task" if task.name in builtin_tasks() else own.get(task.name)
+        if taken == Path(path):
+            raise CoarticError(f"{path}: the same task file is given twice")
         if taken is not None:
             raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
         own[task.name] = Path(path)
-        for method in methods or METHODS:
-            reason = METHODS[method].why_not(task)
-            if reason is None:
-                cells.append(Cell(task, method))
-            else:
-                inapplicable.append(reason)
+        add(task, methods or suite_methods)
+
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
     for name in tasks:
         if name not in known_tasks:
-            raise unknown(f"task of suite {suite.name!r}", name, known_tasks)
+            raise unknown("task", name, known_tasks)
     chosen = [
         cell
         for cell in cells
@@ -114,8 +167,99 @@ def select_cells(
         if (not tasks or name in tasks) and all(cell.task.name != name for cell in chosen)
     ]
     if idle or not chosen:
-        pairs = ", ".join(f"{cell.task.name} x {cell.method}" for cell in cells)
-        why = "; ".join(inapplicable) if idle else f"suite {suite.name!r} has {pairs}"
+        pairs = ", ".join(f"{cell.task.name} x {cell.label}" for cell in cells)
+        why = "; ".join(refused) if refused else f"suite {suite.name!r} has {pairs}"
         what = f"task {idle[0]!r}" if idle else "what was asked for"
         raise CoarticError(f"no method to run on {what}: {why}.")
     return chosen
+
+
+def run_specs(
+    cells: Sequence[Cell],
+    *,
+    runs: int,
+    seed: int,
+    trials: int | None = None,
+    limits: Limits = UNLIMITED,
+) -> list[tuple[Cell, RunSpec]]:
+    """Every run of every cell, in order. ``trials`` goes to methods that have it."""
+    planned = []
+    for cell in cells:
+        parameters = dict(cell.parameters)
+        if trials is not None and "trials" in cell.entry.method.Parameters.model_fields:
+            parameters.setdefault("trials", trials)
+        build(cell.entry, parameters)  # refuse wrong parameters before any run
+        for run in range(runs if cell.entry.method.stochastic else 1):
+            spec = RunSpec(
+                task=cell.task,
+                entry=cell.entry,
+                parameters=tuple(parameters.items()),
+                run=run,
+                seed=run_seed(seed, cell.task.name, run),
+                limits=limits,
+            )
+            planned.append((cell, spec))
+    return planned
+
+
+def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
+    tasks = builtin_tasks() if ALL in block.tasks else block.tasks
+    for name in block.methods:
+        if name not in known and name != ALL:
+            raise unknown(f"method of suite {suite.name!r}", name, known)
+    every = ALL in block.methods
+    cells = []
+    for task_name in tasks:
+        task = load_task(task_name)
+        for name in known if every else block.methods:
+            reason = _why_not(known[name], task)
+            if reason is not None:
+                if every or ALL in block.tasks:
+                    continue  # "all that applies"
+                raise CoarticError(f"suite {suite.name!r}: {reason}")
+            for combination in itertools.product(*block.grid.values()):
+                point = dict(zip(block.grid, combination, strict=True))
+                parameters = {**block.parameters, **point}
+                variant = ", ".join(f"{key}={value}" for key, value in point.items())
+                cell = Cell(task, known[name], tuple(parameters.items()), variant)
+                build(cell.entry, parameters)
+                cells.append(cell)
+    return cells
+
+
+def _why_not(entry: Entry, task: Task) -> str | None:
+    return entry.method().why_not(task)
+
+
+def plan_specification(
+    suite: Suite, cells: Sequence[Cell], runs: int, seed: int, planned: Sequence[RunSpec]
+) -> dict[str, Any]:
+    """The whole plan as plain data, for the manifest."""
+    return {
+        "suite": suite.name,
+        "runs": runs,
+        "seed": seed,
+        "trials": max((s.all_parameters.get("trials", 0) for s in planned), default=0),
+        "tasks": {cell.task.name: cell.task.model_dump(mode="json") for cell in cells},
+        "methods": {
+            cell.method: {
+                "title": cell.entry.method.title,
+                "citation": cell.entry.method.citation,
+                "told": sorted(cell.entry.method.told),
+                "secondary": list(cell.entry.method.secondary),
+                "origin": cell.entry.origin,
+                "code": cell.entry.code,
+            }
+            for cell in cells
+        },
+        "cells": [
+            {
+                "task": cell.task.name,
+                "method": cell.method,
+                "variant": cell.variant,
+                "parameters": dict(cell.parameters),
+            }
+            for cell in cells
+        ],
+        "run_ids": [spec.run_id for spec in planned],
+    }

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import importlib.util
+import io
+import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as RichProgress
 from rich.table import Table as RichTable
 
 from coartic import CoarticError, __version__, builtin_tasks, load_task
+from coartic.compiled import PACKAGE
+
+if TYPE_CHECKING:
+    from benchmarks.harness import Progress
 
 app = typer.Typer(
     add_completion=False,
@@ -26,11 +34,33 @@ PLAIN_WIDTH = 170  # columns where the output is not a terminal
 
 def main() -> None:
     """Run the command line; exit code 2 for what the user can put right."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
+            stream.reconfigure(errors="replace")
     try:
+        _check_packages()
         app(prog_name="coartic")
     except CoarticError as error:
-        print(f"error: {error}", file=sys.stderr)
+        for line in str(error).splitlines():
+            print(f"error: {line}", file=sys.stderr)
         sys.exit(2)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        print(f"error: {error.strerror or error}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _check_packages() -> None:
+    """Other modules of these names, in the current folder say, would be taken for ours."""
+    for name in ("analysis", "baselines", "benchmarks"):
+        found = importlib.util.find_spec(name)
+        origin = Path(found.origin) if found is not None and found.origin else None
+        if origin is None or origin.parent.parent != PACKAGE.parent:
+            raise CoarticError(
+                f"module {name!r} is taken from {origin or 'nowhere'} instead of coartic's "
+                f"installation in {PACKAGE.parent}; run the command from another folder"
+            )
 
 
 def _version(wanted: bool) -> None:
@@ -59,100 +89,138 @@ def _names(text: str | None, option: str) -> list[str]:
     return names
 
 
+MethodFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--method-file", readable=False, help="Methods of your own (Python)."),
+]
+Records = Annotated[Path, typer.Option("--in", help="Folder to look for the run in.")]
+
+
 @app.command()
 def run(
-    suite: Annotated[str, typer.Argument(help="Suite to run; `coartic list` shows them.")],
-    out: Annotated[Path, typer.Option(help="Folder for the results.")],
-    runs: Annotated[int | None, typer.Option(min=1, help="Runs per cell.")] = None,
-    trials: Annotated[int | None, typer.Option(min=1, help="Trials per run.")] = None,
-    jobs: Annotated[int, typer.Option(min=-1, help="Threads; -1 for one per core.")] = -1,
+    suite: Annotated[str, typer.Argument(help="Suite to run (`coartic list`), or a TOML file.")],
+    folder: Annotated[str, typer.Option("--out", help="Folder for the results.")],
+    runs: Annotated[int | None, typer.Option(min=1, max=100_000, help="Runs per cell.")] = None,
+    trials: Annotated[
+        int | None, typer.Option(min=1, max=10_000_000, help="Trials per run.")
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option(min=-1, max=1024, help="Processes; -1 for one per core.")
+    ] = -1,
     tasks: Annotated[str | None, typer.Option(help="Only these tasks, a,b.")] = None,
     methods: Annotated[str | None, typer.Option(help="Only these methods, x,y.")] = None,
     task_file: Annotated[
-        list[Path] | None, typer.Option(help="A task of your own (TOML); may be repeated.")
+        list[Path] | None,
+        typer.Option(readable=False, help="A task of your own (TOML); may be repeated."),
     ] = None,
+    method_file: MethodFiles = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the whole suite.")] = 0,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace results already in the folder.")
+    time_limit: Annotated[
+        float | None, typer.Option(help="Seconds per run; the suite's limit by default.")
+    ] = None,
+    trial_budget: Annotated[
+        int | None, typer.Option(min=1, help="Most physical trials a run may make.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler, tcp://host:port, instead of this machine.")
+    ] = None,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Perform timeouts and crashes again.")
+    ] = False,
+    redo: Annotated[
+        bool, typer.Option("--redo", help="Perform every run again, also those already there.")
     ] = False,
 ) -> None:
-    """Run a suite, keep its records, and compare them with the published numbers."""
-    from analysis.comparison import compare
+    """Run what a suite's folder lacks, then make its tables and the comparison.
+
+    Interrupted by whatever, the same command goes on where it stopped.
+    """
+    from analysis.comparison import compare, plain
     from analysis.results import load_results
+    from benchmarks.executors import Dask, Local
+    from benchmarks.harness import perform_plan
+    from benchmarks.methods import registry
     from benchmarks.provenance import environment
-    from benchmarks.records import prepare_folder, write_results
-    from benchmarks.runner import Plan, corrective_sequences, execute_plan
-    from benchmarks.suites import load_suite, select_cells
+    from benchmarks.specification import Limits
+    from benchmarks.store import Store, write_atomically
+    from benchmarks.suites import load_suite, plan_specification, run_specs, select_cells
+    from benchmarks.tables import write_tables
 
     if jobs == 0:
-        raise CoarticError("--jobs 0: give a number of threads, or -1 for one per core")
+        raise CoarticError("--jobs 0: give a number of processes, or -1 for one per core")
+    if time_limit is not None and not 0 < time_limit < float("inf"):
+        raise CoarticError(f"--time-limit {time_limit}: give a number of seconds above 0")
+    if not folder.strip():
+        raise CoarticError("--out is empty; name a folder for the results")
+    out = Path(folder)
     chosen = load_suite(suite)
     cells = select_cells(
         chosen,
+        registry(method_file or []),
         tasks=_names(tasks, "--tasks"),
         methods=_names(methods, "--methods"),
         task_files=task_file or [],
     )
-    plan = Plan(suite, tuple(cells), runs or chosen.runs, trials or chosen.trials, seed)
-    prepare_folder(out, overwrite=overwrite)
-    started = environment()
-    clock = time.perf_counter()
-    sequences = corrective_sequences(plan.tasks)
-    records = []
-    total = len(plan.cells) * plan.runs
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
-    try:
-        with progress:
-            bar = progress.add_task(suite, total=total)
-            for record in execute_plan(plan, jobs=jobs):
-                records.append(record)
-                row = record.row
-                progress.update(bar, advance=1, description=f"{row['task']} {row['method']}")
-            progress.update(bar, description=suite)
-    except KeyboardInterrupt:
-        print(
-            f"interrupted after {len(records)} of {total} runs; nothing written", file=sys.stderr
-        )
-        sys.exit(130)
+    limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
+    runs = runs or chosen.runs
+    planned = run_specs(cells, runs=runs, seed=seed, trials=trials or chosen.trials, limits=limits)
+    specs = [spec for _, spec in planned]
+    started, clock = environment(), time.perf_counter()
+    store = Store(out)
+    with _Display(chosen.name) as display:
+        try:
+            progress = perform_plan(
+                specs,
+                store,
+                Dask(scheduler) if scheduler else Local(jobs),
+                retry_failed=retry_failed,
+                redo=redo,
+                watch=display.update,
+            )
+        except KeyboardInterrupt:
+            display.close()
+            print(
+                f"interrupted; {display.done} runs done now are kept in {out}, "
+                "and the same command goes on from there",
+                file=sys.stderr,
+            )
+            sys.exit(130)
+    wall = time.perf_counter() - clock
     manifest = {
-        "specification": plan.specification(),
+        "specification": plan_specification(chosen, cells, runs, seed, specs),
+        "limits": {"time_s": limits.time_s, "trials": limits.trials},
         "environment": started,
-        "jobs": jobs,
-        "wall_s": time.perf_counter() - clock,
     }
-    write_results(out, records, sequences, manifest)
+    write_tables(
+        out, chosen.name, [(cell, store.read(spec.run_id)) for cell, spec in planned], manifest
+    )
     comparison = compare(load_results(out))
-    (out / "comparison.md").write_text(comparison.to_markdown(), encoding="utf-8")
+    try:
+        write_atomically(out / "comparison.md", comparison.to_markdown().encode())
+    except OSError as error:
+        raise CoarticError(f"cannot write to {out}: {error.strerror or error}") from None
 
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=PLAIN_WIDTH)
+    console = _console()
     for table in comparison.tables:
         _print(console, table.title, table.columns, table.rows)
     for note in comparison.notes:
-        console.print(f"- {note}", markup=False, highlight=False)
-    failed = sum(record.row["status"] != "ok" for record in records)
+        console.print(f"- {plain(note)}", markup=False, highlight=False)
     print(
-        f"\n{total} runs in {manifest['wall_s']:.1f} s, {failed} failed. "
+        f"\n{progress.total} runs: {progress.present} were there, {progress.done} done in "
+        f"{wall:.1f} s; {progress.failed} failed. "
         f"Results in {out}, this comparison in {out / 'comparison.md'}."
     )
-    if any(record.row["status"] == "crashed" for record in records):
+    if any(store.read(spec.run_id)["status"] == "crashed" for spec in specs):
         sys.exit(1)
 
 
 @app.command(name="list")
-def list_() -> None:
+def list_(method_file: MethodFiles = None) -> None:
     """List tasks, methods and suites."""
-    from benchmarks.methods import METHODS
+    from benchmarks.methods import registry
     from benchmarks.suites import suites
 
-    console = Console() if sys.stdout.isatty() else Console(width=PLAIN_WIDTH)
+    console = _console()
     known = [load_task(name) for name in builtin_tasks()]
     _print(
         console,
@@ -169,38 +237,104 @@ def list_() -> None:
             for task in known
         ],
     )
-    explored = {"none": "none", "closest": "closest hand, ε", "random": "any hand (DASel), ε"}
+    methods = registry(method_file or [])
     _print(
         console,
         "Methods",
-        ("method", "hands", "AModChosen", "AModOther", "hand exploration", "tasks"),
+        ("method", "what it is", "told", "parameters", "tasks"),
         [
             (
                 name,
-                " ".join(condition.hands),
-                "yes" if condition.modify_chosen else "no",
-                "yes" if condition.modify_other else "no",
-                explored[condition.hand_exploration],
-                ", ".join(task.name for task in known if condition.why_not(task) is None),
+                entry.method.title + ("" if entry.origin == "built in" else f" ({entry.origin})"),
+                ", ".join(sorted(entry.method.told)),
+                ", ".join(
+                    f"{key}={field.default}"
+                    for key, field in entry.method.Parameters.model_fields.items()
+                )
+                or "–",
+                ", ".join(task.name for task in known if entry.method().why_not(task) is None),
             )
-            for name, condition in METHODS.items()
+            for name, entry in methods.items()
         ],
     )
     _print(
         console,
         "Suites",
-        ("suite", "cells", "runs", "trials", "what it is"),
+        ("suite", "runs", "trials", "what it is"),
         [
-            (
-                name,
-                str(sum(len(entry.methods) for entry in suite.cells)),
-                str(suite.runs),
-                str(suite.trials),
-                suite.description,
-            )
+            (name, str(suite.runs), str(suite.trials or "–"), suite.description)
             for name, suite in suites().items()
         ],
     )
+
+
+@app.command()
+def show(
+    run_id: Annotated[str, typer.Argument(help="Id of a run, or its beginning.")],
+    folder: Records = Path("results"),
+) -> None:
+    """Show everything about one run, with the command that reproduces it."""
+    from benchmarks.reproduce import find_record
+
+    store, record = find_record(run_id, folder)
+    shown = dict(record)
+    rewards = shown.pop("rewards")
+    shown["rewards"] = f"{len(rewards)} trials, in learning.parquet and in the record"
+    shown["record"] = str(store.path(record["run_id"]))
+    print(json.dumps(shown, indent=2, ensure_ascii=False))
+    print(f"\nReproduce it with: coartic reproduce {record['run_id']} --in {store.folder}")
+
+
+@app.command()
+def reproduce(
+    run_id: Annotated[str, typer.Argument(help="Id of a run, or its beginning.")],
+    folder: Records = Path("results"),
+    method_file: MethodFiles = None,
+) -> None:
+    """Perform one run again and say whether the result is identical."""
+    from benchmarks.methods import registry
+    from benchmarks.reproduce import differences, find_record, perform_once, spec_of
+    from benchmarks.specification import Limits
+
+    _, record = find_record(run_id, folder)
+    limits = Limits(record["timing"]["time_limit_s"], None)
+    spec = spec_of(record, registry(method_file or []), limits)
+    again = perform_once(spec)
+    found = differences(record, again)
+    label = f"{record['run_id']} ({spec.method} on {spec.task.name}, run {spec.run})"
+    if record["code"] != again["code"]:
+        print(f"The record was made by code {record['code']}; here is {again['code']}.")
+    if not found:
+        print(f"{label}: identical.")
+        return
+    print(f"{label}: different.")
+    for difference in found:
+        print(f"- {difference}")
+    sys.exit(1)
+
+
+@app.command()
+def check(
+    subject: Annotated[str, typer.Argument(help="Id of a method, or a task file (.toml).")],
+    method_file: MethodFiles = None,
+) -> None:
+    """Check a method or a task file against the laws of the benchmark."""
+    from benchmarks.conformance import check_method, check_task_file
+    from benchmarks.methods import registry, unknown
+
+    known = registry(method_file or [])
+    if subject.endswith(".toml"):
+        laws = check_task_file(Path(subject), known)
+    elif subject in known:
+        laws = check_method(known[subject])
+    else:
+        raise unknown("method", subject, known)
+    for law in laws:
+        print(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
+    broken = sum(not law.passed for law in laws)
+    print(f"\n{subject}: {len(laws) - broken} of {len(laws)} laws hold.")
+    if broken:
+        sys.exit(1)
 
 
 @app.command()
@@ -208,23 +342,117 @@ def draw(
     out: Annotated[Path, typer.Option(help="Picture to write: .png, .svg or .pdf.")],
     tasks: Annotated[str | None, typer.Option(help="Tasks to draw, a,b; all by default.")] = None,
     task_file: Annotated[
-        list[Path] | None, typer.Option(help="A task of your own (TOML); may be repeated.")
+        list[Path] | None,
+        typer.Option(readable=False, help="A task of your own (TOML); may be repeated."),
     ] = None,
 ) -> None:
     """Draw start configuration and goals of tasks."""
     from analysis.drawing import FORMATS, draw_tasks
 
-    if out.suffix not in FORMATS:
+    if out.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}")
     names = _names(tasks, "--tasks")
     if not names and not task_file:
         names = list(builtin_tasks())
-    chosen = [load_task(name) for name in names] + [load_task(path) for path in task_file or []]
+    chosen = [load_task(name) for name in dict.fromkeys(names)] + [
+        load_task(path) for path in task_file or []
+    ]
     try:
         draw_tasks(chosen, out)
     except OSError as error:
         raise CoarticError(f"cannot write {out}: {error.strerror or error}") from None
     print(f"{', '.join(task.name for task in chosen)} drawn in {out}.")
+
+
+def _console() -> Console:
+    console = Console()
+    return console if console.is_terminal else Console(width=PLAIN_WIDTH)
+
+
+class _Display:
+    """Cells done, failures and time left: live on a terminal, plain lines elsewhere."""
+
+    EVERY_S = 10.0  # between plain lines
+
+    def __init__(self, suite: str) -> None:
+        self.done = 0
+        self._suite = suite
+        self._console = Console(stderr=True)
+        self._bar = RichProgress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[failed]} failed"),
+            TimeRemainingColumn(),
+            console=self._console,
+            transient=False,
+        )
+        self._task: TaskID | None = None
+        self._started = self._last = time.monotonic()  # set anew when work begins
+
+    def __enter__(self) -> _Display:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+        self._bar.stop()
+
+    def update(self, progress: Progress, record: dict[str, Any] | None) -> None:
+        """Show how far the plan is."""
+        self.done = progress.done
+        if record is None:
+            for damage in progress.damaged:
+                self._line(f"{damage.reason}; this run is performed again")
+            if progress.stale:
+                self._line(
+                    f"{len(progress.stale)} records were made by other code and are not used"
+                )
+            if progress.present:
+                self._line(f"{progress.present} of {progress.total} runs are already there")
+        if self._console.is_terminal:
+            self._live(progress, record)
+        else:
+            self._plain(progress)
+
+    def _live(self, progress: Progress, record: dict[str, Any] | None) -> None:
+        if self._task is None:
+            if progress.present == progress.total:
+                return
+            self._bar.start()
+            self._task = self._bar.add_task(
+                self._suite, total=progress.total - progress.present, failed=0
+            )
+        words = "starting workers (the first time compiles)"
+        if record is not None:
+            specification = record["specification"]
+            words = f"{specification['task']['name']} {specification['method']}"
+        self._bar.update(
+            self._task, completed=progress.done, failed=progress.failed, description=words
+        )
+
+    def _plain(self, progress: Progress) -> None:
+        now = time.monotonic()
+        if progress.done <= 1:  # the workers' start says nothing of the pace
+            self._started = self._last = now
+        finished = progress.present + progress.done == progress.total
+        if not progress.done or (now - self._last < self.EVERY_S and not finished):
+            return
+        self._last = now
+        if finished:
+            self._line(f"{progress.total} of {progress.total} runs, {progress.failed} failed")
+            return
+        left = progress.total - progress.present - progress.done
+        seconds = (now - self._started) / (progress.done - 1) * left
+        self._line(
+            f"{progress.present + progress.done} of {progress.total} runs, "
+            f"{progress.failed} failed, about {seconds:.0f} s left"
+        )
+
+    def _line(self, text: str) -> None:
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _print(

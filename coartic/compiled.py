@@ -7,9 +7,11 @@ is named after a hash of the package's sources: changed sources, fresh code.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,19 +25,36 @@ PACKAGE = Path(__file__).parent
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+# Modules that no result passes through: they say or show it, or repeat it slowly.
+_PRESENTATION = {"__init__.py", "__main__.py", "cli.py", "frames.py", "reference.py"}
+
+
+@cache
+def model_source() -> bytes:
+    """The sources that results come from, as they are on disk."""
+    return b"\0".join(
+        path.name.encode() + b"\0" + path.read_bytes()
+        for path in sorted(PACKAGE.glob("*.py"))
+        if path.name not in _PRESENTATION
+    )
+
+
 def source_fingerprint() -> str:
-    """Hash of every Python source of the package: the version of the model's code."""
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.glob("*.py")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
+    """Hash of :func:`model_source`: the version of the model's code."""
+    return hashlib.sha256(model_source()).hexdigest()[:16]
 
 
 def _cache_folder() -> Path | None:
     """A writable folder for compiled code, or None where there is none."""
-    user = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "coartic"
     roots = [Path(numba.config.CACHE_DIR)] if numba.config.CACHE_DIR else []
-    for root in [*roots, PACKAGE / "__pycache__", user]:
+    roots.append(PACKAGE / "__pycache__")
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    if Path(given).is_absolute():
+        roots.append(Path(given) / "coartic")
+    else:
+        with contextlib.suppress(RuntimeError):  # a user without a home
+            roots.append(Path.home() / ".cache" / "coartic")
+    for root in roots:
         folder = root / f"kernel-{source_fingerprint()}"
         try:
             folder.mkdir(parents=True, exist_ok=True)

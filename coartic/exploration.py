@@ -76,7 +76,7 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
     if isinstance(condition, ExplorationCondition):
         return condition
     try:
-        return CONDITIONS[condition]
+        return CONDITIONS[condition.removeprefix("dual-process/")]
     except KeyError:
         known = ", ".join(CONDITIONS)
         raise CoarticError(

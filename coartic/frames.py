@@ -46,25 +46,44 @@ def movement_rows(task: Task, movements: Iterable[Movement]) -> list[dict[str, A
             "kind": movement.kind,
             "ticks": movement.ticks,
         }
+        names = task.robot.joint_names
         if movement.target is not None:
-            row.update(zip(task.robot.joint_names, movement.target.tolist(), strict=True))
+            row.update(zip(names, movement.target.tolist(), strict=True))
+        if movement.waypoints is not None:
+            row["waypoints"] = [
+                dict(zip(names, point.tolist(), strict=True)) for point in movement.waypoints
+            ]
         rows.append(row)
     return rows
 
 
-def movements_from(task: Task, rows: pd.DataFrame) -> tuple[Movement, ...]:
-    """The movements of one run read back from rows as :func:`movement_rows` makes them."""
+def movements_from(
+    task: Task, rows: pd.DataFrame, paths: pd.DataFrame | None = None
+) -> tuple[Movement, ...]:
+    """The movements of one run, read back from its rows of ``solutions.parquet``.
+
+    ``paths`` holds the run's rows of ``paths.parquet``, for movements of kind ``path``.
+    """
     names = list(task.robot.joint_names)
-    return tuple(
-        Movement(
-            goal=int(row["goal"]),
-            hand=row["hand"],
-            kind=row["kind"],
-            target=np.array([row[name] for name in names], dtype=np.float64),
-            ticks=int(row["ticks"]),
+    movements = []
+    for row in rows.sort_values("order").to_dict("records"):
+        waypoints = None
+        if row["kind"] == "path":
+            if paths is None:
+                raise ValueError("a movement of kind 'path' needs the rows of paths.parquet")
+            own = paths[paths["order"] == row["order"]].sort_values("waypoint")
+            waypoints = own[names].to_numpy(dtype=np.float64)
+        movements.append(
+            Movement(
+                goal=int(row["goal"]),
+                hand=row["hand"],
+                kind=row["kind"],
+                target=np.array([row[name] for name in names], dtype=np.float64),
+                ticks=int(row["ticks"]),
+                waypoints=waypoints,
+            )
         )
-        for row in rows.sort_values("order").to_dict("records")
-    )
+    return tuple(movements)
 
 
 def runs_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:

@@ -8,13 +8,17 @@ alone achieves.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable
+from functools import lru_cache
 
 from coartic.errors import NotApplicableError
 from coartic.model import PAPER, MotionModel
 from coartic.robot import HANDS, Hand
 from coartic.solution import Execution, Movement, execute
 from coartic.task import Task, hands_of, letters_of
+
+MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 
 
 def corrective_trial(task: Task, hands: str, *, model: MotionModel = PAPER) -> Execution:
@@ -26,10 +30,46 @@ def corrective_trial(task: Task, hands: str, *, model: MotionModel = PAPER) -> E
 
 
 def hand_sequences(task: Task, hands: Iterable[Hand] | None = None) -> list[str]:
-    """All hand sequences of a task, left before right; 2^G of them for two hands."""
+    """All hand sequences of a task, left before right; 2^G of them for two hands.
+
+    Raises NotApplicableError above ``MOST_SEQUENCES``.
+    """
     allowed = task.hands if hands is None else tuple(hands)
     ordered = [hand for hand in HANDS if hand in allowed]
+    reason = too_many_sequences(task, len(ordered))
+    if reason is not None:
+        raise NotApplicableError(reason)
     return [letters_of(s) for s in itertools.product(ordered, repeat=len(task.goals))]
+
+
+def too_many_sequences(task: Task, hands: int) -> str | None:
+    """Why the sequences of so many hands cannot all be tried, or None where they can."""
+    count = hands ** len(task.goals)
+    if count <= MOST_SEQUENCES:
+        return None
+    return f"task {task.name!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
+
+
+def changes_of_hand(sequence: str) -> int:
+    """How often successive goals are hit by different hands."""
+    return sum(a != b for a, b in itertools.pairwise(sequence))
+
+
+def ranked_sequences(
+    task: Task, sequences: Iterable[str], *, model: MotionModel = PAPER
+) -> list[tuple[str, Execution]]:
+    """The corrective process alone with each hand sequence, best first, failed ones last.
+
+    Of equal rewards the one with the fewest changes of hand comes first, then the one
+    that was given first.
+    """
+
+    def rank(entry: tuple[str, Execution]) -> tuple[float, int]:
+        reward = entry[1].reward
+        return math.inf if reward is None else -reward, changes_of_hand(entry[0])
+
+    trials = [(hands, corrective_trial(task, hands, model=model)) for hands in sequences]
+    return sorted(trials, key=rank)
 
 
 def initial_hands(
@@ -37,26 +77,42 @@ def initial_hands(
 ) -> str:
     """The initial hand sequence of a task for a robot with the given hands.
 
-    A named sequence stands as it is. Policies take the highest reward of the
-    corrective process alone among sequences of one hand (``best-single-hand``) or
-    among all (``best-of-all``); of equals, the one with the fewest changes of hand,
-    then the first with left before right. Raises NotApplicableError where no
-    candidate completes the task.
+    A named sequence stands as it is. Policies take the first of
+    :func:`ranked_sequences` among sequences of one hand (``best-single-hand``) or among
+    all (``best-of-all``). Raises NotApplicableError where no candidate completes the
+    task, or there are too many.
     """
     if not task.initial_is_policy:
         return task.initial_hands
-    candidates = hand_sequences(task, hands)
+    allowed = task.hands if hands is None else hands
+    return _by_policy(_Content(task), tuple(hand for hand in HANDS if hand in allowed), model)
+
+
+class _Content:
+    """A task as a key of a cache: equal where the content is equal."""
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.text = task.model_dump_json()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Content) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+
+@lru_cache(maxsize=64)
+def _by_policy(content: _Content, hands: tuple[Hand, ...], model: MotionModel) -> str:
+    task = content.task
     if task.initial_hands == "best-single-hand":
-        candidates = [sequence for sequence in candidates if len(set(sequence)) == 1]
-    scored = []
-    for order, sequence in enumerate(candidates):
-        reward = corrective_trial(task, sequence, model=model).reward
-        if reward is not None:
-            changes = sum(a != b for a, b in itertools.pairwise(sequence))
-            scored.append((-reward, changes, order, sequence))
-    if not scored:
+        candidates = [letters_of([hand] * len(task.goals)) for hand in hands]
+    else:
+        candidates = hand_sequences(task, hands)
+    best, execution = ranked_sequences(task, candidates, model=model)[0]
+    if not execution.completed:
         raise NotApplicableError(
             f"task {task.name!r}: the corrective process completes it with none of the "
             f"{len(candidates)} hand sequences that {task.initial_hands!r} tries"
         )
-    return min(scored)[-1]
+    return best

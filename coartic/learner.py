@@ -511,6 +511,14 @@ def learn_many(
     return runs
 
 
+def warm_up() -> None:
+    """Compile the kernels, or load them, so that no run's time contains it."""
+    from coartic.task import load_task
+
+    task = load_task("ascending")
+    learn(task, "EC1", seed=0, trials=1).execute()
+
+
 def _problem(task: Task, condition: ExplorationCondition, model: MotionModel) -> _Problem:
     dof = task.robot.dof
     follows = np.zeros((2, dof), dtype=np.bool_)

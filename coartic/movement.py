@@ -223,6 +223,36 @@ def move(
     return MoveResult(position, int(ticks), bool(hit), int(evaluations))
 
 
+def follow(
+    robot: Robot,
+    q: Array,
+    waypoints: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    radius: float,
+    *,
+    model: MotionModel = PAPER,
+) -> MoveResult:
+    """Follow a joint-space path through ``waypoints`` (k, dof) until the goal is hit.
+
+    The k-th point lies at arc length ``k m`` of the polyline from ``q`` through the
+    waypoints, the last point at its end. The movement stops at the first point with
+    the hand within ``radius`` of the goal, or at the end; k steps take k + 1 ticks, as
+    for :func:`move`. Raises ValueError for a wrong shape.
+    """
+    corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
+    lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    last = math.ceil(ends[-1] / model.step)
+    at = np.append(np.arange(last) * model.step, ends[-1])
+    points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
+    points[-1] = corners[-1]
+    misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
+    inside = np.flatnonzero(np.hypot(*misses.T) <= radius)
+    k = int(inside[0]) if inside.size else last
+    return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
+
+
 def configuration(robot: Robot, q: Any) -> Array:
     """A contiguous copy of one configuration; ValueError where the shape is wrong."""
     array = np.array(q, dtype=np.float64)

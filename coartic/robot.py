@@ -24,8 +24,9 @@ from pydantic.dataclasses import dataclass
 
 Hand = Literal["left", "right"]
 Array = NDArray[np.float64]
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+LARGEST = 1e4  # of any figure: far beyond use, and exact in all that follows
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST)]
 
 HANDS: tuple[Hand, Hand] = ("left", "right")  # A, in the order that breaks ties
 BASE_DOF = 2

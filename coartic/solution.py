@@ -9,7 +9,7 @@ says of its own solution, its score is what comes out here.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,12 +17,12 @@ import numpy as np
 from coartic.corrective import correct
 from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
-from coartic.movement import configuration, move
+from coartic.movement import MoveResult, configuration, follow, move
 from coartic.robot import Array, Hand
 from coartic.task import Task, letters_of
 
-Kind = Literal["learned", "corrective", "planned"]
-KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned")
+Kind = Literal["learned", "corrective", "planned", "path"]
+KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,19 @@ class Movement:
     """Number of the goal it is made for, from 1 as in the paper."""
     hand: Hand
     kind: Kind
-    """Learned and planned movements end on a hit or on arrival and are always made;
-    a corrective one ends only on a hit, and is made only if the goal is not hit."""
+    """Learned and planned movements are straight in joint space and end on a hit or on
+    arrival; a path follows its waypoints and ends on a hit or at the last of them; a
+    corrective movement ends only on a hit and is made only if the goal is not hit. The
+    first movement for a goal, unless corrective, is always made; the others only while
+    the goal is not hit."""
     target: Array | None = None
-    """Target configuration q^t, shape ``(dof,)``; None in a corrective movement has
-    the corrective process find it when the time comes."""
+    """Target configuration q^t, shape ``(dof,)``; the last waypoint of a path. None in a
+    corrective movement has the corrective process find it when the time comes."""
     ticks: int | None = None
     """Ticks it took; None before it is executed."""
+    waypoints: Array | None = None
+    """Of a path: configurations to pass through, shape ``(k, dof)``, from where the
+    robot stands to ``waypoints[-1]``; None for the other kinds."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,10 @@ class Execution:
     ticks: int
     corrections: int
     """Corrective movements made."""
+    iterations: int = 0
+    """Iterations of the corrective process, one Jacobian each."""
+    evaluations: int = 0
+    """Forward-kinematics evaluations made."""
     reason: str = ""
     """Why the task was not completed; empty where it was."""
 
@@ -89,47 +99,116 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     breaks the task's rules: goals missing or out of order, a hand the robot does not
     have, a target of the wrong shape or not finite, a locked base that moves.
     """
-    robot = task.robot
-    groups = _by_goal(task, list(solution))
-    q = np.array(task.q0)
-    made: list[Movement] = []
-    configurations: list[Array] = []
-    corrections = 0
+    run = _Run(task, model)
+    for number, movements in _by_goal(task, list(solution)):
+        run.reach(number, movements)
+        if run.reason:
+            break
+    return run.outcome()
 
-    def outcome(reason: str = "") -> Execution:
-        ticks = sum(movement.ticks or 0 for movement in made)
-        reached = np.array(configurations).reshape(-1, robot.dof)
-        return Execution(tuple(made), reached, ticks, corrections, reason)
 
-    for number, planned in groups:
-        hand, goal = planned[0].hand, task.goals[number - 1]
-        hit = move(robot, q, q, hand, goal, task.radius, model=model).hit
-        # The corrective process has the last word on every goal.
-        for movement in (*planned, Movement(number, hand, "corrective")):
-            corrective, target = movement.kind == "corrective", movement.target
-            if corrective and hit:
-                if not made or made[-1].goal != number:  # hit on the way: show the hand
-                    made.append(Movement(number, hand, "corrective", np.array(q), 0))
+class _Run:
+    """An execution while it goes on."""
+
+    def __init__(self, task: Task, model: MotionModel) -> None:
+        self.task = task
+        self.model = model
+        self.q = np.array(task.q0)
+        self.made: list[Movement] = []
+        self.configurations: list[Array] = []
+        self.corrections = self.iterations = self.evaluations = 0
+        self.reason = ""
+
+    def reach(self, number: int, movements: list[Movement]) -> None:
+        """Make the movements of one goal; the corrective process has the last word."""
+        hand = movements[0].hand
+        here = self._move(number, self.q, hand, "planned")
+        hit = here.hit
+        first = True
+        for movement in (*movements, Movement(number, hand, "corrective")):
+            needed = not hit or (first and movement.kind != "corrective")
+            first = False
+            if not needed:
                 continue
-            if target is None:
-                found = correct(robot, q, hand, goal, locked_base=task.locked_base, model=model)
-                if not found.converged:
-                    return outcome(
-                        f"goal {number}: the corrective process did not converge "
-                        f"with the {hand} hand in {found.iterations} iterations"
-                    )
-                target = found.q
-            result = move(
-                robot, q, target, hand, goal, task.radius,
-                stop_on_arrival=not corrective, model=model,
-            )  # fmt: skip
-            q, hit = result.q, result.hit
-            corrections += corrective
-            made.append(Movement(number, hand, movement.kind, target, result.ticks))
+            if movement.waypoints is not None:
+                movement = replace(movement, target=np.array(movement.waypoints[-1]))
+                result = self._follow(movement)
+            else:
+                target = movement.target
+                if target is None:
+                    target = self._correct(number, hand)
+                    if target is None:
+                        return
+                movement = replace(movement, target=target)
+                result = self._move(number, target, hand, movement.kind)
+            self.q, hit = result.q, result.hit
+            self.corrections += movement.kind == "corrective"
+            self.made.append(replace(movement, ticks=result.ticks))
         if not hit:
-            return outcome(f"goal {number}: the corrective movement ended outside the goal")
-        configurations.append(np.array(q))
-    return outcome()
+            self.reason = f"goal {number}: the corrective movement ended outside the goal"
+            return
+        if not self.made or self.made[-1].goal != number:  # hit on the way: show the hand
+            self.made.append(Movement(number, hand, "corrective", np.array(self.q), 0))
+        self.configurations.append(np.array(self.q))
+
+    def outcome(self) -> Execution:
+        """What has happened so far."""
+        return Execution(
+            movements=tuple(self.made),
+            configurations=np.array(self.configurations).reshape(-1, self.task.robot.dof),
+            ticks=sum(movement.ticks or 0 for movement in self.made),
+            corrections=self.corrections,
+            iterations=self.iterations,
+            evaluations=self.evaluations,
+            reason=self.reason,
+        )
+
+    def _move(self, number: int, target: Array, hand: Hand, kind: Kind) -> MoveResult:
+        result = move(
+            self.task.robot,
+            self.q,
+            target,
+            hand,
+            self.task.goals[number - 1],
+            self.task.radius,
+            stop_on_arrival=kind != "corrective",
+            model=self.model,
+        )
+        self.evaluations += result.evaluations
+        return result
+
+    def _follow(self, movement: Movement) -> MoveResult:
+        assert movement.waypoints is not None
+        result = follow(
+            self.task.robot,
+            self.q,
+            movement.waypoints,
+            movement.hand,
+            self.task.goals[movement.goal - 1],
+            self.task.radius,
+            model=self.model,
+        )
+        self.evaluations += result.evaluations
+        return result
+
+    def _correct(self, number: int, hand: Hand) -> Array | None:
+        found = correct(
+            self.task.robot,
+            self.q,
+            hand,
+            self.task.goals[number - 1],
+            locked_base=self.task.locked_base,
+            model=self.model,
+        )
+        self.iterations += found.iterations
+        self.evaluations += found.iterations + 1
+        if found.converged:
+            return found.q
+        self.reason = (
+            f"goal {number}: the corrective process did not converge "
+            f"with the {hand} hand in {found.iterations} iterations"
+        )
+        return None
 
 
 def _by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:
@@ -147,16 +226,22 @@ def _by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movem
             raise CoarticError(f"{where}: two hands for one goal")
         if movement.kind not in KINDS:
             raise CoarticError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
-        if movement.target is None:
-            if movement.kind != "corrective":
-                raise CoarticError(f"{where}: a {movement.kind} movement needs a target")
-            continue
-        try:
-            target = configuration(task.robot, movement.target)
-        except ValueError as error:
-            raise CoarticError(f"{where}: {error}") from None
-        if np.any(target[locked] != task.q0[locked]):
-            raise CoarticError(f"{where}: the target moves a locked base coordinate")
+        points: list[Array] = []
+        if movement.kind == "path":
+            points = [] if movement.waypoints is None else list(movement.waypoints)
+            if not points:
+                raise CoarticError(f"{where}: a path needs waypoints")
+        elif movement.target is not None:
+            points = [movement.target]
+        elif movement.kind != "corrective":
+            raise CoarticError(f"{where}: a {movement.kind} movement needs a target")
+        for point in points:
+            try:
+                checked = configuration(task.robot, point)
+            except ValueError as error:
+                raise CoarticError(f"{where}: {error}") from None
+            if np.any(checked[locked] != task.q0[locked]):
+                raise CoarticError(f"{where}: the target moves a locked base coordinate")
     wanted = list(range(1, len(task.goals) + 1))
     if [goal for goal, _ in groups] != wanted:
         given = [goal for goal, _ in groups]

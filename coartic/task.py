@@ -20,12 +20,14 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import TaskError
 from coartic.model import PAPER
-from coartic.robot import HANDS, Array, Finite, Hand, Robot
+from coartic.robot import HANDS, LARGEST, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
 LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "tasks"
+
+MOST_GOALS = 100
 
 Point = tuple[Finite, Finite]
 
@@ -68,9 +70,9 @@ class Task(_Frozen):
     description: str = ""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)] = HANDS
     """Hands the robot has."""
-    goals: Annotated[tuple[Point, ...], Field(min_length=1)]
+    goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
     """Goal centres x_g in the order in which they are to be hit, length unit."""
-    radius: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = 0.1
+    radius: Length = 0.1
     """θ^g: radius of every goal, length unit."""
     locked_base: tuple[Literal["x", "y"], ...] = ()
     """Base coordinates that cannot move."""
@@ -218,7 +220,7 @@ def load_task(name_or_path: str | Path) -> Task:
             if task.name == name_or_path:
                 return task
         close = difflib.get_close_matches(name_or_path, builtin_tasks(), n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
+        hint = f"; did you mean {close[0]!r}?" if close else "."
         raise TaskError(
             f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
             "A task file's name ends in .toml."
@@ -237,13 +239,13 @@ def _shipped() -> list[Task]:
 
 def _read(path: Path) -> Task:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Notepad's mark, too
     except OSError as error:
         raise TaskError(f"{path}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise TaskError(f"{path}: is not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise TaskError(f"{path}: is not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
+        raise TaskError(f"{path}: is not valid TOML: {_brief(str(error))}") from None
     return parse_task(content, str(path))
 
 
@@ -280,6 +282,10 @@ def _hint(key: str) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
+def _brief(text: str) -> str:
+    return text if len(text) <= 80 else f"{text[:60]}... ({len(text)} characters)"
+
+
 def _key(location: tuple[int | str, ...]) -> str:
     text = ""
     for part in location:
@@ -293,23 +299,30 @@ def _explain(detail: ErrorDetails) -> str:
     if detail["type"] == "task":
         return f"{context['key']} {context['text']}"
     key, value = _key(detail["loc"]), detail["input"]
+    shown = _brief(repr(value))
     match detail["type"]:
         case "missing":
             return f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":
-            return f"{key} is an unknown key{_hint(str(detail['loc'][-1]))}"
+            last = str(detail["loc"][-1])
+            table = str(detail["loc"][0])
+            if len(detail["loc"]) > 1 and last in Task.model_fields:
+                return f"{key} is an unknown key; {last!r} belongs above the line [{table}]"
+            return f"{key} is an unknown key{_hint(last)}"
         case "finite_number":
             return f"{key} is {value}; it must be a finite number"
         case "float_type":
-            return f"{key} is {value!r} ({type(value).__name__}); it must be a number"
+            return f"{key} is {shown} ({type(value).__name__}); it must be a number"
         case "greater_than":
             return f"{key} is {value}; it must be greater than 0"
+        case "greater_than_equal" | "less_than_equal":
+            return f"{key} is {shown}; its size must be at most {LARGEST:g}"
         case "literal_error":
-            return f"{key} is {value!r}; it must be {context['expected']}"
+            return f"{key} is {shown}; it must be {context['expected']}"
         case "string_type":
-            return f"{key} is {value!r} ({type(value).__name__}); it must be a text"
+            return f"{key} is {shown} ({type(value).__name__}); it must be a text"
         case "string_pattern_mismatch":
-            return f"{key} is {value!r}; use letters, digits, '.', '_' and '-' only"
+            return f"{key} is {shown}; use letters, digits, '.', '_' and '-' only"
         case "too_short" if key == "goals":
             return "goals is empty; a task needs at least one goal"
         case "too_short":
@@ -319,9 +332,9 @@ def _explain(detail: ErrorDetails) -> str:
                 f"{key} has {context['actual_length']} entries; it takes {context['max_length']}"
             )
         case "tuple_type":
-            return f"{key} is {value!r} ({type(value).__name__}); it must be a list"
+            return f"{key} is {shown} ({type(value).__name__}); it must be a list"
         case "model_type" | "model_attributes_type" | "dataclass_type" | "dict_type":
-            return f"{key} is {value!r}; it must be a table"
+            return f"{key} is {shown}; it must be a table"
         case _:
             message = detail["msg"]
-            return f"{key}: {message[0].lower()}{message[1:]} (found {value!r})"
+            return f"{key}: {message[0].lower()}{message[1:]} (found {shown})"

@@ -8,11 +8,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from benchmarks.store import Store
 from coartic import __version__, cli
 
 from .test_task import BAD, GOOD
 
 ROOT = Path(__file__).parent.parent
+BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 
 
 def call(monkeypatch, capsys, *arguments):
@@ -29,13 +31,14 @@ def call(monkeypatch, capsys, *arguments):
 
 def test_run_paper(monkeypatch, capsys, tmp_path):
     out = tmp_path / "results"
-    code, text, _ = call(
-        monkeypatch, capsys, "run", "paper", "--out", out, "--runs", 2, "--trials", 60
-    )
+    command = ("run", "paper", "--out", out, "--runs", 2, "--trials", 60)
+    code, text, error = call(monkeypatch, capsys, *command)
     assert code == 0
     assert {path.name for path in out.iterdir()} == {
+        "records",
         "runs.parquet",
         "solutions.parquet",
+        "paths.parquet",
         "learning.parquet",
         "sequences.parquet",
         "manifest.json",
@@ -44,20 +47,31 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     page = (out / "comparison.md").read_text(encoding="utf-8")
     for words in ("-303 ± 2.9 (20)", "-319 (-319*)", "Reconstructed: goals", "LRLR -533"):
         assert words in page
+    assert "are not comparable" in page  # 60 trials against 10 000
     assert "-303 ± 2.9 (20)" in text
-    assert "14 runs in" in text
+    assert "14 runs: 0 were there, 14 done in" in text
     assert "0 failed" in text
+    assert "14 of 14 runs, 0 failed" in error  # plain lines without a terminal
     manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["environment"]["packages"]["numba"]
     assert manifest["environment"]["command"][1:3] == ["run", "paper"]
-    # A second run refuses to replace the first, and does where it is told to.
-    again = ("run", "paper", "--out", out, "--runs", 1, "--trials", 1, "--tasks", "ascending")
-    code, _, error = call(monkeypatch, capsys, *again)
-    assert code == 2
-    assert "already holds results" in error
-    assert len(pd.read_parquet(out / "runs.parquet")) == 14
-    assert call(monkeypatch, capsys, *again, "--overwrite")[0] == 0
-    assert len(pd.read_parquet(out / "runs.parquet")) == 1
+    # The same command again has nothing to do and changes no table.
+    tables = {path: path.read_bytes() for path in out.glob("*.parquet")}
+    code, text, error = call(monkeypatch, capsys, *command)
+    assert code == 0
+    assert "14 runs: 14 were there, 0 done in" in text
+    assert "14 of 14 runs are already there" in error
+    assert tables == {path: path.read_bytes() for path in out.glob("*.parquet")}
+    # A larger one does what is missing; a damaged record is reported and done again.
+    record = next(iter(out.glob("records/*.json")))
+    record.write_bytes(record.read_bytes()[:-20])
+    code, text, error = call(
+        monkeypatch, capsys, "run", "paper", "--out", out, "--runs", 3, "--trials", 60
+    )
+    assert code == 0
+    assert "21 runs: 13 were there, 8 done in" in text
+    assert f"{record}: is damaged" in error
+    assert len(pd.read_parquet(out / "runs.parquet")) == 21
 
 
 def test_run_own_task(monkeypatch, capsys, tmp_path):
@@ -94,16 +108,28 @@ def test_bad_task_files(case, monkeypatch, capsys, tmp_path):
         (["run", "papr", "--out", "x"], "did you mean 'paper'?"),
         (
             ["run", "paper", "--out", "x", "--tasks", "nope"],
-            "unknown task of suite 'paper' 'nope'",
+            "unknown task 'nope'",
         ),
         (["run", "paper", "--out", "x", "--tasks", "ascending,"], "has an empty name"),
-        (["run", "paper", "--out", "x", "--methods", "EC1"], "unknown method 'EC1'"),
+        (["run", "paper", "--out", "x", "--methods", "EC9"], "unknown method 'EC9'"),
         (["run", "paper", "--out", "x", "--jobs", "0"], "--jobs 0"),
         (["run", "paper", "--out", "x", "--runs", "0"], "Invalid value for '--runs'"),
         (["run", "paper", "--out", "x", "--seed", "-1"], "Invalid value for '--seed'"),
         (["run", "paper", "--out", "x", "--trials", "many"], "Invalid value for '--trials'"),
+        (["run", "paper", "--out", "x", "--jobs", "99999"], "Invalid value for '--jobs'"),
+        (["run", "paper", "--out", "x", "--runs", "9999999"], "Invalid value for '--runs'"),
+        (["run", "paper", "--out", " "], "--out is empty"),
         (["run", "paper"], "Missing option"),
         (["run", "paper", "--out", "/dev/null/x"], "cannot write to /dev/null/x"),
+        (["run", "paper", "--out", "x", "--time-limit", "0"], "--time-limit 0.0"),
+        (["run", "paper", "--out", "x", "--time-limit", "nan"], "--time-limit nan"),
+        (["run", "paper", "--out", "x", "--trial-budget", "0"], "Invalid value"),
+        (["run", "paper", "--out", "x", "--method-file", "no.py"], "no.py: cannot be read"),
+        (["run", "none.toml", "--out", "x"], "none.toml: cannot be read"),
+        (["check", "nothing"], "unknown method 'nothing'"),
+        (["show", "abc"], "no run 'abc' below results"),
+        (["show", "*"], "'*' is no run id"),
+        (["reproduce", "abc"], "no run 'abc' below results"),
         (["run", "paper", "--out", "x", "--task-file", "no.toml"], "no.toml: cannot be read"),
         (["draw", "--out", "x.bmp"], "the name must end in .png"),
         (["draw", "--out", "/dev/null/x.png"], "cannot write /dev/null/x.png"),
@@ -121,21 +147,90 @@ def test_usage_errors(arguments, words, monkeypatch, capsys, tmp_path):
 
 
 def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):
-    from benchmarks import runner
-
-    def broken(*_, **__):
-        raise FloatingPointError("planted")
-
-    monkeypatch.setattr(runner, "learn", broken)
     code, text, _ = call(
-        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 3,
-        "--out", tmp_path / "out",
+        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--methods", "test/dies",
+        "--method-file", BROKEN, "--runs", 2, "--out", tmp_path / "out",
     )  # fmt: skip
     assert code == 1
-    assert (
-        "3 runs of ascending x dual-process/EC1 are crashed: FloatingPointError: planted" in text
+    assert "2 runs of ascending x test/dies are crashed: the worker process ended" in text
+    assert "2 failed" in text
+
+
+def test_trial_budget(monkeypatch, capsys, tmp_path):
+    code, _, _ = call(
+        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 1,
+        "--trial-budget", 12, "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert code == 0
+    assert list(pd.read_parquet(tmp_path / "out" / "runs.parquet").trials) == [12]
+
+
+def test_check(monkeypatch, capsys):
+    code, text, _ = call(monkeypatch, capsys, "check", "corrective-alone/given")
+    assert code == 0
+    assert "8 of 8 laws hold" in text
+    assert "FAIL" not in text
+    code, text, _ = call(monkeypatch, capsys, "check", "test/peeks", "--method-file", BROKEN)
+    assert code == 1
+    assert "FAIL  information: on ascending: the method used 'Jacobian'" in text
+
+
+def test_show_and_reproduce(monkeypatch, capsys, tmp_path):
+    call(
+        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 2,
+        "--trials", 50, "--out", tmp_path / "out",
+    )  # fmt: skip
+    first, second = pd.read_parquet(tmp_path / "out" / "runs.parquet").run_id
+    code, text, _ = call(monkeypatch, capsys, "show", first, "--in", tmp_path)
+    assert code == 0
+    shown = json.loads(text.partition("\nReproduce it with")[0])
+    assert shown["specification"]["task"]["name"] == "ascending"
+    assert shown["environment"]["commit"] is None or shown["environment"]["commit"]["id"]
+    code, text, _ = call(monkeypatch, capsys, "reproduce", first, "--in", tmp_path)
+    assert (code, text) == (
+        0,
+        f"{first} (dual-process/EC1 on ascending, run 0): identical.\n",
     )
-    assert "3 failed" in text
+    # A record that says something else than the code gives, with a checksum that fits.
+    store = Store(tmp_path / "out")
+    record = store.read(second)
+    record["score"]["reward"] += 1
+    record["rewards"][3] -= 1
+    store.write(record)
+    code, text, _ = call(monkeypatch, capsys, "reproduce", second, "--in", tmp_path)
+    assert code == 1
+    assert "different." in text
+    assert "- score:" in text
+    assert "- rewards by trial differ, first at trial 3" in text
+    code, _, error = call(monkeypatch, capsys, "show", "", "--in", tmp_path)
+    assert code == 2
+    assert "is no run id" in error
+
+
+def test_short_names_of_conditions(monkeypatch, capsys, tmp_path):
+    code, _, _ = call(
+        monkeypatch, capsys, "run", "paper", "--methods", "EC4", "--tasks", "two-armed-2",
+        "--runs", 1, "--trials", 3, "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert code == 0
+    assert list(pd.read_parquet(tmp_path / "out" / "runs.parquet").method) == ["dual-process/EC4"]
+
+
+def test_a_terminal_without_the_signs(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "coartic", "list"],
+        capture_output=True, check=True, env={"PYTHONIOENCODING": "ascii"}, cwd=ROOT,
+    )  # fmt: skip
+    assert b"ascending" in done.stdout
+
+
+def test_modules_of_our_names_in_the_current_folder(tmp_path):
+    (tmp_path / "analysis.py").write_text("x = 1\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "coartic", "list"], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 2
+    assert "module 'analysis' is taken from" in done.stderr
 
 
 def test_list(monkeypatch, capsys):
@@ -156,6 +251,15 @@ def test_draw(monkeypatch, capsys, tmp_path):
     )
     assert code == 0
     assert text.startswith("mine drawn in")
+
+
+def test_titles_are_text_not_formulas(monkeypatch, capsys, tmp_path):
+    (tmp_path / "mine.toml").write_text('title = "$x^$"\n' + GOOD, encoding="utf-8")
+    code, _, _ = call(
+        monkeypatch, capsys, "draw", "--task-file", tmp_path / "mine.toml",
+        "--out", tmp_path / "own.PNG",
+    )  # fmt: skip
+    assert code == 0
 
 
 def test_the_readme_picture_is_what_the_project_draws(monkeypatch, capsys, tmp_path):

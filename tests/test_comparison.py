@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.comparison import Comparison, Table, compare, difference
+from analysis.comparison import Comparison, Table, compare, difference, plain
 from analysis.published import (
     Summary,
     pooled,
@@ -14,7 +14,9 @@ from analysis.published import (
     published_initial,
 )
 from analysis.results import Results
+from benchmarks.methods import registry
 from benchmarks.suites import load_suite, select_cells
+from coartic import load_task
 
 
 def test_published_numbers():
@@ -30,8 +32,8 @@ def test_published_numbers():
 
 
 def test_every_cell_of_the_suite_is_published():
-    for cell in select_cells(load_suite("paper")):
-        assert published_cell(cell.task.name, cell.condition.id) is not None
+    for cell in select_cells(load_suite("paper"), registry()):
+        assert published_cell(cell.task.name, cell.method.rpartition("/")[2]) is not None
 
 
 def test_pooling_groups_gives_mean_and_sd_of_all():
@@ -79,15 +81,19 @@ def test_edge_cases_of_the_difference():
 def fake_results(tmp_path, runs):
     manifest = {
         "specification": {
-            "suite": "paper", "runs": 3, "trials": 10, "seed": 0, "tasks": {},
-            "cells": [{"task": "two-armed-1", "method": "dual-process/EC2"}],
+            "suite": "paper", "runs": 3, "trials": 10_000, "seed": 0,
+            "tasks": {"two-armed-1": load_task("two-armed-1").model_dump(mode="json")},
+            "cells": [{"task": "two-armed-1", "method": "dual-process/EC2", "variant": ""}],
         },
         "environment": {
             "coartic": "0", "commit": {"id": "abc", "dirty": True}, "model_code": "code",
             "python": "3", "platform": "here", "date": "today",
         },
     }  # fmt: skip
-    frame = pd.DataFrame(runs).assign(task="two-armed-1", method="dual-process/EC2")
+    frame = pd.DataFrame(runs).assign(
+        task="two-armed-1", method="dual-process/EC2", variant="", commit="abc"
+    )
+    frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
     sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
     return Results(tmp_path, manifest, frame, sequences)
@@ -117,6 +123,31 @@ def test_cells_and_sequences(tmp_path):
     assert any("1 runs of two-armed-1 x dual-process/EC2 are infeasible: planted" in note
                for note in page.notes)  # fmt: skip
     assert "commit abc with changes" in page.to_markdown()
+    assert any("7 of 30000 trials failed" in note for note in page.notes)
+    assert row["task"] == "two-armed-1 †"
+    assert any(note.startswith("† Reconstructed: goals and start") for note in page.notes)
+
+
+def test_notes_for_a_terminal():
+    assert plain("\\* of **x** and `y` in *z*") == "* of x and y in z"
+
+
+def test_hands_the_paper_does_not_print(tmp_path):
+    """EC4 of two-armed 2: no hand sequences are printed, so none is printed as 0."""
+    results = fake_results(
+        tmp_path,
+        {
+            "run": [0, 1], "status": ["ok", "ok"], "reason": ["", ""], "reward": [-330, -350],
+            "hands": ["RLRR", "RRRR"], "initial_reward": [-357, -357],
+        },
+    )  # fmt: skip
+    for table in (results.runs, results.manifest["specification"]["cells"][0]):
+        table["task"], table["method"] = "two-armed-2", "dual-process/EC4"
+    results.manifest["specification"]["tasks"] = {
+        "two-armed-2": load_task("two-armed-2").model_dump(mode="json")
+    }
+    sequences = compare(results).tables[1]
+    assert [row[2:5] for row in sequences.rows] == [("RLRR", "–", "–"), ("RRRR", "–", "–")]
 
 
 def test_no_run_at_all(tmp_path):

@@ -5,11 +5,29 @@ import subprocess
 import sys
 from pathlib import Path
 
+from coartic import compiled
+
 ROOT = Path(__file__).parent.parent
 PROGRAM = """
 import coartic
 print(coartic.move(coartic.Robot(), [0.0] * 10, [1.0] + [0.0] * 9, "right", (9, 0), 0.1).ticks)
 """
+
+
+def test_a_user_without_a_home(monkeypatch, tmp_path):
+    """Some containers run as one; then nothing is kept, and nothing is put in odd places."""
+
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(compiled.Path, "home", homeless)
+    monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    monkeypatch.chdir(tmp_path)
+    assert compiled._cache_folder() is None
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert compiled._cache_folder().parent == tmp_path / "cache" / "coartic"
 
 
 def test_a_change_in_a_called_module_is_noticed(tmp_path):

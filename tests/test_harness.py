@@ -1,4 +1,4 @@
-"""Suites, the runner and the tables it leaves behind."""
+"""Suites, the harness, and the tables it leaves behind."""
 
 import json
 
@@ -8,43 +8,74 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis.results import load_results
-from baselines.corrective_alone import every_sequence
-from benchmarks import records, runner
-from benchmarks.records import RUNS, prepare_folder, write_results
-from benchmarks.runner import Plan, corrective_sequences, execute_plan, run_seed
-from benchmarks.suites import Cell, load_suite, select_cells
-from coartic import CoarticError, execute, learn, load_task
+from benchmarks import tables
+from benchmarks.executors import Local
+from benchmarks.harness import perform_plan
+from benchmarks.methods import registry
+from benchmarks.specification import Limits, run_seed
+from benchmarks.store import Store
+from benchmarks.suites import (
+    Cell,
+    load_suite,
+    plan_specification,
+    run_specs,
+    select_cells,
+    suites,
+)
+from benchmarks.tables import RUNS, TIMINGS, write_tables
+from benchmarks.worker import perform
+from coartic import CoarticError, execute, hand_sequences, learn, load_task
 from coartic.frames import movements_from
+from coartic.initial import ranked_sequences
 
 from .strategies import tiny_task
 
-FIRST_COLUMNS = (
-    "run_id suite task method run seed status reason hands reward replay_reward replay_hands "
-    "initial_reward initial_hands"
-).split()
+FIRST_COLUMNS = [
+    *"run_id suite task method variant run seed status reason hands reward".split(),
+    *"replay_reward replay_hands initial_reward initial_hands best_trial trials".split(),
+]
+KNOWN = registry()
 
 
-def small_plan(runs=2, trials=150, seed=0, cells=None):
-    return Plan("paper", tuple(cells or select_cells(load_suite("paper"))), runs, trials, seed)
+class InProcess:
+    """An executor without processes, for tests of everything else."""
+
+    def perform(self, jobs):
+        for job in jobs:
+            yield {"run_id": job["run_id"], "record": perform(json.loads(json.dumps(job)))}
 
 
-def run_and_write(folder, plan, jobs=-1):
-    prepare_folder(folder, overwrite=False)
-    found = list(execute_plan(plan, jobs=jobs))
-    manifest = {"specification": plan.specification(), "environment": {}}
-    write_results(folder, found, corrective_sequences(plan.tasks), manifest)
+def paper_cells(**selection):
+    return select_cells(load_suite("paper"), KNOWN, **selection)
+
+
+def run_and_write(folder, cells=None, runs=2, trials=150, seed=0, executor=None, **options):
+    suite = load_suite("paper")
+    cells = cells or paper_cells()
+    planned = run_specs(
+        cells, runs=runs, seed=seed, trials=trials, limits=options.pop("limits", Limits(300.0))
+    )
+    specs = [spec for _, spec in planned]
+    store = Store(folder)
+    perform_plan(specs, store, executor or InProcess(), **options)
+    records = [(cell, store.read(spec.run_id)) for cell, spec in planned]
+    manifest = {
+        "specification": plan_specification(suite, cells, runs, seed, specs),
+        "environment": {},
+    }
+    write_tables(folder, suite.name, records, manifest)
     return load_results(folder)
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    return run_and_write(tmp_path_factory.mktemp("results") / "deep" / "er", small_plan())
+    return run_and_write(tmp_path_factory.mktemp("results") / "deep" / "er")
 
 
 def test_suite_paper():
     suite = load_suite("paper")
     assert (suite.runs, suite.trials) == (20, 10_000)
-    assert [(cell.task.name, cell.method) for cell in select_cells(suite)] == [
+    assert [(cell.task.name, cell.method) for cell in paper_cells()] == [
         ("ascending", "dual-process/EC1"),
         ("descending", "dual-process/EC1"),
         ("two-armed-1", "dual-process/EC2"),
@@ -55,10 +86,24 @@ def test_suite_paper():
     ]
 
 
+def test_suite_comparison_has_every_method_on_every_task_it_applies_to():
+    cells = {(c.task.name, c.method) for c in select_cells(load_suite("comparison"), KNOWN)}
+    expected = {
+        (name, method)
+        for name in ("ascending", "descending", "two-armed-1", "two-armed-2")
+        for method, entry in KNOWN.items()
+        if entry.method().why_not(load_task(name)) is None
+    }
+    assert cells == expected
+    assert set(suites()) >= {"paper", "comparison", "quick"}
+
+
 def test_runs_table(results):
     runs = results.runs
     assert list(runs.columns) == RUNS.names
     assert list(runs.columns[: len(FIRST_COLUMNS)]) == FIRST_COLUMNS
+    assert (runs.solution_corrections <= 4).all()
+    assert (runs.told.str.contains("reward by trial")).all()
     assert len(runs) == 14
     assert runs.run_id.is_unique
     assert list(runs.run) == [0, 1] * 7
@@ -113,20 +158,25 @@ def test_sequences_table(results):
     assert list(sequences[sequences.task == "two-armed-1"].hands[:2]) == ["LRLR", "RRLR"]
 
 
-def test_tables_do_not_depend_on_the_number_of_workers(results, tmp_path):
-    timings = ["wall_s", "cpu_s"]
+def test_tables_do_not_depend_on_executor_or_workers(results, tmp_path):
+    """In this process, in one worker process, in three: the same but for the timings."""
     for jobs in (1, 3):
-        again = run_and_write(tmp_path / str(jobs), small_plan(), jobs=jobs)
-        pd.testing.assert_frame_equal(
-            again.runs.drop(columns=timings), results.runs.drop(columns=timings)
-        )
-        pd.testing.assert_frame_equal(again.solutions(), results.solutions())
-        pd.testing.assert_frame_equal(again.learning(), results.learning())
+        again = run_and_write(tmp_path / str(jobs), executor=Local(jobs))
+        same_tables(again, results)
+
+
+def same_tables(a, b):
+    pd.testing.assert_frame_equal(
+        a.runs.drop(columns=list(TIMINGS)), b.runs.drop(columns=list(TIMINGS))
+    )
+    for table in ("solutions", "paths", "learning"):
+        pd.testing.assert_frame_equal(getattr(a, table)(), getattr(b, table)())
+    pd.testing.assert_frame_equal(a.sequences, b.sequences)
 
 
 def test_a_cell_does_not_depend_on_its_company(results, tmp_path):
-    cells = select_cells(load_suite("paper"), tasks=["two-armed-2"], methods=["dual-process/EC4"])
-    alone = run_and_write(tmp_path, small_plan(cells=cells)).runs
+    cells = paper_cells(tasks=["two-armed-2"], methods=["dual-process/EC4"])
+    alone = run_and_write(tmp_path, cells).runs
     chosen = results.runs[results.runs.run_id.isin(alone.run_id)].reset_index(drop=True)
     pd.testing.assert_series_equal(alone.reward, chosen.reward)
     assert len(chosen) == 2
@@ -152,14 +202,24 @@ def test_a_run_is_reproduced_from_its_row(results):
     assert run.hands == row.hands
 
 
-def test_run_ids_name_what_the_run_depends_on(monkeypatch):
-    cell, other = select_cells(load_suite("paper"))[:2]
-    base = runner.run_id(cell, 1, 10)
-    assert base == runner.run_id(cell, 1, 10)
-    assert len({base, runner.run_id(other, 1, 10), runner.run_id(cell, 2, 10)}) == 3
-    assert runner.run_id(cell, 1, 11) != base
-    monkeypatch.setattr(runner, "source_fingerprint", lambda: "other code")
-    assert runner.run_id(cell, 1, 10) != base
+def test_run_ids_name_what_the_run_depends_on():
+    def first(**changes):
+        cells = changes.pop("cells", paper_cells()[:1])
+        return run_specs(cells, **{"runs": 1, "seed": 0, "trials": 10, **changes})[0][1]
+
+    base = first()
+    assert base.run_id == first().run_id
+    assert base.run_id == first(limits=Limits(time_s=1.0)).run_id  # decides whether, not which
+    others = [
+        first(cells=paper_cells()[1:2]),
+        first(seed=1),
+        first(trials=11),
+        first(limits=Limits(trials=5)),
+        first(cells=[Cell(base.task, base.entry, (("noise_sd", 0.1),))]),
+        first(cells=[Cell(base.task.model_copy(update={"radius": 0.2}), base.entry)]),
+    ]
+    assert len({spec.key for spec in [base, *others]}) == 7
+    assert base.run_id == f"{base.key}-{base.entry.code}"
 
 
 def test_failures_are_kept_as_data(tmp_path):
@@ -168,8 +228,8 @@ def test_failures_are_kept_as_data(tmp_path):
         goals=[[2.5, 0.1]], initial_hands="R",
     )  # fmt: skip
     policy = stuck.model_copy(update={"name": "policy", "initial_hands": "best-of-all"})
-    cells = [Cell(stuck, "dual-process/EC1"), Cell(policy, "dual-process/EC1")]
-    found = run_and_write(tmp_path, small_plan(trials=5, cells=cells))
+    learner = KNOWN["dual-process/EC1"]
+    found = run_and_write(tmp_path, [Cell(stuck, learner), Cell(policy, learner)], trials=5)
     assert list(found.runs.status) == ["infeasible"] * 4
     assert found.runs.reason.str.len().min() > 20
     assert found.runs.reward.isna().all()
@@ -180,33 +240,75 @@ def test_failures_are_kept_as_data(tmp_path):
     assert found.sequences.reward.isna().all()
 
 
-def test_a_crash_is_a_record_and_stops_nothing(monkeypatch):
-    real = runner.learn
+def test_grid_and_fixed_parameters(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(
+        """
+        title = "Noise"
+        description = "Noise against trials"
+        runs = 1
+        [[cells]]
+        tasks = ["ascending"]
+        methods = ["dual-process/EC1"]
+        parameters = { trials = 40 }
+        grid = { noise_sd = [0.02, 0.1], epsilon = [0.0, 0.5] }
+        """
+    )
+    cells = select_cells(load_suite(str(path)), KNOWN)
+    assert [cell.variant for cell in cells] == [
+        "noise_sd=0.02, epsilon=0.0",
+        "noise_sd=0.02, epsilon=0.5",
+        "noise_sd=0.1, epsilon=0.0",
+        "noise_sd=0.1, epsilon=0.5",
+    ]
+    runs = run_and_write(tmp_path / "out", cells, runs=1, trials=999).runs
+    assert (runs.trials == 40).all()  # the suite's own parameter stands
+    assert runs.reward[0] == runs.reward[1]  # EC1 explores no hands, so ε is idle
+    assert runs.reward[0] != runs.reward[2]
+    assert json.loads(runs.parameters[3]) == {"epsilon": 0.5, "noise_sd": 0.1, "trials": 40}
 
-    def sometimes(task, condition, **arguments):
-        if task.name == "descending":
-            raise ZeroDivisionError("planted")
-        return real(task, condition, **arguments)
 
-    monkeypatch.setattr(runner, "learn", sometimes)
-    cells = select_cells(load_suite("paper"), tasks=["ascending", "descending"])
-    found = [record.row for record in execute_plan(small_plan(cells=cells), jobs=2)]
-    assert [row["status"] for row in found] == ["ok", "ok", "crashed", "crashed"]
-    assert found[2]["reason"] == "ZeroDivisionError: planted"
+@pytest.mark.parametrize(
+    ("block", "words"),
+    [
+        ('methods = ["dual-proces/EC1"]', "did you mean 'dual-process/EC1'"),
+        ('methods = ["dual-process/EC3"]', "task 'ascending' has no left hand"),
+        ('methods = ["dual-process/EC1"]\nparameters = {noise = 1.0}', "noise: extra inputs"),
+        (
+            'methods = ["dual-process/EC1"]\ngrid = {noise_sd = [-1.0]}',
+            "noise_sd: input should be",
+        ),
+        ('methods = ["dual-process/EC1"]\ngrid = {noise_sd = []}', "own.toml: cells.0.grid"),
+        ("methods = []", "own.toml: cells.0.methods"),
+        ('methods = ["dual-process/EC1"]\nrun = 3', "own.toml: cells.0.run: extra inputs"),
+    ],
+)
+def test_suite_files_that_cannot_be_used(block, words, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(
+        f'title = "x"\ndescription = "x"\nruns = 1\n[[cells]]\ntasks = ["ascending"]\n{block}\n'
+    )
+    with pytest.raises(CoarticError) as caught:
+        select_cells(load_suite(str(path)), KNOWN)
+    assert words in str(caught.value)
 
 
-def test_a_reward_that_does_not_re_execute_is_refused(monkeypatch):
-    real = runner.learn
+def test_deterministic_methods_run_once():
+    cells = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
+    assert [cell.method for cell in cells] == ["corrective-alone/every"]
+    assert len(run_specs(cells, runs=20, seed=0)) == 1
 
-    def wrong(*arguments, **keywords):
-        run = real(*arguments, **keywords)
-        run.rewards[run.best_trial] += 1
-        return run
 
-    monkeypatch.setattr(runner, "learn", wrong)
-    (record,) = execute_plan(small_plan(runs=1, cells=select_cells(load_suite("paper"))[:1]))
-    assert record.row["status"] == "crashed"
-    assert "re-executes to" in record.row["reason"]
+def test_corrective_alone_as_a_method(tmp_path):
+    cells = paper_cells(methods=["corrective-alone/given", "corrective-alone/every"])
+    found = run_and_write(tmp_path, cells).runs
+    by_cell = found.set_index(["task", "method"]).reward
+    assert by_cell["two-armed-1", "corrective-alone/given"] == -671
+    assert by_cell["two-armed-1", "corrective-alone/every"] == -533
+    assert by_cell["ascending", "corrective-alone/every"] == -319
+    spent = found.set_index(["task", "method"])
+    assert spent.trials["two-armed-1", "corrective-alone/every"] == 16
+    assert spent.trials["two-armed-1", "corrective-alone/given"] == 0
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):
@@ -214,8 +316,8 @@ def test_robots_of_different_size_share_a_table(tmp_path):
         name="small", robot={"left_links": [2.0], "right_links": [1.0] * 11},
         start={"left": [0.1], "right": [0.1] * 11}, goals=[[3.0, 1.0]], initial_hands="R",
     )  # fmt: skip
-    cells = [Cell(small, "dual-process/EC4"), *select_cells(load_suite("paper"))[:1]]
-    found = run_and_write(tmp_path, small_plan(trials=20, cells=cells))
+    cells = [Cell(small, KNOWN["dual-process/EC4"]), *paper_cells()[:1]]
+    found = run_and_write(tmp_path, cells, trials=20)
     names = list(found.solutions().columns[6:])
     assert names[2:6] == ["left_1", "left_2", "left_3", "left_4"]
     assert names[6:] == [f"right_{k}" for k in range(1, 12)]
@@ -225,33 +327,17 @@ def test_robots_of_different_size_share_a_table(tmp_path):
         assert execute(task, movements_from(task, rows)).reward == run.reward
 
 
-def test_folder_with_results_is_left_alone(results):
-    before = (results.folder / "runs.parquet").read_bytes()
-    with pytest.raises(CoarticError, match="already holds results.*--overwrite"):
-        prepare_folder(results.folder, overwrite=False)
-    prepare_folder(results.folder, overwrite=True)
-    assert (results.folder / "runs.parquet").read_bytes() == before
+def test_a_failed_write_leaves_the_old_tables(tmp_path, monkeypatch):
+    run_and_write(tmp_path, runs=1, trials=2)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
 
-
-def test_unwritable_folder(tmp_path):
-    (tmp_path / "file").write_text("x")
-    with pytest.raises(CoarticError, match="cannot write to"):
-        prepare_folder(tmp_path / "file" / "below", overwrite=False)
-
-
-def test_a_failed_write_leaves_the_old_results(tmp_path, monkeypatch):
-    plan = small_plan(runs=1, trials=2)
-    run_and_write(tmp_path, plan)
-    before = {name: (tmp_path / name).read_bytes() for name in records.FILES}
-
-    def full(*_, **__):
+    def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(records.pq, "write_table", full)
+    monkeypatch.setattr(tables, "write_atomically", full)
     with pytest.raises(CoarticError, match="No space left on device"):
-        write_results(tmp_path, [], [], {})
-    assert {path.name for path in tmp_path.iterdir()} == set(records.FILES)
-    assert before == {name: (tmp_path / name).read_bytes() for name in records.FILES}
+        write_tables(tmp_path, "paper", [], {})
+    assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
 
 
 @pytest.mark.parametrize(
@@ -267,7 +353,7 @@ def test_a_failed_write_leaves_the_old_results(tmp_path, monkeypatch):
 )
 def test_selection_errors(arguments, words):
     with pytest.raises(CoarticError) as caught:
-        select_cells(load_suite("paper"), **arguments)
+        paper_cells(**arguments)
     assert words in str(caught.value)
 
 
@@ -292,43 +378,53 @@ def task_file(tmp_path, **changes):
 def test_own_task_runs_under_every_applicable_condition(tmp_path):
     paper = load_suite("paper")
     path = task_file(tmp_path)
-    cells = select_cells(paper, task_files=[path])
+    cells = select_cells(paper, KNOWN, task_files=[path])
     assert len(cells) == 7 + 4
-    only = select_cells(paper, task_files=[path], tasks=["own"])
+    with_baseline = select_cells(
+        paper, KNOWN, task_files=[path], tasks=["own"], methods=["corrective-alone/every"]
+    )
+    assert [cell.method for cell in with_baseline] == ["corrective-alone/every"]
+    only = select_cells(paper, KNOWN, task_files=[path], tasks=["own"])
     assert [cell.method[-3:] for cell in only] == ["EC1", "EC2", "EC3", "EC4"]
     one_armed = task_file(tmp_path, name='"arm"', hands='["right"]')
-    assert [c.method for c in select_cells(paper, task_files=[one_armed], tasks=["arm"])] == [
-        "dual-process/EC1"
-    ]
+    assert [
+        c.method for c in select_cells(paper, KNOWN, task_files=[one_armed], tasks=["arm"])
+    ] == ["dual-process/EC1"]
 
 
 def test_own_task_errors(tmp_path):
     paper = load_suite("paper")
     with pytest.raises(CoarticError, match="name 'ascending' is already taken by a shipped task"):
-        select_cells(paper, task_files=[task_file(tmp_path, name='"ascending"')])
+        select_cells(paper, KNOWN, task_files=[task_file(tmp_path, name='"ascending"')])
     twice = [task_file(tmp_path), task_file(tmp_path)]
     with pytest.raises(CoarticError, match="name 'own' is already taken by .*own-"):
-        select_cells(paper, task_files=twice)
+        select_cells(paper, KNOWN, task_files=twice)
     left = task_file(tmp_path, name='"left"', hands='["left"]', initial_hands='"LL"')
     with pytest.raises(CoarticError, match="no method to run on task 'left': EC1 uses the right"):
-        select_cells(paper, task_files=[left])
+        select_cells(paper, KNOWN, task_files=[left])
 
 
 def test_every_sequence_is_sorted_and_bounded():
-    trials = every_sequence(load_task("two-armed-1"))
-    rewards = [trial.execution.reward for trial in trials]
+    task = load_task("two-armed-1")
+    trials = ranked_sequences(task, hand_sequences(task))
+    rewards = [execution.reward for _, execution in trials]
     assert rewards == sorted(rewards, reverse=True)
-    assert all(trial.hands == trial.execution.hands for trial in trials)
+    assert all(hands == execution.hands for hands, execution in trials)
+    two = load_task("two-armed-2")  # RLRR and RRRR tie: fewer changes of hand go first
+    assert [hands for hands, _ in ranked_sequences(two, hand_sequences(two))[:2]] == [
+        "RRRR",
+        "RLRR",
+    ]
     many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
     with pytest.raises(CoarticError, match="8192 hand sequences; at most 4096"):
-        every_sequence(many)
-    assert corrective_sequences([many]) == []
+        hand_sequences(many)
+    assert tables._sequence_rows([many]) == []
 
 
 def test_damaged_results_are_named(results, tmp_path):
     with pytest.raises(CoarticError, match="is not a results folder: .*manifest.json is missing"):
         load_results(tmp_path)
-    for name in records.FILES:
+    for name in ("manifest.json", "runs.parquet", "sequences.parquet"):
         (tmp_path / name).write_bytes((results.folder / name).read_bytes()[:100])
     with pytest.raises(CoarticError, match="results cannot be read"):
         load_results(tmp_path)
@@ -339,6 +435,6 @@ def test_manifest(results):
     specification = manifest["specification"]
     assert specification["seed"] == 0
     assert specification["tasks"]["ascending"]["provenance"]["goals"]["status"] == "printed"
-    assert specification["methods"]["dual-process/EC4"]["modify_other"] is True
-    assert specification["model"]["arrival_tolerance"] == 0.01
+    assert "goals" in specification["methods"]["dual-process/EC2"]["told"]
+    assert len(specification["run_ids"]) == 14
     assert np.isfinite(manifest["format"])

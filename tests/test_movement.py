@@ -8,11 +8,69 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coartic import PAPER, MotionModel, Robot, move, reference
+from coartic.compiled import entry, joint_chain
 from coartic.robot import HANDS
 
 from .strategies import UNEVEN, configurations
 
 ROBOT = Robot()
+
+
+@entry
+def _every_step(q, target, arm, goal_x, goal_y, radius, stop_on_arrival, model, xs, ys):
+    """The definition of a movement with the kernels' own kinematics: no step skipped."""
+    tip = len(arm.links)
+    joint_chain(target, arm, xs, ys)
+    end_x, end_y = xs[tip], ys[tip]
+    square = 0.0
+    for j in range(len(q)):
+        square += (target[j] - q[j]) * (target[j] - q[j])
+    distance = math.sqrt(square)
+    last = math.ceil(distance / model.step)
+    point = np.empty_like(q)
+    for k in range(last + 1):
+        for j in range(len(q)):
+            point[j] = target[j]
+            if k < last:
+                point[j] = q[j] + k * model.step / distance * (target[j] - q[j])
+        joint_chain(point, arm, xs, ys)
+        miss = math.sqrt((goal_x - xs[tip]) ** 2 + (goal_y - ys[tip]) ** 2)
+        rest = math.sqrt((end_x - xs[tip]) ** 2 + (end_y - ys[tip]) ** 2)
+        hit = miss <= radius
+        if hit or k == last or (stop_on_arrival and rest <= model.arrival_tolerance):
+            q[:] = point
+            return k + 1, hit
+    return -1, False
+
+
+def assert_equals_every_step(
+    robot, q, target, hand, goal, radius, stop_on_arrival=True, model=PAPER
+):
+    """The kernel against the loop above: the same to the last bit, ties included."""
+    fast = move(robot, q, target, hand, goal, radius, stop_on_arrival=stop_on_arrival, model=model)
+    arm, position = robot.arm(hand), np.array(q)
+    xs, ys = np.empty(len(arm.links) + 1), np.empty(len(arm.links) + 1)
+    ticks, hit = _every_step(
+        position, np.array(target), arm, *map(float, goal), radius, stop_on_arrival, model, xs, ys
+    )
+    assert (fast.ticks, fast.hit) == (ticks, hit)
+    np.testing.assert_array_equal(fast.q, position)
+    return fast
+
+
+def on_a_rim(robot, q, target, hand, goal, radius, model=PAPER, within=1e-9):
+    """Whether some step comes so close to a rim that the last bit of a cosine decides."""
+    start, end = np.array(q), np.array(target)
+    distance = np.linalg.norm(end - start)
+    steps = np.arange(math.ceil(distance / model.step) + 1)[:, None]
+    points = start + np.minimum(steps * model.step / max(distance, 1e-300), 1.0) * (end - start)
+    hands = robot.forward_kinematics(points, hand)
+    miss = np.hypot(*(hands - np.asarray(goal)).T)
+    rest = np.hypot(*(hands - robot.forward_kinematics(end, hand)).T)
+    return bool(
+        np.any(np.abs(miss - radius) < within)
+        or np.any(np.abs(rest - model.arrival_tolerance) < within)
+    )
 
 
 def assert_same(fast, slow):
@@ -51,6 +109,16 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
     assert 200 < hits < 900  # both outcomes are well represented
 
 
+def test_equals_every_step_a_hundred_thousand_times():
+    rng = np.random.default_rng(15)
+    for _ in range(100_000):
+        hand = HANDS[int(rng.integers(2))]
+        robot = ROBOT if rng.random() < 0.8 else UNEVEN
+        q, target, goal = random_movement(rng, robot, hand)
+        model = MotionModel(step=float(rng.choice([0.01, 0.003, 0.1])))
+        assert_equals_every_step(robot, q, target, hand, goal, 0.1, rng.random() < 0.5, model)
+
+
 @settings(max_examples=300, deadline=None)
 @given(
     q=configurations(ROBOT),
@@ -62,6 +130,14 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
     radius=st.floats(0.011, 0.5),
     stop_on_arrival=st.booleans(),
 )
+@example(  # the goal's rim runs exactly through the start
+    q=np.full(10, 2.5), target=np.zeros(10), hand="left", fraction=0.0, offset=(0.0, 0.25),
+    scale=0.25, radius=0.25, stop_on_arrival=False,
+)  # fmt: skip
+@example(  # ... and through the end
+    q=np.full(10, 1.5), target=np.zeros(10), hand="left", fraction=1.0, offset=(0.0, 0.25),
+    scale=0.25, radius=0.25, stop_on_arrival=False,
+)  # fmt: skip
 @example(
     q=np.zeros(10), target=np.zeros(10), hand="right", fraction=0.0, offset=(1.0, 0.0),
     scale=1.0, radius=0.1, stop_on_arrival=True,
@@ -73,10 +149,9 @@ def test_equals_the_loop_for_any_movement(
     point = q + fraction * (target - q)
     goal = tuple(ROBOT.forward_kinematics(point, hand) + offset)
     arguments = (ROBOT, q, target, hand, goal, radius)
-    assert_same(
-        move(*arguments, stop_on_arrival=stop_on_arrival),
-        reference.move(*arguments, stop_on_arrival=stop_on_arrival),
-    )
+    fast = assert_equals_every_step(*arguments, stop_on_arrival)
+    if not on_a_rim(*arguments):  # there NumPy's cosine may differ in the last bit
+        assert_same(fast, reference.move(*arguments, stop_on_arrival=stop_on_arrival))
 
 
 @given(step=st.sampled_from([0.003, 0.01, 0.07]), tolerance=st.sampled_from([0.001, 0.01, 0.1]))
@@ -94,7 +169,7 @@ def test_grazing_a_goal():
     """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)
     outcomes = set()
-    for _ in range(150):
+    for _ in range(5000):
         q = rng.uniform(-2, 2, 10)
         target = q + rng.normal(size=10) * 0.3
         middle = q + rng.uniform(0.2, 0.8) * (target - q)
@@ -103,9 +178,7 @@ def test_grazing_a_goal():
         reach = 0.1 + rng.choice([-1e-6, -1e-12, 1e-12, 1e-6, 1e-4])
         goal = tuple(ROBOT.forward_kinematics(middle, "right") + reach * normal)
         arguments = (ROBOT, q, target, "right", goal, 0.1)
-        fast = move(*arguments)
-        assert_same(fast, reference.move(*arguments))
-        outcomes.add(fast.hit)
+        outcomes.add(assert_equals_every_step(*arguments).hit)
     assert outcomes == {True, False}
 
 

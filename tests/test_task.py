@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from coartic import Task, TaskError, builtin_tasks, corrective_trial, initial_hands, load_task
+from coartic import (
+    NotApplicableError,
+    Task,
+    TaskError,
+    builtin_tasks,
+    corrective_trial,
+    initial_hands,
+    load_task,
+)
 from coartic.task import TASK_FOLDER, parse_task
 
 from .strategies import tiny_task
@@ -176,6 +184,19 @@ BAD = {
         "provenance.gaols is not a key of a task; did you mean 'goals'?",
     ),
     "not TOML": ("name = ", "is not valid TOML"),
+    "nested deep": ("a = " + "[" * 5000, "is not valid TOML"),
+    "huge integer": ("a = " + "9" * 5000, "is not valid TOML"),
+    "large integer": (replace("[5.0, 2.0]", f"[{'9' * 300}, 2.0]"), "(300 characters)"),
+    "far goal": (replace("[5.0, 2.0]", "[1e7, 2.0]"), "goals[1][0] is 10000000.0; its size must"),
+    "far base": (replace("base = [0.0,", "base = [-2e4,"), "start.base[0] is -20000.0; its size"),
+    "wound up": (replace("right = [0.0,", "right = [1e20,"), "start.right[0] is 1e+20; its size"),
+    "huge radius": ("radius = 1e308" + GOOD, "radius is 1e+308; its size must be at most 10000"),
+    "huge link": (GOOD + "[robot]\nleft_links = [1e9]\n", "robot.left_links[0] is 1000000000.0"),
+    "too many goals": (
+        replace("[[5.0, 1.0], [5.0, 2.0]]", "[" + "[5.0, 1.0]," * 101 + "]"),
+        "goals has 101 entries; it takes 100",
+    ),
+    "key below its table": (GOOD + "radius = 0.1\n", "'radius' belongs above the line [start]"),
 }
 
 
@@ -253,6 +274,20 @@ def test_initial_hand_policies():
     assert initial_hands(task) == "LRLR"
     assert initial_hands(task, ("right",)) == "RRRR"
     assert corrective_trial(task, "LRLR").reward == -533
+
+
+def test_policies_with_many_goals():
+    """One hand needs two candidates whatever the number of goals; all hands are bounded."""
+    many = {"goals": [[5.0, 1.0], [5.0, 2.0]] * 15}
+    assert initial_hands(tiny_task(**many, initial_hands="best-single-hand")) == "R" * 30
+    with pytest.raises(NotApplicableError, match="1073741824 hand sequences; at most 4096"):
+        initial_hands(tiny_task(**many, initial_hands="best-of-all"))
+
+
+def test_a_file_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
+    assert load_task(path).name == "mine"
 
 
 def test_every_shipped_file_is_found():

@@ -1,0 +1,304 @@
+"""The conformance kit: what a contributor runs on a new method or task.
+
+Each law is checked by performing runs, most of them in this process, one in a process
+of its own. A law that cannot be checked fails; it is never skipped silently.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.methods import Entry, Registry, build
+from benchmarks.reproduce import differences, perform_once
+from benchmarks.specification import Limits, RunSpec
+from benchmarks.worker import perform, perform_on
+from coartic import (
+    CoarticError,
+    NotApplicableError,
+    Task,
+    TaskError,
+    builtin_tasks,
+    corrective_trial,
+    initial_hands,
+    load_task,
+    parse_task,
+)
+from coartic.method import METERED, Information
+
+CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
+CHECK_LIMIT_S = 120.0
+_BUDGET = 7
+
+
+@dataclass(frozen=True)
+class Law:
+    """One law and what was found."""
+
+    name: str
+    passed: bool
+    finding: str
+
+
+class _BrokenError(Exception):
+    """A law does not hold; the message says what was seen."""
+
+
+def check_method(entry: Entry) -> list[Law]:
+    """Every law of a method, in order."""
+    checks = _MethodChecks(entry)
+    return list(_run(checks.laws()))
+
+
+def check_task_file(path: Path, known: Registry) -> list[Law]:
+    """Every law of a task file, in order."""
+    return list(_run(_task_laws(path, known)))
+
+
+Check = tuple[str, Callable[[], str]]
+
+
+def _run(checks: Iterator[Check]) -> Iterator[Law]:
+    for name, check in checks:
+        try:
+            yield Law(name, True, check())
+        except _BrokenError as broken:
+            yield Law(name, False, str(broken))
+        except CoarticError as error:
+            yield Law(name, False, str(error))
+        except Exception as error:
+            yield Law(name, False, f"the check itself broke: {type(error).__name__}: {error}")
+
+
+class _MethodChecks:
+    def __init__(self, entry: Entry) -> None:
+        self.entry = entry
+
+    def laws(self) -> Iterator[Check]:
+        yield "declaration", self.declaration
+        yield "parameters", self.parameters
+        yield "solution", self.solution
+        yield "determinism", self.determinism
+        yield "no hidden state", self.no_hidden_state
+        yield "limits", self.limits
+        yield "information", self.information
+        yield "failure", self.failure
+
+    @cached_property
+    def defaults(self) -> dict[str, Any]:
+        """Parameters of the check: few trials where the method has trials."""
+        return {"trials": CHECK_TRIALS} if "trials" in self.fields else {}
+
+    @cached_property
+    def fields(self) -> dict[str, Any]:
+        return dict(self.entry.method.Parameters.model_fields)
+
+    @cached_property
+    def tasks(self) -> list[Task]:
+        method = build(self.entry, self.defaults)
+        tasks = [load_task(name) for name in builtin_tasks()]
+        found = [task for task in tasks if method.why_not(task) is None]
+        if not found:
+            raise _BrokenError(
+                "it applies to none of the shipped tasks, so nothing can be checked"
+            )
+        return found
+
+    def spec(self, task: Task, seed: int = 1, budget: int | None = None) -> RunSpec:
+        return RunSpec(
+            task,
+            self.entry,
+            tuple(self.defaults.items()),
+            0,
+            seed,
+            Limits(CHECK_LIMIT_S, budget),
+        )
+
+    def record(self, task: Task, seed: int = 1, budget: int | None = None) -> dict[str, Any]:
+        return perform(json.loads(json.dumps(self.spec(task, seed, budget).job())))
+
+    @cached_property
+    def first_records(self) -> list[tuple[Task, dict[str, Any]]]:
+        return [(task, self.record(task)) for task in self.tasks]
+
+    def declaration(self) -> str:
+        method = self.entry.method
+        for attribute in ("title", "citation"):
+            if not str(getattr(method, attribute, "")).strip():
+                raise _BrokenError(f"{attribute} is empty")
+        unknown = [item for item in method.told if item not in frozenset(Information)]
+        if unknown:
+            raise _BrokenError(f"told names {unknown}, which is not Information")
+        told = ", ".join(sorted(method.told)) or "nothing"
+        return f"{method.title}; told: {told}"
+
+    def parameters(self) -> str:
+        parameters = self.entry.method.Parameters()
+        plain = json.loads(json.dumps(parameters.model_dump(mode="json")))
+        again = build(self.entry, plain).parameters
+        if again != parameters:
+            raise _BrokenError(f"they do not survive JSON: {parameters} became {again}")
+        try:
+            build(self.entry, {"no_such_parameter": 1})
+        except CoarticError:
+            pass
+        else:
+            raise _BrokenError("an unknown parameter is accepted; forbid extra keys")
+        if parameters.model_config.get("frozen") is not True:
+            raise _BrokenError("they can be changed after validation; freeze them")
+        return ", ".join(f"{key}={value}" for key, value in plain.items()) or "none"
+
+    def solution(self) -> str:
+        rewards = []
+        for task, record in self.first_records:
+            if record["status"] != "ok":
+                raise _BrokenError(f"on {task.name}: {record['status']}: {record['reason']}")
+            rewards.append(f"{task.name} {record['score']['reward']}")
+        return "executed and scored on " + ", ".join(rewards)
+
+    def determinism(self) -> str:
+        for task, record in self.first_records:
+            found = differences(record, self.record(task))
+            if found:
+                raise _BrokenError(f"same seed on {task.name}, same process: {found[0]}")
+        task, record = self.first_records[-1]
+        found = differences(record, perform_once(self.spec(task)))
+        if found:
+            raise _BrokenError(f"same seed on {task.name}, another process: {found[0]}")
+        return "same seed, same result, in this process and in another"
+
+    def no_hidden_state(self) -> str:
+        for task in reversed(self.tasks):
+            self.record(task, seed=2)
+        for task, record in self.first_records:
+            found = differences(record, self.record(task))
+            if found:
+                raise _BrokenError(f"after other runs, {task.name} with the same seed: {found[0]}")
+        return "other runs in between change nothing"
+
+    def limits(self) -> str:
+        for task in self.tasks:
+            record = self.record(task, budget=_BUDGET)
+            trials = record["meter"]["trials"]
+            if record["status"] == "crashed" or trials > _BUDGET:
+                raise _BrokenError(
+                    f"a budget of {_BUDGET} trials on {task.name}: "
+                    + (record["reason"] or f"{trials} were made")
+                )
+        for task, record in self.first_records:
+            letters = {hand[0].upper() for hand in task.hands}
+            if record["status"] == "ok" and not set(record["score"]["hands"]) <= letters:
+                raise _BrokenError(f"on {task.name}: uses a hand the robot does not have")
+        return f"keeps to a budget of {_BUDGET} trials, to the hands and to the locked base"
+
+    def information(self) -> str:
+        declared = {item.value for item in self.entry.method.told & METERED}
+        used: set[str] = set()
+        for task, record in self.first_records:
+            if "does not declare" in record["reason"]:
+                raise _BrokenError(f"on {task.name}: {record['reason']}")
+            used |= set(record["used"])
+        idle = sorted(declared - used)
+        if idle:
+            raise _BrokenError(f"declared but never used: {', '.join(idle)}")
+        return f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
+
+    def failure(self) -> str:
+        task = _hopeless(self.tasks[0])
+        if build(self.entry, self.defaults).why_not(task) is not None:
+            return "says beforehand that it does not apply to a task without a solution"
+        record = perform_on(task, self.entry, self.spec(task).job())
+        if record["status"] not in ("infeasible", "solver-failed"):
+            raise _BrokenError(
+                f"a task that nobody can complete gives {record['status']} {record['reason']}, "
+                "where infeasible with a reason is right"
+            )
+        return f"a task that nobody can complete gives {record['status']}: {record['reason']}"
+
+
+def _hopeless(like: Task) -> Task:
+    """A task beyond reach, which validation would refuse, with the hands of another."""
+    return like.model_copy(
+        update={
+            "name": "hopeless",
+            "goals": ((1e4, 1e4),),
+            "locked_base": ("x", "y"),
+            "initial_hands": "R" if "right" in like.hands else "L",
+            "provenance": {},
+        }
+    )
+
+
+def _task_laws(path: Path, known: Registry) -> Iterator[Check]:
+    loaded: list[Task] = []
+
+    def task() -> Task:
+        if not loaded:
+            raise _BrokenError("the file cannot be read, so this cannot be checked")
+        return loaded[0]
+
+    def valid() -> str:
+        try:
+            loaded.append(load_task(path))
+        except TaskError as error:
+            raise _BrokenError(str(error)) from None
+        goals = len(loaded[0].goals)
+        return f"{loaded[0].name}, {goals} goals, {' and '.join(loaded[0].hands)} hand"
+
+    def serialisable() -> str:
+        plain = json.loads(json.dumps(task().model_dump(mode="json")))
+        if parse_task(plain, str(path)) != task():
+            raise _BrokenError("it does not survive being written as JSON")
+        return "survives being written as JSON"
+
+    def new() -> str:
+        if task().name in builtin_tasks() and load_task(task().name) != task():
+            raise _BrokenError(f"name {task().name!r} belongs to a different, shipped task")
+        return f"name {task().name!r} is its own"
+
+    def distinct() -> str:
+        goals = task().goal_array
+        for index in range(1, len(goals)):
+            gap = float(np.hypot(*(goals[index] - goals[index - 1])))
+            if gap <= task().radius:
+                raise _BrokenError(
+                    f"goals {index} and {index + 1} lie within one radius of each other: "
+                    "hitting the first nearly hits the second"
+                )
+        return "successive goals lie apart"
+
+    def solvable() -> str:
+        try:
+            hands = initial_hands(task())
+        except NotApplicableError as error:
+            raise _BrokenError(str(error)) from None
+        execution = corrective_trial(task(), hands)
+        if not execution.completed:
+            raise _BrokenError(f"initial hands {hands}: {execution.reason}")
+        return f"initial hands {hands} complete it with {execution.reward}"
+
+    def provenance() -> str:
+        missing = [key for key in ("goals", "start") if key not in task().provenance]
+        if missing:
+            raise _BrokenError(f"no source and status for {' and '.join(missing)} ([provenance])")
+        return "goals and start have a source and a status"
+
+    def applicable() -> str:
+        names = [name for name, entry in known.items() if entry.method().why_not(task()) is None]
+        if not names:
+            raise _BrokenError("no method applies to it")
+        return ", ".join(names)
+
+    yield "valid", valid
+    yield "serialisable", serialisable
+    yield "name", new
+    yield "distinct goals", distinct
+    yield "solvable", solvable
+    yield "provenance", provenance
+    yield "methods", applicable

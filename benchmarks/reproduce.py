@@ -1,0 +1,92 @@
+"""One run again: find its record, perform it anew, compare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.harness import meter_of
+from benchmarks.methods import Registry, unknown
+from benchmarks.sandbox import SandboxError, supervise
+from benchmarks.specification import Limits, RunSpec
+from benchmarks.store import RecordError, Store
+from coartic import CoarticError, parse_task
+from coartic.method import Meter
+
+
+def find_record(prefix: str, folder: Path) -> tuple[Store, dict[str, Any]]:
+    """The one record whose id starts with ``prefix``, in a folder or any below it.
+
+    Raises RecordError where there is none, more than one, or it is damaged.
+    """
+    found = sorted(folder.glob(f"**/records/{_safe(prefix)}*.json"))
+    ids = sorted({path.stem for path in found})
+    if not ids:
+        raise RecordError(f"no run {prefix!r} below {folder}; name another folder with --in")
+    if len(ids) > 1:
+        shown = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
+        raise RecordError(f"{prefix!r} is the beginning of {len(ids)} runs: {shown}")
+    store = Store(found[0].parent.parent)
+    return store, store.read(ids[0])
+
+
+def spec_of(record: dict[str, Any], known: Registry, limits: Limits) -> RunSpec:
+    """The specification of a record, to be performed by the code that is here now."""
+    specification = record["specification"]
+    name = specification["method"]
+    if name not in known:
+        raise unknown("method", name, known)
+    return RunSpec(
+        task=parse_task(specification["task"], f"record {record['run_id']}"),
+        entry=known[name],
+        parameters=tuple(specification["parameters"].items()),
+        run=record["run"],
+        seed=specification["seed"],
+        limits=Limits(limits.time_s, specification["trial_budget"]),
+    )
+
+
+def perform_once(spec: RunSpec) -> dict[str, Any]:
+    """One run in a process of its own. Raises CoarticError where it leaves no record."""
+    try:
+        answer = supervise(spec.job())
+    except SandboxError as error:
+        raise CoarticError(str(error)) from None
+    if "record" in answer:
+        record: dict[str, Any] = answer["record"]
+        return record
+    raise CoarticError(f"{answer['failure']}: {answer['reason']}")
+
+
+def differences(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
+    """In what the results of two records differ; times and surroundings apart."""
+    found = [
+        f"{name}: {a[name]!r} against {b[name]!r}"
+        for name in ("status", "reason", "score", "details")
+        if a[name] != b[name]
+    ]
+    first, second = meter_of(a), meter_of(b)
+    found += [
+        f"{name}: {first[name]} against {second[name]}"
+        for name in Meter.COUNTS
+        if first[name] != second[name]
+    ]
+    if a["solution"] != b["solution"]:
+        found.append("the solutions' movements differ")
+    if a["rewards"] != b["rewards"]:
+        found.append(f"rewards by trial differ{_first_difference(a['rewards'], b['rewards'])}")
+    return found
+
+
+def _first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
+    for index, (x, y) in enumerate(zip(a, b, strict=False)):
+        if x != y:
+            return f", first at trial {index}: {x} against {y}"
+    return f": {len(a)} trials against {len(b)}"
+
+
+def _safe(prefix: str) -> str:
+    if not prefix or not set(prefix) <= set("0123456789abcdef-"):
+        raise RecordError(f"{prefix!r} is no run id: hexadecimal digits with one '-'")
+    return prefix

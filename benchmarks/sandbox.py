@@ -1,0 +1,181 @@
+"""A process of its own for every run, and the clock outside it.
+
+:func:`supervise` performs one job in a child process that lives on from job to job. The
+child speaks JSON lines over pipes. Where a job exceeds its time limit, or the child dies,
+the child is killed and the outcome is data. Standard library only: workers of any
+executor import this module, and must do so fast.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import multiprocessing
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from typing import IO, Any
+
+# One run, one core: BLAS and OpenMP threads would only get in each other's way.
+THREADS = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+    ),
+    "1",
+)
+_START_LIMIT_S = 300.0  # imports and a cold compilation, on a slow machine
+
+
+class SandboxError(RuntimeError):
+    """The child cannot even start: no run would do better."""
+
+
+class Sandbox:
+    """One child process."""
+
+    def __init__(self) -> None:
+        self._messages: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._messages,
+            env={**os.environ, **THREADS},
+            start_new_session=True,  # Ctrl-C is for the parent
+        )
+        self._buffer = b""
+        ready = self._read_line(_START_LIMIT_S)
+        if ready != b"ready":
+            self.close()
+            raise SandboxError(f"a worker process did not start: {self._last_words()}")
+
+    @property
+    def alive(self) -> bool:
+        """Whether the child still runs."""
+        return self._process.poll() is None
+
+    def perform(self, job: dict[str, Any]) -> dict[str, Any]:
+        """One job: its record, or how it failed. The child is gone after a failure."""
+        assert self._process.stdin is not None
+        clock = time.perf_counter()
+        try:
+            self._process.stdin.write(json.dumps(job).encode() + b"\n")
+            self._process.stdin.flush()
+            line = self._read_line(job["time_limit_s"])
+        except BrokenPipeError:
+            line = b""
+        except BaseException:  # Ctrl-C: never read one job's answer as the next one's
+            self.close()
+            raise
+        wall = time.perf_counter() - clock
+        if line is None:
+            self.close()
+            reason = f"time limit of {job['time_limit_s']:g} s exceeded"
+            return {"failure": "timeout", "reason": reason, "wall_s": wall}
+        if not line:
+            code = self._process.wait()
+            how = f"killed by {_signal_name(-code)}" if code < 0 else f"exit code {code}"
+            reason = f"the worker process ended ({how}): {self._last_words()}"
+            self.close()
+            return {"failure": "crashed", "reason": reason, "wall_s": wall}
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def close(self) -> None:
+        """End the child at once."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout, self._messages):
+            with contextlib.suppress(OSError):  # a job it never read may be left in the pipe
+                if stream is not None:
+                    stream.close()
+
+    def _read_line(self, limit: float | None) -> bytes | None:
+        """One line; None where the limit passed, empty where the child ended."""
+        assert self._process.stdout is not None
+        deadline = None if limit is None else time.monotonic() + limit
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._process.stdout, selectors.EVENT_READ)
+            while b"\n" not in self._buffer:
+                left = None if deadline is None else max(0.0, deadline - time.monotonic())
+                if not selector.select(left):
+                    return None
+                chunk = os.read(self._process.stdout.fileno(), 1 << 20)
+                if not chunk:
+                    return b""
+                self._buffer += chunk
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        return line
+
+    def _last_words(self) -> str:
+        self._messages.seek(0)
+        lines = self._messages.read().decode(errors="replace").strip().splitlines()
+        return " | ".join(lines[-3:]) or "it left no message"
+
+
+_local = threading.local()
+_all: list[Sandbox] = []
+_lock = threading.Lock()
+
+
+def supervise(job: dict[str, Any]) -> dict[str, Any]:
+    """Perform one job in this thread's sandbox."""
+    sandbox: Sandbox | None = getattr(_local, "sandbox", None)
+    if sandbox is None or not sandbox.alive:
+        sandbox = Sandbox()
+        _local.sandbox = sandbox
+        with _lock:
+            _all.append(sandbox)
+    answer = sandbox.perform(job)
+    return {"run_id": job["run_id"], **answer}
+
+
+_bound_to_parent = False
+
+
+def supervise_locally(job: dict[str, Any]) -> dict[str, Any]:
+    """:func:`supervise` in a worker that must not outlive the suite it works for."""
+    global _bound_to_parent
+    if not _bound_to_parent and threading.current_thread() is threading.main_thread():
+        _bound_to_parent = True
+        if multiprocessing.parent_process() is not None:  # not in the suite's own process
+            die_with_parent()
+    return supervise(job)
+
+
+@atexit.register
+def _close_all() -> None:
+    with _lock:
+        for sandbox in _all:
+            sandbox.close()
+
+
+def die_with_parent() -> None:
+    """Have the kernel end this process when its parent ends (Linux)."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    parent = os.getppid()
+    set_death_signal = 1  # PR_SET_PDEATHSIG
+    ctypes.CDLL(None, use_errno=True).prctl(set_death_signal, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before we asked
+        os._exit(1)
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"

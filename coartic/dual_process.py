@@ -1,0 +1,110 @@
+"""The dual-process learner as a method, one per exploration condition."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from coartic.exploration import CONDITIONS, ExplorationCondition
+from coartic.learner import METHOD_PREFIX, TRIALS, LearningRun, learn
+from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.task import Task
+
+
+class DualProcessParameters(Parameters):
+    """Parameters of the learner; the defaults are the paper's."""
+
+    trials: Annotated[int, Field(gt=0)] = TRIALS
+    epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
+    """ε"""
+    noise_sd: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.05
+    """SD of η, length unit (base) or rad (joints)."""
+
+
+class DualProcess(Method):
+    """Trial and error over the corrective process (paper, Figure 3)."""
+
+    condition: ClassVar[ExplorationCondition]
+    citation = (
+        "A. Shah, A. G. Barto, A. H. Fagg (2013). A dual process account of coarticulation "
+        "in motor skill acquisition. Journal of Motor Behavior."
+    )
+    Parameters = DualProcessParameters
+
+    def why_not(self, task: Task) -> str | None:
+        """Why the condition does not apply to a task, or None where it does."""
+        return self.condition.why_not(task)
+
+    def solve(self, session: Session) -> Result:
+        """Learn; the solution is the best trial's."""
+        parameters: DualProcessParameters = self.parameters
+        condition = replace(
+            self.condition, epsilon=parameters.epsilon, noise_sd=parameters.noise_sd
+        )
+        trials = parameters.trials
+        if session.trials_left is not None:
+            trials = min(trials, session.trials_left)
+        with session.solving():
+            run = learn(
+                session.hand_over(*self.told),
+                condition,
+                seed=session.seed,
+                trials=trials,
+                model=session.model,
+            )
+        spent = run.counters
+        session.spend(
+            trials=spent.trials,
+            movement_ticks=spent.movement_ticks,
+            forward_kinematics=spent.forward_kinematics,
+            jacobians=spent.jacobians,
+            corrective_iterations=spent.corrective_iterations,
+            corrections=spent.corrections,
+            failed_trials=spent.failed_trials,
+        )
+        session.meter.solve_s = run.wall_s
+        session.rewards.extend(
+            int(reward) if done else None
+            for reward, done in zip(run.rewards, run.completed, strict=True)
+        )
+        if run.best_trial is None:
+            raise MethodError("infeasible", run.reason, _details(run))
+        return Result(run.solution, _details(run))
+
+
+def _details(run: LearningRun) -> dict[str, Any]:
+    return {
+        "initial_reward": run.initial_reward,
+        "initial_hands": run.first_hands,
+        "replay_reward": run.replay_reward,
+        "replay_hands": run.replay_hands,
+        "best_trial": run.best_trial,
+    }
+
+
+def _told(condition: ExplorationCondition) -> frozenset[Information]:
+    """**A** and the total reward; the closest hand also needs to know where things are."""
+    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    if condition.hand_exploration == "closest":
+        told |= {Information.GOALS, Information.FORWARD_KINEMATICS}
+    return frozenset(told)
+
+
+def _variant(condition: ExplorationCondition) -> type[DualProcess]:
+    return type(
+        f"DualProcess{condition.id}",
+        (DualProcess,),
+        {
+            "__doc__": DualProcess.__doc__,
+            "__module__": __name__,
+            "name": f"{METHOD_PREFIX}{condition.id}",
+            "title": f"Dual-process learner, exploration condition {condition.id[2:]}",
+            "told": _told(condition),
+            "condition": condition,
+        },
+    )
+
+
+DUAL_PROCESS: tuple[type[DualProcess], ...] = tuple(_variant(c) for c in CONDITIONS.values())

@@ -1,0 +1,364 @@
+"""What a method is: its declaration, and the session through which it works.
+
+A learner, planner or controller is a :class:`Method`. It states its citation, its
+parameters and what it is **told**. Given a :class:`Session` (one task, one seed, one
+meter) it returns a solution. The session is the only way to the robot: every call is
+counted, and a call that the method's declaration does not cover is refused. The
+harness executes, scores and verifies the solution itself.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from coartic.corrective import Correction, correct
+from coartic.errors import CoarticError
+from coartic.model import PAPER, MotionModel
+from coartic.robot import Array, Hand
+from coartic.solution import Execution, Movement, execute
+from coartic.task import Task
+
+Outcome = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
+
+
+class Information(StrEnum):
+    """What a method can be told, beyond the start, the hands and the number of goals."""
+
+    GOALS = "goals"
+    """Where the goals are, and their radius."""
+    FORWARD_KINEMATICS = "forward kinematics"
+    """Where a hand is in a configuration."""
+    JACOBIAN = "Jacobian"
+    """How a hand moves with the joints, in a configuration."""
+    CORRECTIVE_PROCESS = "corrective process"
+    """A configuration that hits a goal, found by **A**; **A** knows goal and Jacobian."""
+    REWARD_BY_TRIAL = "reward by trial"
+    """The total reward of a trial, after making it."""
+    KINEMATIC_MODEL = "kinematic model"
+    """The kinematics as formulas, with all derivatives."""
+    REWARD_FORMULA = "reward as a formula"
+    """That reward is lost in proportion to the joint-space path."""
+    SECONDARY_OBJECTIVES = "secondary objectives"
+    """Objectives beyond hitting the goals, such as smoothness."""
+
+
+METERED = frozenset(
+    {
+        Information.GOALS,
+        Information.FORWARD_KINEMATICS,
+        Information.JACOBIAN,
+        Information.CORRECTIVE_PROCESS,
+        Information.REWARD_BY_TRIAL,
+        Information.KINEMATIC_MODEL,
+    }
+)
+"""What a session hands out and so can see being used; the rest is stated."""
+
+
+class UndeclaredError(CoarticError):
+    """A method used what its declaration does not cover."""
+
+
+class BudgetError(CoarticError):
+    """A method asked for more trials than its budget has."""
+
+
+class MethodError(CoarticError):
+    """A method's own word that it found no solution: ``infeasible`` or ``solver-failed``."""
+
+    def __init__(
+        self,
+        outcome: Literal["infeasible", "solver-failed"],
+        reason: str,
+        details: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(reason)
+        self.outcome = outcome
+        self.details = details or {}
+
+
+class Parameters(BaseModel):
+    """Base of every method's parameters: typed, validated, immutable, plain data."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+@dataclass
+class Meter:
+    """What a method spent."""
+
+    trials: int = 0
+    """Physical trials."""
+    movement_ticks: int = 0
+    """Control ticks of those trials."""
+    forward_kinematics: int = 0
+    """Forward-kinematics evaluations, one per configuration."""
+    jacobians: int = 0
+    corrective_iterations: int = 0
+    corrections: int = 0
+    """Corrective movements made."""
+    failed_trials: int = 0
+    """Trials that did not hit every goal."""
+    gradients: int = 0
+    """Gradient evaluations of a solver."""
+    hessians: int = 0
+    solver_iterations: int = 0
+    build_s: float = 0.0
+    """Wall time of setting problems up, which is paid once."""
+    solve_s: float = 0.0
+    """Wall time of solving them."""
+
+    COUNTS: ClassVar[tuple[str, ...]] = (
+        "trials",
+        "movement_ticks",
+        "forward_kinematics",
+        "jacobians",
+        "corrective_iterations",
+        "corrections",
+        "failed_trials",
+        "gradients",
+        "hessians",
+        "solver_iterations",
+    )
+
+    def counts(self) -> dict[str, int]:
+        """The counters, without the times."""
+        return {name: getattr(self, name) for name in self.COUNTS}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Counters and times."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a method returns."""
+
+    solution: tuple[Movement, ...]
+    details: dict[str, Any] = field(default_factory=dict)
+    """Whatever the method wants kept beside it, as plain data. Never its score."""
+
+
+class Session:
+    """One task, one seed, one meter: all that a method gets to work with."""
+
+    def __init__(
+        self,
+        task: Task,
+        seed: int,
+        told: Iterable[Information],
+        *,
+        model: MotionModel = PAPER,
+        trial_budget: int | None = None,
+    ) -> None:
+        self._task = task
+        self._told = frozenset(told)
+        self.seed = seed
+        self.rng = np.random.default_rng(seed)
+        self.model = model
+        self.trial_budget = trial_budget
+        self.meter = Meter()
+        self.used: set[Information] = set()
+        self.rewards: list[int | None] = []
+        """Reward of each trial made, in order; None where it failed."""
+
+    # Open to every method: what the robot is, not what the task wants of it.
+
+    @property
+    def task_name(self) -> str:
+        """Name of the task."""
+        return self._task.name
+
+    @property
+    def goals_count(self) -> int:
+        """Number of goals."""
+        return len(self._task.goals)
+
+    @property
+    def hands(self) -> tuple[Hand, ...]:
+        """Hands the robot has."""
+        return self._task.hands
+
+    @property
+    def initial_hands(self) -> str:
+        """Hand sequence, or policy, that the task names for a first solution."""
+        return self._task.initial_hands
+
+    @property
+    def locked_base(self) -> tuple[str, ...]:
+        """Base coordinates that cannot move."""
+        return self._task.locked_base
+
+    @property
+    def q0(self) -> Array:
+        """Starting configuration, shape ``(dof,)``."""
+        return np.array(self._task.q0)
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        return self._task.robot.dof
+
+    def joints(self, hand: Hand) -> slice:
+        """The part of ``q`` that holds one arm's joints."""
+        return self._task.robot.joints(hand)
+
+    # What has to be declared.
+
+    @property
+    def goals(self) -> Array:
+        """Goal centres, shape ``(G, 2)``. Needs ``goals``."""
+        self._use(Information.GOALS)
+        return np.array(self._task.goal_array)
+
+    @property
+    def radius(self) -> float:
+        """θ^g. Needs ``goals``."""
+        self._use(Information.GOALS)
+        return self._task.radius
+
+    def forward_kinematics(self, q: Any, hand: Hand) -> Array:
+        """Hand positions, ``(..., 2)``; counts one evaluation per configuration."""
+        self._use(Information.FORWARD_KINEMATICS)
+        positions = self._task.robot.forward_kinematics(q, hand)
+        self.meter.forward_kinematics += positions[..., 0].size
+        return positions
+
+    def jacobian(self, q: Any, hand: Hand) -> Array:
+        """Jacobians, ``(..., 2, dof)``; counts one per configuration."""
+        self._use(Information.JACOBIAN)
+        jacobians = self._task.robot.jacobian(q, hand)
+        self.meter.jacobians += jacobians[..., 0, 0].size
+        return jacobians
+
+    def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
+        """**A** from ``q`` for goal number ``goal`` (from 1); counts its iterations."""
+        self._use(Information.CORRECTIVE_PROCESS)
+        found = correct(
+            self._task.robot,
+            q,
+            hand,
+            self._task.goals[self._goal(goal)],
+            locked_base=self._task.locked_base,
+            model=self.model,
+        )
+        self.meter.corrective_iterations += found.iterations
+        self.meter.jacobians += found.iterations
+        self.meter.forward_kinematics += found.iterations + 1
+        return found
+
+    def trial(self, solution: Sequence[Movement]) -> Execution:
+        """Make one physical trial; counts it, its ticks and its corrections.
+
+        Raises BudgetError where no trial is left.
+        """
+        self._use(Information.REWARD_BY_TRIAL)
+        if self.trials_left == 0:
+            raise BudgetError(f"all {self.trial_budget} trials of the budget are made")
+        execution = execute(self._task, solution, model=self.model)
+        self.meter.trials += 1
+        self.meter.movement_ticks += execution.ticks
+        self.meter.corrections += execution.corrections
+        self.meter.corrective_iterations += execution.iterations
+        self.meter.jacobians += execution.iterations
+        self.meter.forward_kinematics += execution.evaluations
+        self.meter.failed_trials += not execution.completed
+        self.rewards.append(execution.reward)
+        return execution
+
+    def symbolic_hand(self, q: Any, hand: Hand) -> Any:
+        """Hand position as a CasADi expression. Needs ``kinematic model``.
+
+        What a solver evaluates of it is counted with :meth:`spend`.
+        """
+        self._use(Information.KINEMATIC_MODEL)
+        return self._task.robot.symbolic_hand(q, hand)
+
+    @property
+    def trials_left(self) -> int | None:
+        """Trials left in the budget; None where there is none."""
+        return None if self.trial_budget is None else self.trial_budget - self.meter.trials
+
+    # What the method has to state itself.
+
+    def spend(self, **counts: int) -> None:
+        """Add to counters that the session cannot see, such as ``solver_iterations``."""
+        for name, count in counts.items():
+            if name not in Meter.COUNTS:
+                raise ValueError(f"unknown counter {name!r}; known: {', '.join(Meter.COUNTS)}")
+            setattr(self.meter, name, getattr(self.meter, name) + int(count))
+
+    @contextmanager
+    def building(self) -> Iterator[None]:
+        """Count the wall time of the block as set-up."""
+        clock = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.meter.build_s += time.perf_counter() - clock
+
+    @contextmanager
+    def solving(self) -> Iterator[None]:
+        """Count the wall time of the block as solving."""
+        clock = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.meter.solve_s += time.perf_counter() - clock
+
+    def hand_over(self, *information: Information) -> Task:
+        """The task itself, for compiled methods of this project that count by themselves.
+
+        Marks ``information`` as used; such a method must :meth:`spend` what it spends.
+        """
+        for item in information:
+            self._use(item)
+        return self._task
+
+    def _use(self, information: Information) -> None:
+        if information not in self._told:
+            told = ", ".join(sorted(self._told)) or "nothing"
+            raise UndeclaredError(
+                f"the method used {information.value!r}, which it does not declare (told: {told})"
+            )
+        self.used.add(information)
+
+    def _goal(self, number: int) -> int:
+        if not 1 <= number <= self.goals_count:
+            raise ValueError(f"goal {number}: goals are numbered 1 to {self.goals_count}")
+        return number - 1
+
+
+class Method(ABC):
+    """Base of every method. A subclass declares itself in its class attributes."""
+
+    name: ClassVar[str]
+    """Id, such as ``"dual-process"``; a variant adds ``/variant``."""
+    title: ClassVar[str]
+    citation: ClassVar[str]
+    told: ClassVar[frozenset[Information]]
+    secondary: ClassVar[tuple[str, ...]] = ()
+    """Its secondary objectives, in words."""
+    stochastic: ClassVar[bool] = True
+    """Whether the seed matters; the others are run once."""
+    Parameters: ClassVar[type[Parameters]] = Parameters
+
+    def __init__(self, parameters: Any = None) -> None:
+        self.parameters: Any = self.Parameters() if parameters is None else parameters
+
+    def why_not(self, task: Task) -> str | None:
+        """Why the method does not apply to a task, or None where it does."""
+        return None
+
+    @abstractmethod
+    def solve(self, session: Session) -> Result:
+        """Find a solution. Raises MethodError where there is none to be found."""

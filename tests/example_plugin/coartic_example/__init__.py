@@ -1,0 +1,39 @@
+"""Always use the hand that is nearest to the goal."""
+
+from pydantic import Field
+
+from coartic.method import Information, Method, Parameters, Result, Session
+from coartic.solution import Movement
+
+
+class NearestHandParameters(Parameters):
+    reluctance: float = Field(default=0.0, ge=0)  # length a hand must be nearer to take over
+
+
+class NearestHand(Method):
+    name = "nearest-hand"
+    title = "Corrective process with the nearest hand"
+    citation = "An example of this package."
+    told = frozenset(
+        {
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.CORRECTIVE_PROCESS,
+        }
+    )
+    stochastic = False
+    Parameters = NearestHandParameters
+
+    def solve(self, session: Session) -> Result:
+        q, previous, movements = session.q0, None, []
+        for number, goal in enumerate(session.goals, 1):
+            misses = {}
+            for hand in session.hands:
+                dx, dy = session.forward_kinematics(q, hand) - goal
+                misses[hand] = (dx * dx + dy * dy) ** 0.5
+                if previous is not None and hand != previous:
+                    misses[hand] += self.parameters.reluctance
+            previous = min(misses, key=misses.get)
+            q = session.correct(q, previous, number).q
+            movements.append(Movement(number, previous, "planned", q))
+        return Result(tuple(movements))

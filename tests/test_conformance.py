@@ -1,0 +1,94 @@
+"""The conformance kit: every built-in method passes, every broken one fails its law."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.conformance import check_method, check_task_file
+from benchmarks.methods import registry
+from coartic.task import TASK_FOLDER
+
+from .test_task import GOOD
+
+BROKEN = Path(__file__).parent / "plugins" / "broken.py"
+KNOWN = registry([BROKEN])
+LAWS = [
+    "declaration",
+    "parameters",
+    "solution",
+    "determinism",
+    "no hidden state",
+    "limits",
+    "information",
+    "failure",
+]
+
+
+@pytest.mark.parametrize("name", [*registry(), "test/good"])
+def test_methods_that_keep_every_law(name):
+    laws = check_method(KNOWN[name])
+    assert [law.name for law in laws] == LAWS
+    assert [law for law in laws if not law.passed] == []
+    assert all(law.finding for law in laws)
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "finding"),
+    [
+        ("test/uncited", "declaration", "citation is empty"),
+        ("test/loose", "parameters", "an unknown parameter is accepted"),
+        ("test/unexecutable", "solution", "movements for goals [1], wanted [1, 2, 3]"),
+        ("test/random", "determinism", "same seed on ascending, same process: details"),
+        ("test/remembers", "no hidden state", "after other runs, ascending with the same seed"),
+        ("test/spendthrift", "limits", "did not keep to its budget: all 7 trials"),
+        ("test/peeks", "information", "the method used 'Jacobian', which it does not declare"),
+        ("test/overdeclares", "information", "declared but never used: Jacobian"),
+        ("test/unhelpful", "failure", "gives crashed ZeroDivisionError: no goal is that far"),
+    ],
+)
+def test_each_law_can_be_broken(name, law, finding):
+    laws = {found.name: found for found in check_method(KNOWN[name])}
+    assert not laws[law].passed
+    assert finding in laws[law].finding
+    if law not in ("solution", "information", "determinism"):  # these have consequences
+        assert [found.name for found in laws.values() if not found.passed] == [law]
+
+
+def test_every_law_is_broken_by_some_method():
+    broken = {"test/uncited", "test/loose", "test/unexecutable", "test/random"}
+    broken |= {"test/remembers", "test/spendthrift", "test/peeks", "test/unhelpful"}
+    found = {law.name for name in broken for law in check_method(KNOWN[name]) if not law.passed}
+    assert found == set(LAWS)
+
+
+@pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_tasks_keep_every_law(path):
+    assert [law for law in check_task_file(path, KNOWN) if not law.passed] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "law", "finding"),
+    [
+        ("name = 1", "valid", "name is 1"),
+        (GOOD, "provenance", "no source and status for goals and start"),
+        (GOOD.replace('"mine"', '"ascending"'), "name", "belongs to a different, shipped task"),
+        (GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), "distinct goals", "goals 1 and 2 lie within"),
+        (
+            'locked_base = ["x", "y"]\nhands = ["right"]'
+            + GOOD.replace("[[5.0, 1.0], [5.0, 2.0]]", "[[2.5, 0.1], [3.0, 1.0]]"),
+            "solvable",
+            "initial hands RR: goal 1: the corrective process did not converge",
+        ),
+        (
+            'hands = ["left"]' + GOOD.replace('"RR"', '"LL"'),
+            "methods",
+            "corrective-alone/given",
+        ),
+    ],
+)
+def test_laws_of_a_task_file(text, law, finding, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    laws = {found.name: found for found in check_task_file(path, KNOWN)}
+    assert finding in laws[law].finding
+    assert laws[law].passed == (law == "methods")
