@@ -22,6 +22,8 @@ class Summary:
     runs: int
     derived: bool = False
     """Computed from other printed numbers rather than printed itself."""
+    runs_printed: bool = True
+    """Whether the number of runs stands beside it; else it is the paper's general 20."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,12 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
     sequences = tuple(
         SequenceResult(
             item["hands"],
-            Summary(item["reward"], item.get("sd"), item.get("runs", RUNS)),
+            Summary(
+                item["reward"],
+                item.get("sd"),
+                item.get("runs", RUNS),
+                runs_printed="runs" in item,
+            ),
             item.get("runs"),
         )
         for item in entry.get("sequences", ())

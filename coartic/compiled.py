@@ -10,6 +10,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import shutil
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -31,7 +33,7 @@ _PRESENTATION = {"__init__.py", "__main__.py", "cli.py", "frames.py", "reference
 
 @cache
 def model_source() -> bytes:
-    """The sources that results come from, as they are on disk."""
+    """The sources that results come from, as they were when the package was imported."""
     return b"\0".join(
         path.name.encode() + b"\0" + path.read_bytes()
         for path in sorted(PACKAGE.glob("*.py"))
@@ -61,8 +63,18 @@ def _cache_folder() -> Path | None:
         except OSError:
             continue
         if os.access(folder, os.W_OK):
+            _prune(root, folder)
             return folder
     return None
+
+
+def _prune(root: Path, current: Path) -> None:
+    """Remove machine code of older sources that nobody has used for a month."""
+    for folder in root.glob("kernel-*"):
+        with contextlib.suppress(OSError):
+            used = max(path.stat().st_atime for path in [folder, *folder.rglob("*")])
+            if folder != current and time.time() - used > 30 * 24 * 3600:
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def inner(function: F) -> F:

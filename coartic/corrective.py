@@ -13,8 +13,8 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from coartic.compiled import entry, inner, joint_chain, joint_lever
-from coartic.model import PAPER, MotionModel
-from coartic.movement import configuration, scratch_for
+from coartic.model import PAPER, MotionModel, checked_model
+from coartic.movement import configuration, goal_centre, scratch_for
 from coartic.robot import Array, Hand, Robot
 
 
@@ -95,17 +95,19 @@ def correct(
 
     ``locked_base`` holds ``"x"`` and/or ``"y"``. No convergence within
     ``model.max_iterations`` is an outcome, not an error. Raises ValueError for a
-    wrong shape. Source: paper, Figure 2 (Whitney 1969; Craig 2004).
+    wrong shape, for figures that are not finite, and for other locks. Source: paper,
+    Figure 2 (Whitney 1969; Craig 2004).
     """
+    if not set(locked_base) <= {"x", "y"}:
+        raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     position = configuration(robot, q)
     converged, iterations = _correct(
         position,
         robot.arm(hand),
-        float(goal[0]),
-        float(goal[1]),
+        *goal_centre(goal),
         "x" not in locked_base,
         "y" not in locked_base,
-        model,
+        checked_model(model),
         scratch_for(robot),
     )
     return Correction(position, bool(converged), int(iterations))

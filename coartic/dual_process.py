@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
@@ -54,20 +54,14 @@ class DualProcess(Method):
                 trials=trials,
                 model=session.model,
             )
-        spent = run.counters
-        session.spend(
-            trials=spent.trials,
-            movement_ticks=spent.movement_ticks,
-            forward_kinematics=spent.forward_kinematics,
-            jacobians=spent.jacobians,
-            corrective_iterations=spent.corrective_iterations,
-            corrections=spent.corrections,
-            failed_trials=spent.failed_trials,
-        )
+        session.spend(**asdict(run.counters))
+        search = run.initial_search._asdict()
+        del search["hands"]
+        session.spend(**search, jacobians=run.initial_search.corrective_iterations)
         session.meter.solve_s = run.wall_s
         session.rewards.extend(
             int(reward) if done else None
-            for reward, done in zip(run.rewards, run.completed, strict=True)
+            for reward, done in zip(run.rewards.data, run.completed, strict=True)
         )
         if run.best_trial is None:
             raise MethodError("infeasible", run.reason, _details(run))

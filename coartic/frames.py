@@ -111,8 +111,8 @@ def learning_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
         pd.DataFrame(
             {
                 "run": index,
-                "trial": np.arange(len(run.rewards)),
-                "reward": pd.arrays.IntegerArray(run.rewards, ~run.completed),
+                "trial": np.arange(run.rewards.size),
+                "reward": pd.arrays.IntegerArray(run.rewards.data, ~run.completed),
             }
         )
         for index, run in enumerate(runs)

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import NamedTuple
 
 from coartic.errors import NotApplicableError
 from coartic.model import PAPER, MotionModel
@@ -82,8 +83,27 @@ def initial_hands(
     all (``best-of-all``). Raises NotApplicableError where no candidate completes the
     task, or there are too many.
     """
+    return search_initial_hands(task, hands, model=model).hands
+
+
+class InitialSearch(NamedTuple):
+    """The initial hands of a task, and what a policy spent on finding them."""
+
+    hands: str
+    trials: int = 0
+    movement_ticks: int = 0
+    forward_kinematics: int = 0
+    corrective_iterations: int = 0
+    corrections: int = 0
+    failed_trials: int = 0
+
+
+def search_initial_hands(
+    task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
+) -> InitialSearch:
+    """:func:`initial_hands` with its cost, which is nothing for a named sequence."""
     if not task.initial_is_policy:
-        return task.initial_hands
+        return InitialSearch(task.initial_hands)
     allowed = task.hands if hands is None else hands
     return _by_policy(_Content(task), tuple(hand for hand in HANDS if hand in allowed), model)
 
@@ -103,16 +123,26 @@ class _Content:
 
 
 @lru_cache(maxsize=64)
-def _by_policy(content: _Content, hands: tuple[Hand, ...], model: MotionModel) -> str:
+def _by_policy(content: _Content, hands: tuple[Hand, ...], model: MotionModel) -> InitialSearch:
     task = content.task
     if task.initial_hands == "best-single-hand":
         candidates = [letters_of([hand] * len(task.goals)) for hand in hands]
     else:
         candidates = hand_sequences(task, hands)
-    best, execution = ranked_sequences(task, candidates, model=model)[0]
+    ranked = ranked_sequences(task, candidates, model=model)
+    best, execution = ranked[0]
     if not execution.completed:
         raise NotApplicableError(
             f"task {task.name!r}: the corrective process completes it with none of the "
             f"{len(candidates)} hand sequences that {task.initial_hands!r} tries"
         )
-    return best
+    made = [trial for _, trial in ranked]
+    return InitialSearch(
+        best,
+        trials=len(made),
+        movement_ticks=sum(trial.ticks for trial in made),
+        forward_kinematics=sum(trial.evaluations for trial in made),
+        corrective_iterations=sum(trial.iterations for trial in made),
+        corrections=sum(trial.corrections for trial in made),
+        failed_trials=sum(not trial.completed for trial in made),
+    )

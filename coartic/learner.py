@@ -29,8 +29,8 @@ from coartic.compiled import entry, inner, joint_chain
 from coartic.corrective import correct_kernel
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.exploration import ExplorationCondition, load_condition
-from coartic.initial import initial_hands
-from coartic.model import PAPER, MotionModel
+from coartic.initial import InitialSearch, search_initial_hands
+from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import move_kernel, scratch_for
 from coartic.robot import HANDS, Array
 from coartic.solution import Execution, Movement, execute
@@ -160,6 +160,68 @@ def _record(log: Any, goal: int, hand: int, kind: int, ticks: int, target: Any) 
 
 
 @inner
+def _set_target(
+    target: Any, q: Any, stored: Any, hand: int, explore: bool, problem: Any, rng: Any
+) -> None:
+    """q^t = q*(s, a) + η; joints that are not to be modified keep their current values."""
+    for j in range(len(q)):
+        target[j] = q[j] if problem.follows[hand, j] else stored[j]
+        if explore and problem.explored[hand, j]:
+            target[j] += problem.noise_sd * rng.standard_normal()
+
+
+@inner
+def _move(
+    q: Any,
+    target: Any,
+    goal: int,
+    hand: int,
+    kind: int,
+    problem: Any,
+    log: Any,
+    counts: Any,
+    scratch: Any,
+) -> tuple[int, bool]:
+    """Move ``q`` in place and log it; ticks, goal hit."""
+    ticks, hit, evaluations = move_kernel(
+        q,
+        target,
+        _arm(problem, hand),
+        problem.goals[goal, 0],
+        problem.goals[goal, 1],
+        problem.radius,
+        kind == LEARNED,
+        problem.model,
+        scratch,
+    )
+    counts[_C.evaluations] += evaluations
+    counts[_C.ticks] += ticks
+    _record(log, goal, hand, kind, ticks, target)
+    return ticks, hit
+
+
+@inner
+def _correct(
+    q: Any, target: Any, goal: int, hand: int, problem: Any, counts: Any, scratch: Any
+) -> bool:
+    """Set ``target`` to what **A** finds from ``q``; whether it found anything."""
+    target[:] = q
+    converged, iterations = correct_kernel(
+        target,
+        _arm(problem, hand),
+        problem.goals[goal, 0],
+        problem.goals[goal, 1],
+        problem.free_x,
+        problem.free_y,
+        problem.model,
+        scratch,
+    )
+    counts[_C.iterations] += iterations
+    counts[_C.evaluations] += iterations + 1
+    return converged
+
+
+@inner
 def _trial(
     forced: Any,
     explore: bool,
@@ -173,7 +235,6 @@ def _trial(
     scratch: Any,
 ) -> tuple[bool, int]:
     """One trial into ``log``; completed, ticks. ``forced`` hands, if any, are used."""
-    model = problem.model
     q[:] = problem.start
     log.count[0] = 0
     total = 0
@@ -186,51 +247,27 @@ def _trial(
             hand = _explored_hand(q, goal, values, problem, rng, counts, scratch)
         else:
             hand = _greedy(values, problem.hands)
-        arm = _arm(problem, hand)
-        goal_x = problem.goals[goal, 0]
-        goal_y = problem.goals[goal, 1]
 
         if values[hand] > -math.inf:
             stored = tables.target[goal, previous, hand]
-            for j in range(len(q)):
-                target[j] = q[j] if problem.follows[hand, j] else stored[j]
-                if explore and problem.explored[hand, j]:
-                    target[j] += problem.noise_sd * rng.standard_normal()
-            ticks, hit, evaluations = move_kernel(
-                q, target, arm, goal_x, goal_y, problem.radius, True, model, scratch
-            )
+            _set_target(target, q, stored, hand, explore, problem, rng)
+            ticks, hit = _move(q, target, goal, hand, LEARNED, problem, log, counts, scratch)
             total += ticks
-            counts[_C.evaluations] += evaluations
-            _record(log, goal, hand, LEARNED, ticks, target)
         else:
-            distance = _goal_distance(q, goal, hand, problem, counts, scratch)
-            hit = distance <= problem.radius
+            hit = _goal_distance(q, goal, hand, problem, counts, scratch) <= problem.radius
             if hit:
                 _record(log, goal, hand, CORRECTIVE, 0, q)
-
         if not hit:
-            target[:] = q
-            converged, iterations = correct_kernel(
-                target, arm, goal_x, goal_y, problem.free_x, problem.free_y, model, scratch
-            )
-            counts[_C.iterations] += iterations
-            counts[_C.evaluations] += iterations + 1
-            if not converged:
+            if not _correct(q, target, goal, hand, problem, counts, scratch):
                 counts[_C.failed] += 1
-                counts[_C.ticks] += total
                 return False, total
-            ticks, hit, evaluations = move_kernel(
-                q, target, arm, goal_x, goal_y, problem.radius, False, model, scratch
-            )
-            total += ticks
-            counts[_C.evaluations] += evaluations
             counts[_C.corrections] += 1
-            _record(log, goal, hand, CORRECTIVE, ticks, target)
-
+            # It ends inside the goal: the model's tolerance is below the radius.
+            ticks, _ = _move(q, target, goal, hand, CORRECTIVE, problem, log, counts, scratch)
+            total += ticks
         log.hands[goal] = hand
         log.reached[goal] = q
         previous = hand
-    counts[_C.ticks] += total
     return True, total
 
 
@@ -254,8 +291,6 @@ def _copy(source: Any, destination: Any) -> None:
         destination.ticks[row] = source.ticks[row]
         destination.target[row] = source.target[row]
     destination.count[0] = source.count[0]
-    destination.hands[:] = source.hands
-    destination.reached[:] = source.reached
 
 
 @entry
@@ -325,12 +360,10 @@ class LearningRun:
     condition: ExplorationCondition
     model: MotionModel
     seed: int
-    first_hands: str
-    """Hands of trial 0."""
-    rewards: NDArray[np.int64]
-    """Total reward of each trial, shape ``(trials,)``; read ``completed`` beside it."""
-    completed: NDArray[np.bool_]
-    """Whether each trial hit every goal; the others failed and taught nothing."""
+    initial_search: InitialSearch
+    """Hands of trial 0, and what a policy spent on finding them."""
+    rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
+    """Total reward of each trial, shape ``(trials,)``; masked where the trial failed."""
     best_trial: int | None
     """First trial with the highest total reward; None where none was completed."""
     solution: tuple[Movement, ...]
@@ -345,6 +378,16 @@ class LearningRun:
     counters: Counters
     wall_s: float
     cpu_s: float
+
+    @property
+    def first_hands(self) -> str:
+        """Hands of trial 0."""
+        return self.initial_search.hands
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """Whether each trial hit every goal; the others failed and taught nothing."""
+        return ~np.ma.getmaskarray(self.rewards)
 
     @property
     def method(self) -> str:
@@ -412,7 +455,8 @@ def learn(
 
     The result depends on the arguments alone. Raises NotApplicableError where the
     condition does not fit the task, CoarticError for an unknown condition and
-    ValueError for a negative seed or fewer than one trial. Source: paper, Figure 3.
+    ValueError for a negative seed, fewer than one trial, or a model that no movement can
+    be made with. Source: paper, Figure 3.
     """
     condition = load_condition(condition)
     reason = condition.why_not(task)
@@ -420,7 +464,8 @@ def learn(
         raise NotApplicableError(reason)
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
-    first_hands = initial_hands(task, condition.hands, model=model)
+    checked_model(model, radius=task.radius)
+    search = search_initial_hands(task, condition.hands, model=model)
     problem = _problem(task, condition, model)
     goals, dof = len(task.goals), task.robot.dof
     tables = _Tables(np.full((goals, 3, 2), -np.inf), np.full((goals, 3, 2, dof), np.nan))
@@ -428,7 +473,7 @@ def learn(
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
     counts = np.zeros(len(_C), dtype=np.int64)
-    hand_codes = np.array([HANDS.index(hand) for hand in hands_of(first_hands)], dtype=np.int64)
+    hand_codes = np.array([HANDS.index(hand) for hand in hands_of(search.hands)], dtype=np.int64)
     rng = np.random.default_rng(seed)
 
     def run(trial_rewards: NDArray[np.int64]) -> tuple[int, bool, int]:
@@ -447,7 +492,8 @@ def learn(
         )
         return result
 
-    run(rewards[:0])  # compiles where that is still to be done: not part of any run's time
+    if not getattr(_learn, "signatures", True):
+        run(rewards[:0])  # compiles, which is not part of any run's time
     wall, cpu = time.perf_counter(), time.thread_time()
     best_trial, replayed, _ = run(rewards)
     wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
@@ -458,9 +504,8 @@ def learn(
         condition=condition,
         model=model,
         seed=seed,
-        first_hands=first_hands,
-        rewards=rewards,
-        completed=completed,
+        initial_search=search,
+        rewards=np.ma.array(rewards, mask=~completed),
         best_trial=int(best_trial) if best_trial >= 0 else None,
         solution=_movements(best) if best_trial >= 0 else (),
         replay=_movements(replay),

@@ -30,3 +30,29 @@ class MotionModel(NamedTuple):
 
 
 PAPER = MotionModel()
+
+
+def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
+    """The model itself; ValueError for constants no movement can be made with.
+
+    ``radius`` of the goals, where known: a corrective process that ends farther from a
+    goal's centre than that never hits it.
+    """
+    for name in ("step", "gain", "correction_tolerance"):
+        value = getattr(model, name)
+        if not 1e-6 <= value <= 1e6:
+            raise ValueError(f"model.{name} is {value}; it must be between 1e-6 and 1e6")
+    if not 0.0 <= model.arrival_tolerance <= 1e6:
+        raise ValueError(
+            f"model.arrival_tolerance is {model.arrival_tolerance}; it must be 0 to 1e6"
+        )
+    if model.max_iterations < 0:
+        raise ValueError(
+            f"model.max_iterations is {model.max_iterations}; it must not be negative"
+        )
+    if radius is not None and model.correction_tolerance >= radius:
+        raise ValueError(
+            f"model.correction_tolerance {model.correction_tolerance} is not below the goals' "
+            f"radius {radius}: the corrective process would end outside the goal"
+        )
+    return model

@@ -24,13 +24,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic.compiled import entry, inner, joint_chain
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import Array, Hand, Robot
 
 # Distance kept clear beyond what the bounds ask for: far above the rounding of
-# positions (1e-14 for the paper's robot, 1e-11 at coordinates of 10 000), far below
-# any step.
+# positions (1e-14 for the paper's robot, 1e-11 at coordinates of 10 000), far below any
+# step. It holds for figures up to LARGEST, so larger ones are refused.
 _CLEARANCE = 1e-9
+LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
 class Scratch(NamedTuple):
@@ -204,7 +205,8 @@ def move(
 
     ``q`` and ``target`` have shape ``(dof,)``. ``stop_on_arrival=False`` is a
     corrective movement, which ends only on hitting the goal (or at its target).
-    Raises ValueError for a wrong shape. Source: paper, *Generating Movement for
+    Raises ValueError for a wrong shape and for figures that are not finite or beyond
+    ``LARGEST``. Source: paper, *Generating Movement for
     Each Goal*.
     """
     position = configuration(robot, q)
@@ -213,11 +215,10 @@ def move(
         position,
         end,
         robot.arm(hand),
-        float(goal[0]),
-        float(goal[1]),
-        float(radius),
+        *goal_centre(goal),
+        _radius(radius),
         stop_on_arrival,
-        model,
+        checked_model(model),
         scratch_for(robot),
     )
     return MoveResult(position, int(ticks), bool(hit), int(evaluations))
@@ -240,6 +241,7 @@ def follow(
     the hand within ``radius`` of the goal, or at the end; k steps take k + 1 ticks, as
     for :func:`move`. Raises ValueError for a wrong shape.
     """
+    goal_centre(goal), _radius(radius), checked_model(model)
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -260,4 +262,20 @@ def configuration(robot: Robot, q: Any) -> Array:
         raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
     if not np.isfinite(array).all():
         raise ValueError(f"configuration {array.tolist()} is not finite")
+    if np.abs(array).max() > LARGEST:
+        raise ValueError(f"configuration {array.tolist()} has a figure beyond {LARGEST:g}")
     return array
+
+
+def goal_centre(goal: Any) -> tuple[float, float]:
+    """The two coordinates of a goal; ValueError where they are anything else."""
+    x, y = float(goal[0]), float(goal[1])
+    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
+        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST:g}")
+    return x, y
+
+
+def _radius(radius: float) -> float:
+    if not 0.0 <= radius <= LARGEST:
+        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST:g}")
+    return float(radius)

@@ -1,8 +1,9 @@
 """The model written as the paper prints it: one step at a time, in plain NumPy.
 
-Slow and obvious. It shares the robot with the rest of the package and nothing else:
-the compiled kernels are tested against it, trial by trial, and timed against it
-(benchmarks/speed.py). It draws from its generator in the same order as the learner.
+Slow and obvious. Movement, corrective process and learner share the robot's formulas
+with the rest of the package and nothing of its kernels, which are tested against them,
+trial by trial, and timed against them (benchmarks/speed.py); only a policy's initial
+hands are taken over. Draws from its generator in the same order as the learner.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ class ReferenceRun(NamedTuple):
     completed: NDArray[np.bool_]
     values: dict[tuple[State, Hand], float]
     targets: dict[tuple[State, Hand], Array]
+    movement_ticks: int
+    corrections: int
+    corrective_iterations: int
 
 
 def move(
@@ -98,6 +102,7 @@ def learn(
     targets: dict[tuple[State, Hand], Array] = {}
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
+    ticks = corrections = iterations = 0
     for trial in range(trials):
         q = np.array(task.q0)
         total = 0
@@ -113,12 +118,14 @@ def learn(
                 target = _explore(task, condition, q, hand, targets[state, hand], rng)
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
+                ticks += result.ticks
             else:
                 hit = _distance(task.robot.forward_kinematics(q, hand), goal) <= task.radius
             if not hit:
                 found = correct(
                     task.robot, q, hand, goal, locked_base=task.locked_base, model=model
                 )
+                iterations += found.iterations
                 if not found.converged:
                     break
                 result = move(
@@ -126,6 +133,8 @@ def learn(
                     stop_on_arrival=False, model=model,
                 )  # fmt: skip
                 q, total = result.q, total - result.ticks
+                ticks += result.ticks
+                corrections += 1
             visited.append((state, hand, q))
             previous = hand
         rewards[trial] = total
@@ -135,7 +144,7 @@ def learn(
                 if total > values.get((state, hand), -math.inf):
                     values[state, hand] = total
                     targets[state, hand] = reached
-    return ReferenceRun(rewards, completed, values, targets)
+    return ReferenceRun(rewards, completed, values, targets, ticks, corrections, iterations)
 
 
 def _choose(

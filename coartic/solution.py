@@ -16,7 +16,7 @@ import numpy as np
 
 from coartic.corrective import correct
 from coartic.errors import CoarticError
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import MoveResult, configuration, follow, move
 from coartic.robot import Array, Hand
 from coartic.task import Task, letters_of
@@ -97,9 +97,10 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     the robot stands, and the correction is paid for. Where **A** does not converge
     the execution ends there with a reason. Raises CoarticError for a solution that
     breaks the task's rules: goals missing or out of order, a hand the robot does not
-    have, a target of the wrong shape or not finite, a locked base that moves.
+    have, a target of the wrong shape or not finite, a locked base that moves. Raises
+    ValueError for a model that no movement can be made with.
     """
-    run = _Run(task, model)
+    run = _Run(task, checked_model(model, radius=task.radius))
     for number, movements in _by_goal(task, list(solution)):
         run.reach(number, movements)
         if run.reason:

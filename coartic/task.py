@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -228,13 +228,9 @@ def load_task(name_or_path: str | Path) -> Task:
     return _read(Path(name_or_path))
 
 
-_cache: list[Task] = []
-
-
-def _shipped() -> list[Task]:
-    if not _cache:
-        _cache.extend(_read(path) for path in sorted(TASK_FOLDER.glob("*.toml")))
-    return _cache
+@cache
+def _shipped() -> tuple[Task, ...]:
+    return tuple(_read(path) for path in sorted(TASK_FOLDER.glob("*.toml")))
 
 
 def _read(path: Path) -> Task:

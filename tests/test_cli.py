@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from benchmarks.specification import run_seed
 from benchmarks.store import Store
 from coartic import __version__, cli
 
@@ -144,6 +145,52 @@ def test_usage_errors(arguments, words, monkeypatch, capsys, tmp_path):
     assert words in " ".join(error.replace("│", " ").split())
     assert "Traceback" not in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
+    from benchmarks import executors
+
+    asked = []
+    real = executors.Local
+
+    class Watched(real):
+        def __init__(self, jobs):
+            asked.append(jobs)
+            super().__init__(1)
+
+    monkeypatch.setattr(executors, "Local", Watched)
+    command = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
+    for seed in (0, 5):
+        call(
+            monkeypatch,
+            capsys,
+            *command,
+            "--seed",
+            seed,
+            "--jobs",
+            3,
+            "--out",
+            tmp_path / f"{seed}",
+        )
+    first, second = (pd.read_parquet(tmp_path / f"{seed}" / "runs.parquet") for seed in (0, 5))
+    assert asked == [3, 3]
+    assert list(first.seed) == [run_seed(0, "ascending", run) for run in (0, 1)]
+    assert list(second.seed) == [run_seed(5, "ascending", run) for run in (0, 1)]
+
+
+def test_the_commit_is_recorded(monkeypatch, capsys, tmp_path):
+    git = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    head = subprocess.run(git, capture_output=True, text=True)
+    call(
+        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 1, "--trials", 1,
+        "--out", tmp_path / "out",
+    )  # fmt: skip
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text(encoding="utf-8"))
+    commit = manifest["environment"]["commit"]
+    if head.returncode == 0:
+        assert commit["id"] == head.stdout.strip()
+    else:
+        assert commit is None
 
 
 def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):

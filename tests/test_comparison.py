@@ -72,6 +72,10 @@ def test_verdicts(shift, spread, verdict):
     assert difference(ours, Summary(-500, 1.0, 20)).verdict == verdict
 
 
+def test_margin():
+    assert difference([-500.0] * 2, Summary(-500, 1.0, 20)).margin == 5.0
+
+
 def test_edge_cases_of_the_difference():
     assert difference([-500.0], Summary(-500, 1.0, 20)).verdict == "undecided"
     same = difference([-500.0, -500.0], Summary(-500, None, 20))

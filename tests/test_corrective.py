@@ -55,6 +55,11 @@ def test_locked_base_stays(locked):
         assert found.q[index] == q[index]
 
 
+def test_unknown_locks_are_refused():
+    with pytest.raises(ValueError, match="it may name 'x' and 'y'"):
+        correct(ROBOT, np.zeros(10), "right", (3.0, 2.0), locked_base=("Y",))
+
+
 def test_already_there_costs_no_iteration():
     found = correct(ROBOT, np.zeros(10), "right", (4.505, 0.1))
     assert (found.converged, found.iterations) == (True, 0)

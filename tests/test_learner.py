@@ -1,7 +1,7 @@
 """The learner against the paper's loop, the published results, and its own laws."""
 
-import dataclasses
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -16,8 +16,11 @@ from coartic import (
     learn,
     learn_many,
     load_task,
+    parse_task,
     reference,
 )
+from coartic.learner import TRIALS
+from coartic.robot import HANDS
 
 from .strategies import UNEVEN, tiny_task
 
@@ -35,7 +38,8 @@ PAPER_CELLS = [
 def same_run(a, b):
     assert a.counters == b.counters
     assert a.reward == b.reward
-    for field in ("rewards", "completed", "values", "targets"):
+    np.testing.assert_array_equal(a.rewards.data, b.rewards.data)
+    for field in ("completed", "values", "targets"):
         np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
 
 
@@ -43,7 +47,21 @@ def assert_equals_reference(task, condition, trials, seed=11):
     model = MotionModel(max_iterations=400)  # failures soon enough for the slow side
     fast = learn(task, condition, seed=seed, trials=trials, model=model)
     slow = reference.learn(task, condition, seed=seed, trials=trials, model=model)
-    np.testing.assert_array_equal(fast.rewards, slow.rewards)
+    np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
+    counters = fast.counters
+    assert counters.movement_ticks == slow.movement_ticks
+    assert counters.corrections == slow.corrections
+    assert counters.corrective_iterations == counters.jacobians
+    assert counters.corrective_iterations <= slow.corrective_iterations
+    if slow.completed.all():  # else the kernel leaves a stationary point sooner
+        assert counters.corrective_iterations == slow.corrective_iterations
+    assert counters.failed_trials == (~slow.completed).sum()
+    assert counters.trials == trials
+    assert (
+        counters.corrective_iterations
+        < counters.forward_kinematics
+        < slow.movement_ticks + (2 * slow.corrective_iterations + 8 * trials * len(task.goals))
+    )
     np.testing.assert_array_equal(fast.completed, slow.completed)
     stored = 0
     for goal, before, chosen in np.ndindex(fast.values.shape):
@@ -109,7 +127,7 @@ def test_initial_rewards(name, condition, initial):
         # Published mean and spread, widened by the standard error of eight runs.
         ("ascending", "EC1", -307, -299, {"RRR"}),
         ("descending", "EC1", -319, -311, {"RRR"}),
-        ("two-armed-1", "EC2", -640, -555, {"RRRR", "RRLR", "LLLR", "LRLR"}),
+        ("two-armed-1", "EC2", -640, -555, {"RRRR", "RRLR", "LLLR", "LRLR", "LRRR"}),
         ("two-armed-1", "EC3", -511, -499, {"LRLR"}),
         ("two-armed-1", "EC4", -490, -478, {"LRLR"}),
         ("two-armed-2", "EC3", -354, -347, {"RRRR", "RLRR"}),
@@ -168,17 +186,89 @@ def test_one_armed_condition_never_uses_or_moves_the_left_arm():
     assert not run.execute().configurations[:, task.robot.joints("left")].any()
 
 
-def test_hand_exploration_rates():
-    """DASel picks a random hand ε of the time: with Q tied to one hand, ε/2 depart from it."""
-    task = tiny_task(initial_hands="RR")
-    still = ExplorationCondition("e", ("left", "right"), False, False, "random", epsilon=0.0)
-    assert set(learn(task, still, seed=0, trials=50).rewards) == {
-        learn(task, still, seed=0, trials=1).reward,
-        learn(task, still, seed=0, trials=2).rewards[1],
-    }
-    always = dataclasses.replace(still, epsilon=1.0)
-    run = learn(task, always, seed=0, trials=2000)
-    assert np.isfinite(run.values[:, [0, 1]][1]).all()  # every pair is visited
+@pytest.mark.parametrize("epsilon", [0.0, 0.2, 1.0])
+def test_hand_exploration_rate(epsilon):
+    """DASel picks a random hand ε of the time, so the wrong one ε/2 of the time.
+
+    The left hand fails here, and so leaves a trace; the right one is greedy.
+    """
+    trials = 20_000
+    condition = ExplorationCondition("e", HANDS, True, False, "random", epsilon)
+    run = learn(failing_task(), condition, seed=0, trials=trials)
+    spread = (epsilon / 2 * (1 - epsilon / 2) / trials) ** 0.5
+    assert abs(run.counters.failed_trials / trials - epsilon / 2) <= 4 * spread
+
+
+@pytest.mark.parametrize(
+    ("shift", "visited"),
+    [(0.0, [True, True]), (1e-12, [True, True]), (1e-6, [False, True]), (-1e-6, [True, True])],
+)
+def test_closest_hand_and_its_ties(shift, visited):
+    """EC2: the nearer hand always, a random one of two at the same place up to rounding."""
+    task = tiny_task(
+        goals=[[0.0, 6.0]],
+        initial_hands="R",
+        start={
+            "left": [math.acos(0.125), 0, 0, 0],
+            "right": [math.pi - math.acos(0.125), 0, 0, 0],
+        },
+        robot={"right_shoulder": [0.5, 0.1 + shift]},
+    )
+    condition = ExplorationCondition("c", HANDS, True, False, "closest", epsilon=1.0)
+    run = learn(task, condition, seed=0, trials=200)
+    assert list(np.isfinite(run.values[0, 2])) == visited  # trial 0 visits the right one
+
+
+def test_best_trial_is_the_first_of_equals():
+    still = ExplorationCondition("s", ("right",), False, False, "none")
+    run = learn(tiny_task(), still, seed=0, trials=300)
+    assert (run.rewards == run.reward).sum() > 1
+    assert run.best_trial == int(np.flatnonzero(run.rewards == run.reward)[0])
+
+
+def test_constants_of_the_paper():
+    assert MotionModel() == (0.01, 0.01, 0.05, 0.01, 20_000)
+    for condition in CONDITIONS.values():
+        assert (condition.epsilon, condition.noise_sd) == (0.2, 0.05)
+    assert TRIALS == 10_000
+
+
+def test_twenty_thousand_iterations_are_allowed():
+    """A goal at the edge of a locked reach: slow, but within the bound."""
+    task = tiny_task(locked_base=["x", "y"], goals=[[4.5, 0.1], [0.5, 4.1]])
+    short = learn(task, "EC1", seed=0, trials=1, model=MotionModel(max_iterations=50))
+    assert short.status == "infeasible"
+    assert learn(task, "EC1", seed=0, trials=1).counters.corrective_iterations > 50
+
+
+def test_what_a_policy_spends_is_counted():
+    content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
+    run = learn(parse_task(content, "x"), "EC3", seed=0, trials=1)
+    search = run.initial_search
+    assert (search.hands, search.trials, search.failed_trials) == ("LRLR", 16, 0)
+    assert search.movement_ticks > 16 * 533
+    assert search.corrections == 64
+    assert learn(load_task("two-armed-1"), "EC3", seed=0, trials=1).initial_search.trials == 0
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        MotionModel(step=0.0),
+        MotionModel(step=-0.01),
+        MotionModel(step=float("nan")),
+        MotionModel(step=1e-20),
+        MotionModel(gain=0.0),
+        MotionModel(arrival_tolerance=-1.0),
+        MotionModel(correction_tolerance=0.2),
+        MotionModel(max_iterations=-1),
+    ],
+)
+def test_models_no_movement_can_be_made_with(model):
+    with pytest.raises(ValueError, match="model\\."):
+        learn(load_task("ascending"), "EC1", seed=0, trials=1, model=model)
+    with pytest.raises(ValueError, match="model\\."):
+        execute(load_task("ascending"), [], model=model)
 
 
 def test_same_seed_same_run_any_number_of_workers():
@@ -227,6 +317,8 @@ def test_failed_trials_are_recorded_and_teach_nothing():
     run = learn(task, condition, seed=0, trials=400)
     assert run.status == "ok"
     assert run.counters.failed_trials == (~run.completed).sum() > 50
+    assert run.rewards.max() == run.reward  # failed trials are masked
+    assert run.rewards.count() == 400 - run.counters.failed_trials
     assert np.isneginf(run.values[0, 2, 0])  # nothing learned of the left hand
     assert np.isfinite(run.values[0, 2, 1])
     assert_equals_reference(task, condition, trials=100)

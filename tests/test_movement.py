@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from coartic import PAPER, MotionModel, Robot, move, reference
 from coartic.compiled import entry, joint_chain
+from coartic.movement import _clear_steps, follow
 from coartic.robot import HANDS
 
 from .strategies import UNEVEN, configurations
@@ -223,6 +224,29 @@ def test_skips_most_steps():
     assert evaluations < ticks / 4
 
 
+def test_the_bound_keeps_its_promise():
+    """In the steps it clears, no motion within the bounds can close the gap."""
+    rng = np.random.default_rng(16)
+    for _ in range(5000):
+        gap, speed, bend = rng.uniform(0, 3), rng.uniform(0, 0.1), rng.uniform(0, 1e-3)
+        closing = rng.uniform(-1, 1) * speed
+        steps = _clear_steps(gap, closing, speed, bend)
+        assert min(speed * steps, closing * steps + bend * steps**2 / 2) < gap - 5e-10
+    for gap in (0.0, 1e-10, 1e-9):  # too near to call
+        assert _clear_steps(gap, 0.01, 0.01, 1e-3) == 0.0
+    assert _clear_steps(1.0, 0.0, 0.0, 0.0) == np.inf
+
+
+def test_equals_every_step_at_the_largest_figures():
+    rng = np.random.default_rng(17)
+    for _ in range(2000):
+        q = rng.uniform(-9e4, 9e4, 10)
+        target = q + rng.normal(size=10) * 0.2
+        point = q + rng.random() * (target - q)
+        goal = ROBOT.forward_kinematics(point, "left") + rng.normal(size=2) * 0.1
+        assert_equals_every_step(ROBOT, q, target, "left", goal, 0.1)
+
+
 def test_inputs_are_left_alone_and_checked():
     q, target = np.zeros(10), np.ones(10)
     move(ROBOT, q, target, "right", (1.0, 1.0), 0.1)
@@ -232,3 +256,36 @@ def test_inputs_are_left_alone_and_checked():
         move(ROBOT, np.zeros(3), target, "right", (1.0, 1.0), 0.1)
     with pytest.raises(ValueError, match="not finite"):
         move(ROBOT, q, np.full(10, np.nan), "right", (1.0, 1.0), 0.1)
+    with pytest.raises(ValueError, match="a figure beyond 100000"):
+        move(ROBOT, q, np.full(10, 1e17), "right", (1.0, 1.0), 0.1)
+    with pytest.raises(ValueError, match="goal \\(nan, 1.0\\) is not finite"):
+        move(ROBOT, q, target, "right", (np.nan, 1.0), 0.1)
+    with pytest.raises(ValueError, match="radius is nan"):
+        move(ROBOT, q, target, "right", (1.0, 1.0), np.nan)
+    with pytest.raises(ValueError, match="model.step is 0.0"):
+        move(ROBOT, q, target, "right", (1.0, 1.0), 0.1, model=MotionModel(step=0.0))
+
+
+def test_a_path_of_one_segment_is_a_movement_without_early_arrival():
+    rng = np.random.default_rng(18)
+    for _ in range(300):
+        q, target, goal = random_movement(rng, ROBOT, "right")
+        path = follow(ROBOT, q, target[None], "right", goal, 0.1)
+        line = move(ROBOT, q, target, "right", goal, 0.1, stop_on_arrival=False)
+        if not on_a_rim(ROBOT, q, target, "right", goal, 0.1):
+            assert (path.ticks, path.hit) == (line.ticks, line.hit)
+            np.testing.assert_allclose(path.q, line.q, atol=1e-12)
+
+
+def test_a_path_costs_its_length_however_finely_it_is_cut():
+    q, target = np.zeros(10), np.zeros(10)
+    target[0], target[3] = 1.0, 0.7
+    far = (90.0, 0.0)
+    ticks = {
+        follow(ROBOT, q, np.linspace(q, target, pieces + 1)[1:], "right", far, 0.1).ticks
+        for pieces in (1, 2, 10, 50)
+    }
+    assert ticks == {math.ceil(math.hypot(1.0, 0.7) / 0.01) + 1}
+    there_and_back = follow(ROBOT, q, np.stack([target, q, target]), "right", far, 0.1)
+    assert there_and_back.ticks == math.ceil(3 * math.hypot(1.0, 0.7) / 0.01) + 1
+    np.testing.assert_array_equal(there_and_back.q, target)

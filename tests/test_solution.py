@@ -110,6 +110,40 @@ def test_aiming_at_the_rim_stops_short_of_it():
     assert execute(task, planned(posture(1.0 - safe + 1e-9))).corrections == 0
 
 
+def test_paths():
+    """A path pays its steps and one tick; it may hit on the way; a miss is corrected."""
+    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
+    waypoints = np.linspace(posture(0.0), posture(1.0), 11)[1:]
+    path = Movement(1, "right", "path", waypoints=waypoints)
+    onward = Movement(2, "right", "path", waypoints=np.array([posture(2.0)]))
+    execution = execute(task, [path, onward])
+    assert execution.ticks_by_goal() == (91, 101)
+    assert execution.corrections == 0
+    np.testing.assert_array_equal(execution.movements[0].target, posture(1.0))
+    again = execute(task, execution.movements)
+    assert again.reward == execution.reward
+    short = Movement(1, "right", "path", waypoints=waypoints[:5])
+    assert execute(task, [short, onward]).corrections == 1
+    with pytest.raises(CoarticError, match="a path needs waypoints"):
+        execute(task, [Movement(1, "right", "path", np.array(posture(1.0))), onward])
+    with pytest.raises(CoarticError, match="is not finite"):
+        execute(task, [Movement(1, "right", "path", waypoints=waypoints * np.nan), onward])
+
+
+def test_via_points_end_with_the_hit():
+    """The first movement is always made; once the goal is hit, the rest is not."""
+    task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")
+    via = [*planned(posture(1.0)), Movement(1, "right", "planned", np.array(posture(3.0)))]
+    assert execute(task, via).ticks_by_goal() == (91,)
+
+
+def test_figures_that_no_movement_can_have():
+    """Once, 1e17 overflowed the tick count into a positive reward."""
+    task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")
+    with pytest.raises(CoarticError, match="a figure beyond 100000"):
+        execute(task, planned(posture(1e17)))
+
+
 def test_a_planned_movement_is_always_made():
     task = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
     assert execute(task, planned(posture(0.0))).reward == -1
