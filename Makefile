@@ -10,7 +10,7 @@ READY  := $(VENV)/.ready
 .PHONY: benchmark test check format speed setup clean
 
 benchmark: $(READY)
-	$(BIN)/coartic run paper --out $(OUT) --overwrite
+	$(BIN)/coartic run paper --out $(OUT)
 
 test: $(READY)
 	$(BIN)/python -m pytest

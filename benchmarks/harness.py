@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.executors import Answer, Executor
 from benchmarks.provenance import environment
 from benchmarks.specification import RunSpec
-from benchmarks.store import Damage, Store
+from benchmarks.store import Damage, Store, encode
 from coartic import CoarticError
 from coartic.method import Meter
 
@@ -32,7 +32,7 @@ class Progress:
     stale: list[str] = field(default_factory=list)
 
 
-Watcher = Callable[[Progress, dict[str, Any] | None], None]
+Watcher = Callable[[Progress, RunSpec | None], None]
 
 
 def perform_plan(
@@ -42,13 +42,14 @@ def perform_plan(
     *,
     retry_failed: bool = False,
     redo: bool = False,
-    watch: Watcher = lambda progress, record: None,
+    watch: Watcher = lambda progress, spec: None,
 ) -> Progress:
     """Perform every run that the store has no good record of.
 
     A record is good where its checksum fits. One that timed out under a shorter limit
     than now asked for is redone, and with ``retry_failed`` every timeout and crash is;
-    ``redo`` performs everything anew. ``watch`` is called after each record. Raises
+    ``redo`` performs everything anew. ``watch`` is called before the first run and after
+    each. Raises
     CoarticError where records cannot be written or runs keep getting lost.
     """
     by_id = {spec.run_id: spec for spec in specs}
@@ -70,12 +71,12 @@ def perform_plan(
             return progress
         before = len(missing)
         for answer in executor.perform([spec.job() for spec in missing.values()]):
-            record = _record(answer, missing[answer["run_id"]])
-            store.write(record)
-            del missing[answer["run_id"]]
+            spec = missing.pop(answer["run_id"])
+            status, text = _record(answer, spec)
+            store.write(spec.run_id, text)
             progress.done += 1
-            progress.failed += record["status"] != "ok"
-            watch(progress, record)
+            progress.failed += status != "ok"
+            watch(progress, spec)
         if missing and len(missing) == before:
             break
     if missing:
@@ -95,15 +96,14 @@ def _to_redo(record: dict[str, Any], spec: RunSpec, retry_failed: bool) -> bool:
     return record["status"] == "timeout" and had is not None and (has is None or has > had)
 
 
-def _record(answer: Answer, spec: RunSpec) -> dict[str, Any]:
-    """The record of an answer, also of one that says how the run failed."""
-    if "record" in answer:
-        record: dict[str, Any] = answer["record"]
-        return record
+def _record(answer: Answer, spec: RunSpec) -> tuple[str, str]:
+    """Status and record (as text) of an answer, also of one that says how the run failed."""
+    if "status" in answer:
+        return answer["status"], answer["record"]
     if answer["failure"] == "foreign":
         raise CoarticError(answer["reason"])
     job = spec.job()
-    return {
+    record = {
         "run_id": spec.run_id,
         "run": spec.run,
         "specification": job["specification"],
@@ -127,6 +127,7 @@ def _record(answer: Answer, spec: RunSpec) -> dict[str, Any]:
         },
         "environment": environment(),
     }
+    return answer["failure"], encode(record)
 
 
 def meter_of(record: dict[str, Any]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from benchmarks.store import Store
 from benchmarks.tables import TIMINGS
 
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
-SUITE = ("run", "quick", "--runs", "4", "--trials", "2000")
+SUITE = ("run", "quick", "--runs", "8", "--trials", "6000")
 
 
 def main() -> None:

@@ -12,8 +12,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import joblib
-
 import coartic
 from coartic.compiled import PACKAGE, source_fingerprint
 
@@ -35,6 +33,8 @@ _LIBRARIES = (
 
 def environment() -> dict[str, Any]:
     """Versions, platform, commit, date and command of this process."""
+    from joblib import cpu_count
+
     return {
         "coartic": coartic.__version__,
         "model_code": source_fingerprint(),
@@ -43,7 +43,7 @@ def environment() -> dict[str, Any]:
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
         "platform": platform.platform(),
         "processor": _processor(),
-        "cores": joblib.cpu_count(),
+        "cores": cpu_count(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
     }

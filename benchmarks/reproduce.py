@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -53,8 +54,8 @@ def perform_once(spec: RunSpec) -> dict[str, Any]:
         answer = supervise(spec.job())
     except SandboxError as error:
         raise CoarticError(str(error)) from None
-    if "record" in answer:
-        record: dict[str, Any] = answer["record"]
+    if "status" in answer:
+        record: dict[str, Any] = json.loads(answer["record"])
         return record
     raise CoarticError(f"{answer['failure']}: {answer['reason']}")
 

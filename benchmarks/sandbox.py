@@ -65,7 +65,7 @@ class Sandbox:
         return self._process.poll() is None
 
     def perform(self, job: dict[str, Any]) -> dict[str, Any]:
-        """One job: its record, or how it failed. The child is gone after a failure."""
+        """One job: status and record (as text), or how it failed, which ends the child."""
         assert self._process.stdin is not None
         clock = time.perf_counter()
         try:
@@ -89,7 +89,8 @@ class Sandbox:
             self.close()
             return {"failure": "crashed", "reason": reason, "wall_s": wall}
         answer: dict[str, Any] = json.loads(line)
-        return answer
+        record = self._read_line(_START_LIMIT_S)
+        return {**answer, "record": (record or b"").decode()}
 
     def close(self) -> None:
         """End the child at once."""

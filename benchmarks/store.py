@@ -60,16 +60,18 @@ class Store:
         """Where a run's record is kept."""
         return self.records / f"{run_id}.json"
 
-    def write(self, record: dict[str, Any]) -> None:
-        """Keep a record. Raises CoarticError where the disk does not take it."""
-        body = json.dumps(record, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-        data = body.encode()
+    def write(self, run_id: str, record: str) -> None:
+        """Keep a record, given as :func:`encode` makes it.
+
+        Raises CoarticError where the disk does not take it.
+        """
+        data = record.encode()
         head = f"{_PREFIX}{hashlib.sha256(data).hexdigest()}\n".encode()
         try:
-            write_atomically(self.path(record["run_id"]), head + data + b"\n")
+            write_atomically(self.path(run_id), head + data + b"\n")
         except OSError as error:
             raise CoarticError(
-                f"cannot write the record of run {record['run_id']}: {error.strerror or error}"
+                f"cannot write the record of run {run_id}: {error.strerror or error}"
             ) from None
 
     def read(self, run_id: str) -> dict[str, Any]:
@@ -112,6 +114,13 @@ class Store:
         )
 
 
+def encode(record: dict[str, Any]) -> str:
+    """A record as one line of JSON; what JSON has no word for becomes text."""
+    return json.dumps(
+        record, separators=(",", ":"), allow_nan=False, ensure_ascii=False, default=str
+    )
+
+
 def decode(data: bytes, path: Path) -> dict[str, Any]:
     """A record from its bytes. Raises RecordError where the checksum does not fit."""
     head, _, body = data.partition(b"\n")
@@ -125,7 +134,10 @@ def decode(data: bytes, path: Path) -> dict[str, Any]:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all, also after a power cut."""
+    """Write a file so that it is there whole or not at all, also after a power cut.
+
+    A power cut may undo the rename; then the old file, or none, is there.
+    """
     part = path.parent / f".{uuid.uuid4().hex}.part"
     try:
         with part.open("xb") as file:
@@ -136,8 +148,3 @@ def write_atomically(path: Path, data: bytes) -> None:
     except BaseException:
         part.unlink(missing_ok=True)
         raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)

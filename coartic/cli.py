@@ -8,7 +8,7 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import box
@@ -22,6 +22,7 @@ from coartic.compiled import PACKAGE
 
 if TYPE_CHECKING:
     from benchmarks.harness import Progress
+    from benchmarks.specification import RunSpec
 
 app = typer.Typer(
     add_completion=False,
@@ -400,10 +401,10 @@ class _Display:
         """Leave the terminal as it was."""
         self._bar.stop()
 
-    def update(self, progress: Progress, record: dict[str, Any] | None) -> None:
+    def update(self, progress: Progress, spec: RunSpec | None) -> None:
         """Show how far the plan is."""
         self.done = progress.done
-        if record is None:
+        if spec is None:
             for damage in progress.damaged:
                 self._line(f"{damage.reason}; this run is performed again")
             if progress.stale:
@@ -413,11 +414,11 @@ class _Display:
             if progress.present:
                 self._line(f"{progress.present} of {progress.total} runs are already there")
         if self._console.is_terminal:
-            self._live(progress, record)
+            self._live(progress, spec)
         else:
             self._plain(progress)
 
-    def _live(self, progress: Progress, record: dict[str, Any] | None) -> None:
+    def _live(self, progress: Progress, spec: RunSpec | None) -> None:
         if self._task is None:
             if progress.present == progress.total:
                 return
@@ -426,9 +427,8 @@ class _Display:
                 self._suite, total=progress.total - progress.present, failed=0
             )
         words = "starting workers (the first time compiles)"
-        if record is not None:
-            specification = record["specification"]
-            words = f"{specification['task']['name']} {specification['method']}"
+        if spec is not None:
+            words = f"{spec.task.name} {spec.method}"
         self._bar.update(
             self._task, completed=progress.done, failed=progress.failed, description=words
         )

@@ -83,6 +83,12 @@ def inner(function: F) -> F:
     return compiled
 
 
+def inlined(function: F) -> F:
+    """As :func:`inner`, for a part of one other function: passing whole tables would cost."""
+    compiled: F = njit(nogil=True, inline="always")(function)
+    return compiled
+
+
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep its machine code on disk."""
     folder = _cache_folder()

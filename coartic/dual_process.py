@@ -59,10 +59,7 @@ class DualProcess(Method):
         del search["hands"]
         session.spend(**search, jacobians=run.initial_search.corrective_iterations)
         session.meter.solve_s = run.wall_s
-        session.rewards.extend(
-            int(reward) if done else None
-            for reward, done in zip(run.rewards.data, run.completed, strict=True)
-        )
+        session.rewards.extend(run.rewards.tolist())  # None where a trial failed
         if run.best_trial is None:
             raise MethodError("infeasible", run.reason, _details(run))
         return Result(run.solution, _details(run))

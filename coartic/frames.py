@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from coartic.learner import LearningRun
 from coartic.solution import Movement
 from coartic.task import Task
+
+if TYPE_CHECKING:  # pandas is imported where a frame is made: workers make none
+    import pandas as pd
 
 
 def run_row(run: LearningRun) -> dict[str, Any]:
@@ -88,6 +90,8 @@ def movements_from(
 
 def runs_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
     """One row a run, in the order given; column ``run`` counts them from 0."""
+    import pandas as pd
+
     frame = pd.DataFrame([run_row(run) for run in runs])
     frame.insert(2, "run", range(len(frame)))
     integers = ["reward", "replay_reward", "initial_reward", "best_trial"]
@@ -96,6 +100,8 @@ def runs_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
 
 def solutions_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
     """One row a movement of each run's best trial."""
+    import pandas as pd
+
     return pd.DataFrame(
         [
             {"run": index, **row}
@@ -107,6 +113,8 @@ def solutions_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
 
 def learning_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
     """One row a trial of each run: its total reward, missing where the trial failed."""
+    import pandas as pd
+
     parts = [
         pd.DataFrame(
             {

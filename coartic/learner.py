@@ -22,10 +22,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from coartic.compiled import entry, inner, joint_chain
+from coartic.compiled import entry, inlined, inner, joint_chain
 from coartic.corrective import correct_kernel
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.exploration import ExplorationCondition, load_condition
@@ -96,12 +95,12 @@ class _Count(NamedTuple):
 _C = _Count()
 
 
-@inner
+@inlined
 def _arm(problem: Any, hand: int) -> Any:
     return problem.left if hand == 0 else problem.right
 
 
-@inner
+@inlined
 def _goal_distance(q: Any, goal: int, hand: int, problem: Any, counts: Any, scratch: Any) -> float:
     arm = _arm(problem, hand)
     joint_chain(q, arm, scratch.xs, scratch.ys)
@@ -148,7 +147,7 @@ def _explored_hand(
     return int(nearest)
 
 
-@inner
+@inlined
 def _record(log: Any, goal: int, hand: int, kind: int, ticks: int, target: Any) -> None:
     row = log.count[0]
     log.goal[row] = goal
@@ -159,7 +158,7 @@ def _record(log: Any, goal: int, hand: int, kind: int, ticks: int, target: Any) 
     log.count[0] = row + 1
 
 
-@inner
+@inlined
 def _set_target(
     target: Any, q: Any, stored: Any, hand: int, explore: bool, problem: Any, rng: Any
 ) -> None:
@@ -170,7 +169,7 @@ def _set_target(
             target[j] += problem.noise_sd * rng.standard_normal()
 
 
-@inner
+@inlined
 def _move(
     q: Any,
     target: Any,
@@ -200,7 +199,7 @@ def _move(
     return ticks, hit
 
 
-@inner
+@inlined
 def _correct(
     q: Any, target: Any, goal: int, hand: int, problem: Any, counts: Any, scratch: Any
 ) -> bool:
@@ -541,6 +540,8 @@ def learn_many(
     ``jobs`` threads work at once, -1 for one per core; the kernels hold no lock and
     the number changes nothing but the time. ``on_done`` is called after each run.
     """
+    from joblib import Parallel, delayed
+
     condition = load_condition(condition)
     ordered: Sequence[int] = list(seeds)
 

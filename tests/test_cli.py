@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.specification import run_seed
-from benchmarks.store import Store
+from benchmarks.store import Store, encode
 from coartic import __version__, cli
 
 from .test_task import BAD, GOOD
@@ -243,7 +243,7 @@ def test_show_and_reproduce(monkeypatch, capsys, tmp_path):
     record = store.read(second)
     record["score"]["reward"] += 1
     record["rewards"][3] -= 1
-    store.write(record)
+    store.write(second, encode(record))
     code, text, _ = call(monkeypatch, capsys, "reproduce", second, "--in", tmp_path)
     assert code == 1
     assert "different." in text

@@ -74,9 +74,9 @@ def test_results_equal_the_local_ones_though_a_worker_dies(tmp_path):
     seen = []
     with cluster(tmp_path) as (address, workers):
 
-        def watch(progress, record):
-            if record is not None:
-                seen.append(record["run_id"])
+        def watch(progress, spec):
+            if spec is not None:
+                seen.append(spec.run_id)
             if len(seen) == 5 and workers[0].poll() is None:
                 threading.Thread(target=kill, args=(workers[0],)).start()
 

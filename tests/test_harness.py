@@ -13,7 +13,7 @@ from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
 from benchmarks.methods import registry
 from benchmarks.specification import Limits, run_seed
-from benchmarks.store import Store
+from benchmarks.store import Store, encode
 from benchmarks.suites import (
     Cell,
     load_suite,
@@ -42,7 +42,9 @@ class InProcess:
 
     def perform(self, jobs):
         for job in jobs:
-            yield {"run_id": job["run_id"], "record": perform(json.loads(json.dumps(job)))}
+            record = perform(json.loads(json.dumps(job)))
+            answer = {"run_id": job["run_id"], "status": record["status"]}
+            yield {**answer, "record": encode(record)}
 
 
 def paper_cells(**selection):

@@ -148,3 +148,19 @@ def test_the_readme_shows_the_example_as_it_is():
     assert any(METHOD.read_text(encoding="utf-8").strip() in block for block in shown)
     task = (EXAMPLE / "shelf.toml").read_text(encoding="utf-8").split("\n[provenance]")[0].strip()
     assert any(task in re.sub(r"\n?# shelf.toml\n", "", block) for block in shown)
+
+
+def test_the_readme_suite_can_be_used(tmp_path):
+    from benchmarks.suites import load_suite, select_cells
+
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(# noise.toml.*?)```", readme, re.DOTALL)
+    path = tmp_path / "noise.toml"
+    path.write_text(block, encoding="utf-8")
+    cells = select_cells(load_suite(str(path)), registry())
+    assert [cell.variant for cell in cells[:3]] == [
+        "noise_sd=0.02",
+        "noise_sd=0.05",
+        "noise_sd=0.1",
+    ]
+    assert len(cells) == 6

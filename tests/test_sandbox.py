@@ -1,5 +1,6 @@
 """Time limits and dying workers, seen from outside the method."""
 
+import json
 import os
 import signal
 import subprocess
@@ -69,7 +70,7 @@ def test_one_sandbox_performs_many_jobs_and_says_warm(known):
     sandbox = Sandbox()
     try:
         records = [
-            sandbox.perform(spec.job())["record"]
+            json.loads(sandbox.perform(spec.job())["record"])
             for spec in spec_of(known, "dual-process/EC1", runs=3)
         ]
     finally:
