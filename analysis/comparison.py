@@ -139,8 +139,10 @@ def _cells_table(results: Results) -> Table:
                 _mean_sd(rewards),
                 _difference_text(rewards, paper.summary if paper else None),
                 _verdict(cell.task, rewards, paper.summary if paper and same_length else None),
-                f"{_distinct(cell.runs.initial_reward)} ({_initial_text(cell.task)})",
-                f"{_counts(good.hands)} ({_published_hands(paper)})",
+                _beside(_distinct(cell.runs.initial_reward), _initial_text(cell.task)),
+                _counts(good.hands)
+                if paper is None
+                else _beside(_counts(good.hands), _published_hands(paper)),
             )
         )
     columns = (
@@ -351,6 +353,11 @@ def _published_hands(paper: PublishedCell | None) -> str:
 
 def _counts(values: pd.Series) -> str:
     return ", ".join(f"{value} {count}" for value, count in values.value_counts().items()) or NONE
+
+
+def _beside(ours: str, published: str) -> str:
+    """Ours with the published in brackets, where there is ours to compare."""
+    return ours if NONE in (ours, published) else f"{ours} ({published})"
 
 
 def _initial_text(task: str) -> str:

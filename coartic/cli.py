@@ -30,7 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Comparative benchmark of coarticulation in motor skill acquisition.",
 )
-PLAIN_WIDTH = 170  # columns where the output is not a terminal
+PLAIN_WIDTH = 200  # columns where the output is not a terminal
 
 
 def main() -> None:
