@@ -28,8 +28,7 @@ class Correction(NamedTuple):
     """Descent steps, each with one Jacobian and one forward-kinematics evaluation."""
 
 
-@inner
-def correct_kernel(
+def _correct(
     q: Any,
     arm: Any,
     goal_x: float,
@@ -68,18 +67,8 @@ def correct_kernel(
     return False, model.max_iterations
 
 
-@entry
-def _correct(
-    q: Any,
-    arm: Any,
-    goal_x: float,
-    goal_y: float,
-    free_x: bool,
-    free_y: bool,
-    model: Any,
-    scratch: Any,
-) -> tuple[bool, int]:
-    return correct_kernel(q, arm, goal_x, goal_y, free_x, free_y, model, scratch)
+correct_kernel = inner(_correct)
+_compiled_correct = entry(_correct)
 
 
 def correct(
@@ -101,7 +90,7 @@ def correct(
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     position = configuration(robot, q)
-    converged, iterations = _correct(
+    converged, iterations = _compiled_correct(
         position,
         robot.arm(hand),
         *goal_centre(goal),

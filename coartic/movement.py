@@ -85,8 +85,7 @@ def _clear_steps(gap: float, closing: float, speed: float, bend: float) -> float
     return steps * (1.0 - 1e-9)
 
 
-@inner
-def move_kernel(
+def _move(
     q: Any,
     target: Any,
     arm: Any,
@@ -175,19 +174,8 @@ def move_kernel(
         k += 1 + int(min(clear, float(last)))
 
 
-@entry
-def _move(
-    q: Any,
-    target: Any,
-    arm: Any,
-    goal_x: float,
-    goal_y: float,
-    radius: float,
-    stop_on_arrival: bool,
-    model: Any,
-    scratch: Any,
-) -> tuple[int, bool, int]:
-    return move_kernel(q, target, arm, goal_x, goal_y, radius, stop_on_arrival, model, scratch)
+move_kernel = inner(_move)
+_compiled_move = entry(_move)
 
 
 def move(
@@ -211,7 +199,7 @@ def move(
     """
     position = configuration(robot, q)
     end = configuration(robot, target)
-    ticks, hit, evaluations = _move(
+    ticks, hit, evaluations = _compiled_move(
         position,
         end,
         robot.arm(hand),
