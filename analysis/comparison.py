@@ -125,12 +125,12 @@ def compare(results: Results) -> Comparison:
 
 
 def _cells_table(results: Results) -> Table:
-    same_length = results.manifest["specification"]["trials"] in (0, TRIALS)
     tasks = results.tasks
     rows = []
     for cell in results.cells:
         paper, good = _published(cell), cell.good
         rewards = good.reward.to_numpy(dtype=np.float64)
+        same_length = bool((good.trials == TRIALS).all())
         rows.append(
             (
                 f"{cell.task} †" if tasks[cell.task].reconstructed else cell.task,
@@ -257,10 +257,16 @@ def _notes(results: Results) -> list[str]:
             f"The runs were made at {commits} commits; the code behind each method's results "
             "is the same in all of them."
         )
-    if specification["trials"] not in (0, TRIALS):
+    if any(_published(cell) and (cell.good.trials != TRIALS).any() for cell in results.cells):
         notes.append(
-            f"The published runs have {TRIALS} trials, these {specification['trials']}: learned "
-            "rewards are not comparable, so no verdict is given."
+            f"The published runs have {TRIALS} trials; learned rewards of runs with another "
+            "number are not comparable, so those get no verdict."
+        )
+    libraries = len(results.runs["packages"].unique())
+    if libraries > 1:
+        notes.append(
+            f"The runs were made with {libraries} different sets of "
+            "library versions (column packages of runs.parquet)."
         )
     commit = environment["commit"]
     version = f"coartic {environment['coartic']}"

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import itertools
 
-from coartic import Execution, Movement, Task, initial_hands
-from coartic.initial import changes_of_hand, too_many_sequences
+from coartic import Execution, Movement, Task
+from coartic.dual_process import spend_search
+from coartic.initial import changes_of_hand, search_initial_hands, too_many_sequences
 from coartic.method import Information, Method, MethodError, Result, Session
 from coartic.robot import Hand
 from coartic.task import hands_of
@@ -30,13 +31,18 @@ class GivenHands(Method):
     name = "corrective-alone/given"
     title = "Corrective process alone, the task's hands"
     citation = CITATION
-    told = frozenset({Information.CORRECTIVE_PROCESS})
+    told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """One movement per goal, its target found by **A** when the time comes."""
+        """One trial, the targets found by **A** as it goes."""
         task = session.hand_over(Information.CORRECTIVE_PROCESS)
-        return Result(_corrective(hands_of(initial_hands(task))))
+        search = search_initial_hands(task)
+        spend_search(session, search)
+        execution = session.trial(_corrective(hands_of(search.hands)))
+        if not execution.completed:
+            raise MethodError("infeasible", execution.reason)
+        return Result(execution.movements)
 
 
 class EverySequence(Method):
@@ -54,7 +60,6 @@ class EverySequence(Method):
 
     def solve(self, session: Session) -> Result:
         """One trial per sequence; of equal ones the one with the fewest changes of hand."""
-        session.hand_over(Information.CORRECTIVE_PROCESS)  # **A** acts in the trials
         found: list[tuple[int, int, Execution]] = []
         ordered: list[Hand] = sorted(session.hands)
         for hands in itertools.product(ordered, repeat=session.goals_count):

@@ -7,10 +7,11 @@ worker dies, the pool breaks): the harness asks again for what is missing.
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-from benchmarks.sandbox import SandboxError, supervise, supervise_locally
+from benchmarks.sandbox import SandboxError, die_with_parent, supervise
 from coartic import CoarticError
 
 Job = dict[str, Any]
@@ -39,9 +40,16 @@ class Local:
 
         workers = min(effective_n_jobs(self.jobs), len(jobs))
         try:
-            with parallel_config(backend="loky", n_jobs=workers, inner_max_num_threads=1):
+            # The initializer runs before any job: no worker outlives a suite killed early.
+            with parallel_config(
+                backend="loky",
+                n_jobs=workers,
+                inner_max_num_threads=1,
+                initializer=die_with_parent,
+                initargs=(os.getpid(),),
+            ):
                 yield from Parallel(return_as="generator_unordered", batch_size=1)(
-                    delayed(supervise_locally)(job) for job in jobs
+                    delayed(supervise)(job) for job in jobs
                 )
         except BrokenProcessPool:
             return
@@ -74,6 +82,7 @@ class Dask:
                 client.submit(supervise, job, pure=False, retries=2): job["run_id"] for job in jobs
             }
             cleanup.callback(client.cancel, list(futures))
+            cleanup.enter_context(_lost_scheduler(self.address))
             for future in as_completed(list(futures)):  # type: ignore[no-untyped-call]
                 error = future.exception()
                 if isinstance(error, KilledWorker):
@@ -90,3 +99,19 @@ class Dask:
                     raise error
                 else:
                     yield future.result()
+
+
+@contextlib.contextmanager
+def _lost_scheduler(address: str) -> Iterator[None]:
+    """One sentence for all the ways in which a scheduler that goes away shows."""
+    from concurrent.futures import CancelledError
+
+    from distributed.comm.core import CommClosedError
+
+    try:
+        yield
+    except (CancelledError, CommClosedError, OSError) as error:
+        raise CoarticError(
+            f"lost the Dask scheduler at {address} ({type(error).__name__}); what is done is "
+            "kept, and the same command goes on from there"
+        ) from None

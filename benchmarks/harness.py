@@ -13,7 +13,7 @@ from benchmarks.store import Damage, Store, encode
 from coartic import CoarticError
 from coartic.method import Meter
 
-_ROUNDS = 5  # times that lost runs are asked for again
+_ROUNDS = 3  # in a row without a single answer, after which runs are given up
 RETRIED = frozenset({"timeout", "crashed"})
 
 
@@ -52,33 +52,46 @@ def perform_plan(
     each. Raises
     CoarticError where records cannot be written or runs keep getting lost.
     """
+    store.open()
+    try:
+        return _perform(specs, store, executor, retry_failed, redo, watch)
+    finally:
+        store.close()
+
+
+def _perform(
+    specs: Sequence[RunSpec],
+    store: Store,
+    executor: Executor,
+    retry_failed: bool,
+    redo: bool,
+    watch: Watcher,
+) -> Progress:
     by_id = {spec.run_id: spec for spec in specs}
     progress = Progress(total=len(by_id))
-    store.open()
     progress.stale = store.stale(list(by_id))
     missing = dict(by_id)
     if not redo:
         for record in store.read_known(list(by_id)):
             if isinstance(record, Damage):
                 progress.damaged.append(record)
+                store.set_aside(record.path)
             elif not _to_redo(record, by_id[record["run_id"]], retry_failed):
                 del missing[record["run_id"]]
                 progress.present += 1
                 progress.failed += record["status"] != "ok"
     watch(progress, None)
-    for _ in range(_ROUNDS):
-        if not missing:
-            return progress
-        before = len(missing)
+    idle = 0
+    while missing and idle < _ROUNDS:
+        idle += 1
         for answer in executor.perform([spec.job() for spec in missing.values()]):
             spec = missing.pop(answer["run_id"])
-            status, text = _record(answer, spec)
+            status, text = record_of(answer, spec)
             store.write(spec.run_id, text)
             progress.done += 1
             progress.failed += status != "ok"
+            idle = 0
             watch(progress, spec)
-        if missing and len(missing) == before:
-            break
     if missing:
         raise CoarticError(
             f"{len(missing)} runs were lost again and again (workers die before they answer); "
@@ -96,7 +109,7 @@ def _to_redo(record: dict[str, Any], spec: RunSpec, retry_failed: bool) -> bool:
     return record["status"] == "timeout" and had is not None and (has is None or has > had)
 
 
-def _record(answer: Answer, spec: RunSpec) -> tuple[str, str]:
+def record_of(answer: Answer, spec: RunSpec) -> tuple[str, str]:
     """Status and record (as text) of an answer, also of one that says how the run failed."""
     if "status" in answer:
         return answer["status"], answer["record"]
@@ -125,6 +138,7 @@ def _record(answer: Answer, spec: RunSpec) -> tuple[str, str]:
             "process_peak_mb": None,
             "time_limit_s": spec.limits.time_s,
         },
+        "origin": spec.entry.origin,
         "environment": environment(),
     }
     return answer["failure"], encode(record)

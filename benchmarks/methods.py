@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import difflib
 import hashlib
+import importlib.util
 import inspect
 import sys
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -18,12 +20,14 @@ from typing import Any
 from pydantic import ValidationError
 
 import baselines.corrective_alone
-from coartic import CoarticError
-from coartic.compiled import model_source
+from coartic import CoarticError, Task
+from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
 from coartic.method import Method
 
 ENTRY_POINTS = "coartic.methods"
+BUILT_IN_ORIGIN = "built in"
+_PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
 BUILT_IN: tuple[type[Method], ...] = (*DUAL_PROCESS, *baselines.corrective_alone.METHODS)
 
 
@@ -62,8 +66,8 @@ Registry = Mapping[str, Entry]
 def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     """Every known method by id.
 
-    Raises MethodFileError for a file or plug-in that cannot be loaded, holds no method,
-    or takes an id that is already there.
+    A plug-in that cannot be loaded is a warning. Raises MethodFileError for a file that
+    cannot be loaded, holds no method, or takes an id that is already there.
     """
     found: dict[str, Entry] = {}
 
@@ -76,21 +80,22 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
         found[name] = entry
 
     for method in BUILT_IN:
-        add(method, Entry(method, "built in", code_hash(_module_source(method))))
+        add(method, Entry(method, BUILT_IN_ORIGIN, code_hash(_package_source(method))))
     for point in metadata.entry_points(group=ENTRY_POINTS):
         origin = f"plug-in {point.dist.name if point.dist else point.value}"
-        try:
-            target = point.load()
+        try:  # a broken plug-in must not take the others with it
+            for method in _methods_of(point.load(), origin):
+                add(method, Entry(method, origin, code_hash(_package_source(method))))
         except Exception as error:
-            raise MethodFileError(
-                f"{origin}: entry point {point.name!r} cannot be loaded: {_brief(error)}"
-            ) from None
-        for method in _methods_of(target, origin):
-            add(method, Entry(method, origin, code_hash(_module_source(method))))
+            warnings.warn(
+                f"{origin}: entry point {point.name!r} cannot be used: {_brief(error)}",
+                stacklevel=2,
+            )
     for path in method_files:
         plugin = read_plugin(path)
         for method in plugin_methods(plugin):
-            add(method, Entry(method, str(path), code_hash(plugin.source), plugin))
+            code = code_hash(file_source(plugin.source))
+            add(method, Entry(method, str(path), code, plugin))
     return found
 
 
@@ -166,6 +171,21 @@ def build(entry: Entry, parameters: Mapping[str, Any]) -> Method:
         ) from None
 
 
+def why_not(entry: Entry, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
+    """Why a method with parameters does not apply to a task; None where it does.
+
+    Raises CoarticError for wrong parameters and for a method that fails to say.
+    """
+    method = build(entry, parameters or {})
+    try:
+        return method.why_not(task)
+    except Exception as error:
+        raise MethodFileError(
+            f"method {entry.method.name!r} cannot say whether it applies to task "
+            f"{task.name!r}: {_brief(error)}"
+        ) from None
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     """An error for a name that is not among the known ones, with the nearest of them."""
     names = list(known)
@@ -174,33 +194,82 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     return CoarticError(f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}.")
 
 
-def _module_source(method: type[Method]) -> str:
-    """Source of a method's module and of what it imports from its own package."""
-    package = method.__module__.partition(".")[0]
+def _package_source(method: type[Method]) -> str:
+    """Every source of the package (or the module) that an installed method comes from.
+
+    For a method of this project: its own module and those of ``baselines`` it imports.
+    """
+    root = method.__module__.partition(".")[0]
+    if root == "coartic":
+        return ""  # part of the model's code anyway
+    if root == "baselines":
+        return _own_source(method.__module__)
+    module = sys.modules[root]
+    paths = [Path(folder) for folder in getattr(module, "__path__", [])]
+    files = [path for folder in paths for path in sorted(folder.rglob("*.py"))]
+    if not files and module.__file__:
+        files = [Path(module.__file__)]
+    return _joined(files)
+
+
+def _own_source(name: str) -> str:
     sources: dict[str, str] = {}
-    waiting = [method.__module__]
+    waiting = [name]
     while waiting:
         name = waiting.pop()
         module = sys.modules.get(name)
-        if name in sources or module is None or name.partition(".")[0] != package:
+        if name in sources or module is None or name.partition(".")[0] != "baselines":
             continue
-        try:
-            sources[name] = inspect.getsource(module)
-        except (OSError, TypeError):
+        sources[name] = inspect.getsource(module)
+        waiting += _imported(sources[name])
+    return "".join(f"{name}\n{sources[name]}" for name in sorted(sources))
+
+
+def file_source(source: str) -> str:
+    """Source of a method file with the local modules it imports: all but installed ones."""
+    local: dict[str, Path] = {}
+    waiting = _imported(source)
+    while waiting:
+        root = waiting.pop().partition(".")[0]
+        if root in local or root in sys.stdlib_module_names or root in _PACKAGES:
             continue
-        for node in ast.walk(ast.parse(sources[name])):
-            if isinstance(node, ast.Import):
-                waiting += [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                waiting += [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
-    return "".join(f"{name}\n{sources[name]}" for name in sorted(sources) if package != "coartic")
+        spec = importlib.util.find_spec(root)
+        if spec is None or spec.origin is None or "site-packages" in spec.origin:
+            continue
+        local[root] = Path(spec.origin)
+        waiting += _imported(local[root].read_text(encoding="utf-8"))
+    files = []
+    for path in local.values():
+        files += sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
+    return source + _joined(files)
+
+
+def _imported(source: str) -> list[str]:
+    names: list[str] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return names
+
+
+def _joined(files: list[Path]) -> str:
+    return "".join(f"{path.name}\n{path.read_text(encoding='utf-8')}" for path in files)
 
 
 def code_hash(source: str) -> str:
-    """Hash of the model's code and one method's source: what its results come from."""
+    """Hash of the code one method's results come from: the model, scoring, the method."""
     digest = hashlib.sha256(model_source())
+    for path in (PACKAGE / "frames.py", Path(__file__).with_name("worker.py")):
+        digest.update(_on_import(path))
     digest.update(source.encode())
     return digest.hexdigest()[:12]
+
+
+@cache
+def _on_import(path: Path) -> bytes:
+    return path.read_bytes()
 
 
 def _brief(error: BaseException) -> str:

@@ -17,6 +17,8 @@ from coartic.compiled import PACKAGE, source_fingerprint
 
 _LIBRARIES = (
     "casadi",
+    "dask",
+    "distributed",
     "joblib",
     "llvmlite",
     "matplotlib",

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness import meter_of
+from benchmarks.harness import meter_of, record_of
 from benchmarks.methods import Registry, unknown
 from benchmarks.sandbox import SandboxError, supervise
 from benchmarks.specification import Limits, RunSpec
@@ -49,15 +50,22 @@ def spec_of(record: dict[str, Any], known: Registry, limits: Limits) -> RunSpec:
 
 
 def perform_once(spec: RunSpec) -> dict[str, Any]:
-    """One run in a process of its own. Raises CoarticError where it leaves no record."""
+    """The record of one run, performed in a process of its own."""
     try:
-        answer = supervise(spec.job())
+        _, record = record_of(supervise(spec.job()), spec)
     except SandboxError as error:
         raise CoarticError(str(error)) from None
-    if "status" in answer:
-        record: dict[str, Any] = json.loads(answer["record"])
-        return record
-    raise CoarticError(f"{answer['failure']}: {answer['reason']}")
+    performed: dict[str, Any] = json.loads(record)
+    return performed
+
+
+def command_for(record: dict[str, Any], folder: Path) -> str:
+    """The command that performs the run of a record again."""
+    command = f"coartic reproduce {record['run_id']} --in {shlex.quote(str(folder))}"
+    origin = record["origin"]
+    if origin.endswith(".py"):
+        command += f" --method-file {shlex.quote(origin)}"
+    return command
 
 
 def differences(a: dict[str, Any], b: dict[str, Any]) -> list[str]:

@@ -1,8 +1,9 @@
-"""A process of its own for every run, and the clock outside it.
+"""Processes that runs are performed in, and the clock outside them.
 
-:func:`supervise` performs one job in a child process that lives on from job to job. The
-child speaks JSON lines over pipes. Where a job exceeds its time limit, or the child dies,
-the child is killed and the outcome is data. Standard library only: workers of any
+:func:`supervise` performs one job in a child process that lives on from job to job, until
+one of them times out or ends it. The child speaks JSON lines over pipes. Where a job exceeds its time limit, or the child dies,
+the child is killed and the outcome is data; a run whose child was killed by a signal is
+tried again in a fresh one first. Standard library only: workers of any
 executor import this module, and must do so fast.
 """
 
@@ -11,7 +12,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import json
-import multiprocessing
 import os
 import selectors
 import signal
@@ -33,6 +33,8 @@ THREADS = dict.fromkeys(
     ),
     "1",
 )
+_END_LIMIT_S = 5.0
+_RETRIES = 2  # fresh processes for a run whose process was killed
 _START_LIMIT_S = 300.0  # imports and a cold compilation, on a slow machine
 
 
@@ -46,7 +48,7 @@ class Sandbox:
     def __init__(self) -> None:
         self._messages: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.worker"],
+            [sys.executable, "-m", "benchmarks.worker", str(os.getpid())],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._messages,
@@ -54,6 +56,7 @@ class Sandbox:
             start_new_session=True,  # Ctrl-C is for the parent
         )
         self._buffer = b""
+        self._said_before = 0
         ready = self._read_line(_START_LIMIT_S)
         if ready != b"ready":
             self.close()
@@ -67,6 +70,7 @@ class Sandbox:
     def perform(self, job: dict[str, Any]) -> dict[str, Any]:
         """One job: status and record (as text), or how it failed, which ends the child."""
         assert self._process.stdin is not None
+        self._said_before = os.fstat(self._messages.fileno()).st_size
         clock = time.perf_counter()
         try:
             self._process.stdin.write(json.dumps(job).encode() + b"\n")
@@ -83,14 +87,20 @@ class Sandbox:
             reason = f"time limit of {job['time_limit_s']:g} s exceeded"
             return {"failure": "timeout", "reason": reason, "wall_s": wall}
         if not line:
-            code = self._process.wait()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_END_LIMIT_S)  # it closed its output: it is ending
+            code = self._process.poll() or 0
             how = f"killed by {_signal_name(-code)}" if code < 0 else f"exit code {code}"
             reason = f"the worker process ended ({how}): {self._last_words()}"
             self.close()
             return {"failure": "crashed", "reason": reason, "wall_s": wall}
         answer: dict[str, Any] = json.loads(line)
         record = self._read_line(_START_LIMIT_S)
-        return {**answer, "record": (record or b"").decode()}
+        if not record:
+            self.close()
+            reason = "the worker process ended before it had handed over its record"
+            return {"failure": "crashed", "reason": reason, "wall_s": wall}
+        return {**answer, "record": record.decode()}
 
     def close(self) -> None:
         """End the child at once."""
@@ -120,7 +130,7 @@ class Sandbox:
         return line
 
     def _last_words(self) -> str:
-        self._messages.seek(0)
+        self._messages.seek(self._said_before)  # the child is gone: the offset is ours
         lines = self._messages.read().decode(errors="replace").strip().splitlines()
         return " | ".join(lines[-3:]) or "it left no message"
 
@@ -134,25 +144,24 @@ def supervise(job: dict[str, Any]) -> dict[str, Any]:
     """Perform one job in this thread's sandbox."""
     sandbox: Sandbox | None = getattr(_local, "sandbox", None)
     if sandbox is None or not sandbox.alive:
-        sandbox = Sandbox()
-        _local.sandbox = sandbox
-        with _lock:
-            _all.append(sandbox)
+        if sandbox is not None:
+            sandbox.close()
+        sandbox = _new_sandbox()
     answer = sandbox.perform(job)
+    for _ in range(_RETRIES):
+        if "killed by" not in answer.get("reason", "") or "failure" not in answer:
+            break
+        # From outside (out of memory, an operator), or by its own fault: tried again.
+        answer = _new_sandbox().perform(job)
     return {"run_id": job["run_id"], **answer}
 
 
-_bound_to_parent = False
-
-
-def supervise_locally(job: dict[str, Any]) -> dict[str, Any]:
-    """:func:`supervise` in a worker that must not outlive the suite it works for."""
-    global _bound_to_parent
-    if not _bound_to_parent and threading.current_thread() is threading.main_thread():
-        _bound_to_parent = True
-        if multiprocessing.parent_process() is not None:  # not in the suite's own process
-            die_with_parent()
-    return supervise(job)
+def _new_sandbox() -> Sandbox:
+    _local.sandbox = sandbox = Sandbox()
+    with _lock:
+        _all[:] = [other for other in _all if other.alive]
+        _all.append(sandbox)
+    return sandbox
 
 
 @atexit.register
@@ -162,13 +171,12 @@ def _close_all() -> None:
             sandbox.close()
 
 
-def die_with_parent() -> None:
-    """Have the kernel end this process when its parent ends (Linux)."""
+def die_with_parent(parent: int) -> None:
+    """Have the kernel end this process when its parent (a process id) ends (Linux)."""
     if sys.platform != "linux":
         return
     import ctypes
 
-    parent = os.getppid()
     set_death_signal = 1  # PR_SET_PDEATHSIG
     ctypes.CDLL(None, use_errno=True).prctl(set_death_signal, signal.SIGKILL)
     if os.getppid() != parent:  # it ended before we asked

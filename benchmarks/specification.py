@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -92,6 +94,9 @@ class RunSpec:
             "code": self.entry.code,
             "time_limit_s": self.limits.time_s,
             "plugin": None if plugin is None else [plugin.filename, plugin.source],
+            "origin": self.entry.origin,
+            "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+            "reach": True,
         }
 
 

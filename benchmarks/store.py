@@ -7,6 +7,7 @@ is there whole or not at all. Nothing in a results folder is ever unpickled.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
@@ -14,11 +15,19 @@ import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from coartic import CoarticError
 
 _PREFIX = "sha256:"
+KEYS = frozenset(
+    (
+        *("run_id", "run", "specification", "code", "status", "reason", "score", "solution"),
+        *("told", "secondary", "used", "meter", "details", "rewards", "timing", "origin"),
+        "environment",
+    )
+)
+"""What every record holds."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +48,47 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.records = folder / "records"
+        self._lock: IO[bytes] | None = None
 
     def open(self) -> None:
-        """Make the folder and clear what an interrupted writer left behind.
+        """Make the folder, lock it against other writers until this process ends, and
+        clear what an interrupted one left behind.
 
-        Raises CoarticError where it cannot be written.
+        Raises CoarticError where it cannot be written or another suite is at work.
         """
         probe = self.records / f".{uuid.uuid4().hex}.part"
         try:
             self.records.mkdir(parents=True, exist_ok=True)
             probe.touch()
+            self._lock = (self.records / ".lock").open("wb")
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                probe.unlink()
+                self.close()
+                raise CoarticError(
+                    f"another suite is at work in {self.folder}; wait for it, or choose "
+                    "another --out"
+                ) from None
             for path in self.records.glob(".*.part"):
                 path.unlink(missing_ok=True)
         except OSError as error:
             raise CoarticError(
                 f"cannot write to {self.folder}: {error.strerror or error}"
             ) from None
+
+    def close(self) -> None:
+        """Let other writers in."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def set_aside(self, path: Path) -> None:
+        """Move something that is no good record out of the way, keeping it."""
+        try:
+            path.rename(path.with_name(f"damaged-{uuid.uuid4().hex[:8]}-{path.name}.txt"))
+        except OSError as error:
+            raise CoarticError(f"{path}: cannot be moved: {error.strerror or error}") from None
 
     def path(self, run_id: str) -> Path:
         """Where a run's record is kept."""
@@ -78,12 +112,17 @@ class Store:
         """A record, checked against its checksum. Raises RecordError otherwise."""
         path = self.path(run_id)
         try:
+            if path.exists() and not path.is_file():
+                raise RecordError(f"{path}: is not a file")
             data = path.read_bytes()
         except FileNotFoundError:
             raise RecordError(f"no record of run {run_id} in {self.folder}") from None
         except OSError as error:
             raise RecordError(f"{path}: cannot be read: {error.strerror or error}") from None
-        return decode(data, path)
+        record = decode(data, path)
+        if record["run_id"] != run_id:
+            raise RecordError(f"{path}: holds the record of run {record['run_id']}")
+        return record
 
     def ids(self) -> set[str]:
         """Ids of all records, whole or damaged."""
@@ -96,14 +135,9 @@ class Store:
             if run_id not in present:
                 continue
             try:
-                record = self.read(run_id)
+                yield self.read(run_id)
             except RecordError as error:
                 yield Damage(self.path(run_id), str(error))
-                continue
-            if record["run_id"] != run_id:
-                yield Damage(self.path(run_id), f"holds the record of run {record['run_id']}")
-            else:
-                yield record
 
     def stale(self, run_ids: list[str]) -> list[str]:
         """Records of the same specifications made by other code."""
@@ -129,8 +163,15 @@ def decode(data: bytes, path: Path) -> dict[str, Any]:
         raise RecordError(f"{path}: is not a run record")
     if head.decode(errors="replace") != f"{_PREFIX}{hashlib.sha256(body).hexdigest()}":
         raise RecordError(f"{path}: is damaged: its checksum does not fit")
-    record: dict[str, Any] = json.loads(body)
-    return record
+    try:
+        record = json.loads(body)
+        missing = KEYS - record.keys()
+    except (ValueError, AttributeError):
+        raise RecordError(f"{path}: is damaged: no record behind its checksum") from None
+    if missing:
+        raise RecordError(f"{path}: is damaged: {', '.join(sorted(missing))} missing")
+    found: dict[str, Any] = record
+    return found
 
 
 def write_atomically(path: Path, data: bytes) -> None:

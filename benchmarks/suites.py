@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from benchmarks.methods import Entry, Registry, build, unknown
+from benchmarks.methods import Entry, Registry, build, unknown, why_not
 from benchmarks.specification import UNLIMITED, Limits, RunSpec, run_seed
 from coartic import CONDITIONS, CoarticError, Task, builtin_tasks, load_task
 from coartic.learner import METHOD_PREFIX
@@ -40,11 +40,11 @@ class Suite(BaseModel):
     name: str
     title: str
     description: str
-    runs: Annotated[int, Field(gt=0)]
+    runs: Annotated[int, Field(gt=0, strict=True)]
     """Runs per cell of a stochastic method; the others are run once."""
-    trials: Annotated[int, Field(gt=0)] | None = None
+    trials: Annotated[int, Field(gt=0, strict=True)] | None = None
     """Trials per run, for methods that have this parameter."""
-    time_limit_s: Annotated[float, Field(gt=0)] | None = 600.0
+    time_limit_s: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = 600.0
     cells: Annotated[tuple[_Block, ...], Field(min_length=1)]
 
 
@@ -55,8 +55,16 @@ class Cell:
     task: Task
     entry: Entry
     parameters: tuple[tuple[str, Scalar], ...] = ()
-    variant: str = ""
-    """The grid's parameters in words, such as ``noise_sd=0.1``; empty without a grid."""
+
+    @property
+    def variant(self) -> str:
+        """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
+        fields = self.entry.method.Parameters.model_fields
+        return ", ".join(
+            f"{name}={value}"
+            for name, value in self.parameters
+            if name not in fields or value != fields[name].default
+        )
 
     @property
     def method(self) -> str:
@@ -132,7 +140,7 @@ def select_cells(
 
     def add(task: Task, names: Iterable[str]) -> None:
         for name in names:
-            reason = _why_not(known[name], task)
+            reason = why_not(known[name], task)
             if reason is None:
                 cells.append(Cell(task, known[name]))
             else:
@@ -155,9 +163,12 @@ def select_cells(
     for name in tasks:
         if name not in known_tasks:
             raise unknown("task", name, known_tasks)
+    distinct: dict[tuple[str, str], Cell] = {}
+    for cell in cells:
+        distinct.setdefault((cell.task.name, cell.label), cell)
     chosen = [
         cell
-        for cell in cells
+        for cell in distinct.values()
         if (not tasks or cell.task.name in tasks) and (not methods or cell.method in methods)
     ]
     # A user's own task that nothing applies to is an error, not a silent gap.
@@ -212,7 +223,7 @@ def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
     for task_name in tasks:
         task = load_task(task_name)
         for name in known if every else block.methods:
-            reason = _why_not(known[name], task)
+            reason = why_not(known[name], task, block.parameters)
             if reason is not None:
                 if every or ALL in block.tasks:
                     continue  # "all that applies"
@@ -220,15 +231,10 @@ def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
             for combination in itertools.product(*block.grid.values()):
                 point = dict(zip(block.grid, combination, strict=True))
                 parameters = {**block.parameters, **point}
-                variant = ", ".join(f"{key}={value}" for key, value in point.items())
-                cell = Cell(task, known[name], tuple(parameters.items()), variant)
+                cell = Cell(task, known[name], tuple(parameters.items()))
                 build(cell.entry, parameters)
                 cells.append(cell)
     return cells
-
-
-def _why_not(entry: Entry, task: Task) -> str | None:
-    return entry.method().why_not(task)
 
 
 def plan_specification(

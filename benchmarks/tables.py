@@ -20,10 +20,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from benchmarks.harness import meter_of
+from benchmarks.specification import content_hash
 from benchmarks.store import write_atomically
 from benchmarks.suites import Cell
 from coartic import CoarticError, NotApplicableError, Task, hand_sequences
 from coartic.initial import ranked_sequences
+from coartic.learner import METHOD_PREFIX
 from coartic.method import Meter
 
 FORMAT = 2  # of the tables below; raised when a column changes its meaning
@@ -34,7 +36,7 @@ RUNS = pa.schema(
         ("suite", pa.string()),
         ("task", pa.string()),
         ("method", pa.string()),
-        ("variant", pa.string()),  # the grid's parameters in words; empty without a grid
+        ("variant", pa.string()),  # parameters that differ from the method's defaults
         ("run", pa.int32()),  # 0-based
         ("seed", pa.int64()),
         ("status", pa.string()),  # ok, infeasible, solver-failed, timeout, crashed
@@ -58,9 +60,19 @@ RUNS = pa.schema(
         ("process_peak_mb", pa.float64()),  # of the worker so far, all its runs included
         ("commit", pa.string()),
         ("code", pa.string()),  # hash of the code that produced the result
+        ("packages", pa.string()),  # hash of Python's and all libraries' versions
     ]
 )
-TIMINGS = ("build_s", "solve_s", "wall_s", "cpu_s", "warm", "process_peak_mb", "commit")
+TIMINGS = (
+    "build_s",
+    "solve_s",
+    "wall_s",
+    "cpu_s",
+    "warm",
+    "process_peak_mb",
+    "commit",
+    "packages",
+)
 """Columns of ``runs.parquet`` that may differ between two runs of one specification."""
 
 SOLUTIONS = pa.schema(
@@ -128,7 +140,7 @@ def _run_row(suite: str, cell: Cell, record: dict[str, Any]) -> dict[str, Any]:
     commit = record["environment"]["commit"]
     timing = record["timing"]
     return {
-        **{name: details.get(name) for name in RUNS.names if name in details},
+        **(_learner_columns(details) if cell.method.startswith(METHOD_PREFIX) else {}),
         "run_id": record["run_id"],
         "suite": suite,
         "task": cell.task.name,
@@ -150,7 +162,15 @@ def _run_row(suite: str, cell: Cell, record: dict[str, Any]) -> dict[str, Any]:
         "process_peak_mb": timing["process_peak_mb"],
         "commit": commit and commit["id"] + ("+" if commit["dirty"] else ""),
         "code": record["code"],
+        "packages": content_hash(
+            [record["environment"]["python"], record["environment"]["packages"]]
+        )[:8],
     }
+
+
+def _learner_columns(details: dict[str, Any]) -> dict[str, Any]:
+    names = ("replay_reward", "replay_hands", "initial_reward", "initial_hands", "best_trial")
+    return {name: details.get(name) for name in names}
 
 
 def _path_rows(solutions: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:

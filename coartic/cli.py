@@ -7,6 +7,7 @@ import io
 import json
 import sys
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,7 +23,9 @@ from coartic.compiled import PACKAGE
 
 if TYPE_CHECKING:
     from benchmarks.harness import Progress
+    from benchmarks.methods import Entry
     from benchmarks.specification import RunSpec
+    from coartic import Task
 
 app = typer.Typer(
     add_completion=False,
@@ -38,6 +41,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
+    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
     try:
         _check_packages()
         app(prog_name="coartic")
@@ -253,7 +257,7 @@ def list_(method_file: MethodFiles = None) -> None:
                     for key, field in entry.method.Parameters.model_fields.items()
                 )
                 or "–",
-                ", ".join(task.name for task in known if entry.method().why_not(task) is None),
+                _applicable(entry, known),
             )
             for name, entry in methods.items()
         ],
@@ -269,13 +273,23 @@ def list_(method_file: MethodFiles = None) -> None:
     )
 
 
+def _applicable(entry: Entry, tasks: list[Task]) -> str:
+    """Tasks a method applies to with its default parameters, or why that is unknown."""
+    from benchmarks.methods import why_not
+
+    try:
+        return ", ".join(task.name for task in tasks if why_not(entry, task) is None)
+    except CoarticError as error:
+        return f"unknown: {error}"
+
+
 @app.command()
 def show(
     run_id: Annotated[str, typer.Argument(help="Id of a run, or its beginning.")],
     folder: Records = Path("results"),
 ) -> None:
     """Show everything about one run, with the command that reproduces it."""
-    from benchmarks.reproduce import find_record
+    from benchmarks.reproduce import command_for, find_record
 
     store, record = find_record(run_id, folder)
     shown = dict(record)
@@ -283,7 +297,7 @@ def show(
     shown["rewards"] = f"{len(rewards)} trials, in learning.parquet and in the record"
     shown["record"] = str(store.path(record["run_id"]))
     print(json.dumps(shown, indent=2, ensure_ascii=False))
-    print(f"\nReproduce it with: coartic reproduce {record['run_id']} --in {store.folder}")
+    print(f"\nReproduce it with: {command_for(record, store.folder)}")
 
 
 @app.command()

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from coartic.exploration import CONDITIONS, ExplorationCondition
+from coartic.initial import InitialSearch, search_initial_hands
 from coartic.learner import METHOD_PREFIX, TRIALS, LearningRun, learn
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.task import Task
@@ -43,26 +44,35 @@ class DualProcess(Method):
         condition = replace(
             self.condition, epsilon=parameters.epsilon, noise_sd=parameters.noise_sd
         )
+        task = session.hand_over(*self.told)
+        spend_search(session, search_initial_hands(task, condition.hands, model=session.model))
         trials = parameters.trials
         if session.trials_left is not None:
             trials = min(trials, session.trials_left)
+        if trials < 1:
+            raise MethodError(
+                "infeasible", "the trial budget ends with the search for initial hands"
+            )
         with session.solving():
             run = learn(
-                session.hand_over(*self.told),
+                task,
                 condition,
                 seed=session.seed,
                 trials=trials,
                 model=session.model,
             )
         session.spend(**asdict(run.counters))
-        search = run.initial_search._asdict()
-        del search["hands"]
-        session.spend(**search, jacobians=run.initial_search.corrective_iterations)
-        session.meter.solve_s = run.wall_s
-        session.rewards.extend(run.rewards.tolist())  # None where a trial failed
+        session.record_rewards(run.rewards.tolist())  # None where a trial failed
         if run.best_trial is None:
             raise MethodError("infeasible", run.reason, _details(run))
         return Result(run.solution, _details(run))
+
+
+def spend_search(session: Session, search: InitialSearch) -> None:
+    """Charge what a policy spent on finding the initial hands."""
+    spent = search._asdict()
+    del spent["hands"]
+    session.spend(**spent, jacobians=search.corrective_iterations)
 
 
 def _details(run: LearningRun) -> dict[str, Any]:

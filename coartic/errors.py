@@ -13,5 +13,9 @@ class TaskError(CoarticError):
     """A task file or task definition that cannot be used."""
 
 
+class SolutionError(CoarticError):
+    """A solution that breaks the rules of its task."""
+
+
 class NotApplicableError(CoarticError):
     """A method asked to run on a task it does not apply to."""

@@ -13,7 +13,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Literal
 
@@ -82,6 +82,8 @@ class MethodError(CoarticError):
         details: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(reason)
+        if outcome not in ("infeasible", "solver-failed"):
+            raise ValueError(f"outcome {outcome!r}: it is 'infeasible' or 'solver-failed'")
         self.outcome = outcome
         self.details = details or {}
 
@@ -129,10 +131,14 @@ class Meter:
         "hessians",
         "solver_iterations",
     )
-
-    def counts(self) -> dict[str, int]:
-        """The counters, without the times."""
-        return {name: getattr(self, name) for name in self.COUNTS}
+    SOLVER: ClassVar[tuple[str, ...]] = (
+        "forward_kinematics",
+        "jacobians",
+        "gradients",
+        "hessians",
+        "solver_iterations",
+    )
+    """Counters that a method states itself: what a solver evaluates."""
 
     def as_dict(self) -> dict[str, Any]:
         """Counters and times."""
@@ -149,7 +155,13 @@ class Result:
 
 
 class Session:
-    """One task, one seed, one meter: all that a method gets to work with."""
+    """One task, one seed, one meter: all that a method gets to work with.
+
+    The declaration is enforced and the calls are counted between honest parties: Python
+    has no walls, and who reaches for underscored names finds a way around both.
+    ``trusted`` methods, this project's own, may also take the task to their compiled
+    kernels and state what those spent.
+    """
 
     def __init__(
         self,
@@ -159,17 +171,18 @@ class Session:
         *,
         model: MotionModel = PAPER,
         trial_budget: int | None = None,
+        trusted: bool = False,
     ) -> None:
         self._task = task
         self._told = frozenset(told)
         self.seed = seed
         self.rng = np.random.default_rng(seed)
         self.model = model
-        self.trial_budget = trial_budget
-        self.meter = Meter()
-        self.used: set[Information] = set()
-        self.rewards: list[int | None] = []
-        """Reward of each trial made, in order; None where it failed."""
+        self._trusted = trusted
+        self._trial_budget = trial_budget
+        self._meter = Meter()
+        self._used: set[Information] = set()
+        self._rewards: list[int | None] = []
 
     # Open to every method: what the robot is, not what the task wants of it.
 
@@ -230,14 +243,14 @@ class Session:
         """Hand positions, ``(..., 2)``; counts one evaluation per configuration."""
         self._use(Information.FORWARD_KINEMATICS)
         positions = self._task.robot.forward_kinematics(q, hand)
-        self.meter.forward_kinematics += positions[..., 0].size
+        self._meter.forward_kinematics += positions[..., 0].size
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
         """Jacobians, ``(..., 2, dof)``; counts one per configuration."""
         self._use(Information.JACOBIAN)
         jacobians = self._task.robot.jacobian(q, hand)
-        self.meter.jacobians += jacobians[..., 0, 0].size
+        self._meter.jacobians += jacobians[..., 0, 0].size
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
@@ -251,29 +264,42 @@ class Session:
             locked_base=self._task.locked_base,
             model=self.model,
         )
-        self.meter.corrective_iterations += found.iterations
-        self.meter.jacobians += found.iterations
-        self.meter.forward_kinematics += found.iterations + 1
+        self._meter.corrective_iterations += found.iterations
+        self._meter.jacobians += found.iterations
+        self._meter.forward_kinematics += found.iterations + 1
         return found
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
         """Make one physical trial; counts it, its ticks and its corrections.
 
-        Raises BudgetError where no trial is left.
+        Goals that are missed are corrected, and paid for. Where the corrective process
+        is not declared, the execution that comes back does not show what it found.
+        Raises BudgetError where no trial is left, SolutionError for a solution that
+        breaks the rules.
         """
         self._use(Information.REWARD_BY_TRIAL)
+        self.check_solution(solution)
         if self.trials_left == 0:
-            raise BudgetError(f"all {self.trial_budget} trials of the budget are made")
+            raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
         execution = execute(self._task, solution, model=self.model)
-        self.meter.trials += 1
-        self.meter.movement_ticks += execution.ticks
-        self.meter.corrections += execution.corrections
-        self.meter.corrective_iterations += execution.iterations
-        self.meter.jacobians += execution.iterations
-        self.meter.forward_kinematics += execution.evaluations
-        self.meter.failed_trials += not execution.completed
-        self.rewards.append(execution.reward)
-        return execution
+        self._meter.trials += 1
+        self._meter.movement_ticks += execution.ticks
+        self._meter.corrections += execution.corrections
+        self._meter.corrective_iterations += execution.iterations
+        self._meter.jacobians += execution.iterations
+        self._meter.forward_kinematics += execution.evaluations
+        self._meter.failed_trials += not execution.completed
+        self._rewards.append(execution.reward)
+        if Information.CORRECTIVE_PROCESS in self._told:
+            return execution
+        return replace(
+            execution, movements=tuple(solution), configurations=execution.configurations[:0]
+        )
+
+    def check_solution(self, solution: Sequence[Movement]) -> None:
+        """Corrective movements without a target are a use of the corrective process."""
+        if any(getattr(m, "kind", "") == "corrective" and m.target is None for m in solution):
+            self._use(Information.CORRECTIVE_PROCESS)
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
         """Hand position as a CasADi expression. Needs ``kinematic model``.
@@ -286,16 +312,44 @@ class Session:
     @property
     def trials_left(self) -> int | None:
         """Trials left in the budget; None where there is none."""
-        return None if self.trial_budget is None else self.trial_budget - self.meter.trials
+        return None if self._trial_budget is None else self._trial_budget - self._meter.trials
+
+    # What has been spent and used so far: copies, to read.
+
+    @property
+    def meter(self) -> Meter:
+        """What has been spent."""
+        return replace(self._meter)
+
+    @property
+    def used(self) -> frozenset[Information]:
+        """What has been used of what was declared."""
+        return frozenset(self._used)
+
+    @property
+    def rewards(self) -> list[int | None]:
+        """Reward of each trial made, in order; None where it failed."""
+        return list(self._rewards)
 
     # What the method has to state itself.
 
     def spend(self, **counts: int) -> None:
-        """Add to counters that the session cannot see, such as ``solver_iterations``."""
+        """Add to counters that the session cannot see: a solver's evaluations, say.
+
+        Raises ValueError for a negative count and for one that the session keeps itself.
+        """
+        allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
-            if name not in Meter.COUNTS:
-                raise ValueError(f"unknown counter {name!r}; known: {', '.join(Meter.COUNTS)}")
-            setattr(self.meter, name, getattr(self.meter, name) + int(count))
+            if name not in allowed:
+                raise ValueError(f"counter {name!r} cannot be stated; {', '.join(allowed)} can")
+            if count < 0:
+                raise ValueError(f"counter {name!r}: {count} is negative")
+            setattr(self._meter, name, getattr(self._meter, name) + int(count))
+
+    def record_rewards(self, rewards: Iterable[int | None]) -> None:
+        """Rewards of the trials of a compiled method (trusted methods only)."""
+        self._needs_trust("record_rewards")
+        self._rewards.extend(rewards)
 
     @contextmanager
     def building(self) -> Iterator[None]:
@@ -304,7 +358,7 @@ class Session:
         try:
             yield
         finally:
-            self.meter.build_s += time.perf_counter() - clock
+            self._meter.build_s += time.perf_counter() - clock
 
     @contextmanager
     def solving(self) -> Iterator[None]:
@@ -313,16 +367,24 @@ class Session:
         try:
             yield
         finally:
-            self.meter.solve_s += time.perf_counter() - clock
+            self._meter.solve_s += time.perf_counter() - clock
 
     def hand_over(self, *information: Information) -> Task:
         """The task itself, for compiled methods of this project that count by themselves.
 
         Marks ``information`` as used; such a method must :meth:`spend` what it spends.
+        Raises UndeclaredError for any other method.
         """
+        self._needs_trust("hand_over")
+        if not information:
+            raise UndeclaredError("hand_over without saying what is used of the task")
         for item in information:
             self._use(item)
         return self._task
+
+    def _needs_trust(self, name: str) -> None:
+        if not self._trusted:
+            raise UndeclaredError(f"{name} is for this project's own compiled methods")
 
     def _use(self, information: Information) -> None:
         if information not in self._told:
@@ -330,7 +392,7 @@ class Session:
             raise UndeclaredError(
                 f"the method used {information.value!r}, which it does not declare (told: {told})"
             )
-        self.used.add(information)
+        self._used.add(information)
 
     def _goal(self, number: int) -> int:
         if not 1 <= number <= self.goals_count:

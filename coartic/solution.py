@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from coartic.corrective import correct
-from coartic.errors import CoarticError
+from coartic.errors import SolutionError
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import MoveResult, configuration, follow, move
 from coartic.robot import Array, Hand
@@ -95,7 +95,7 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
 
     A goal that is still missed after its movements is corrected by **A** from where
     the robot stands, and the correction is paid for. Where **A** does not converge
-    the execution ends there with a reason. Raises CoarticError for a solution that
+    the execution ends there with a reason. Raises SolutionError for a solution that
     breaks the task's rules: goals missing or out of order, a hand the robot does not
     have, a target of the wrong shape or not finite, a locked base that moves. Raises
     ValueError for a model that no movement can be made with.
@@ -131,8 +131,7 @@ class _Run:
             first = False
             if not needed:
                 continue
-            if movement.waypoints is not None:
-                movement = replace(movement, target=np.array(movement.waypoints[-1]))
+            if movement.kind == "path":
                 result = self._follow(movement)
             else:
                 target = movement.target
@@ -140,7 +139,7 @@ class _Run:
                     target = self._correct(number, hand)
                     if target is None:
                         return
-                movement = replace(movement, target=target)
+                movement = replace(movement, target=np.array(target, dtype=np.float64))
                 result = self._move(number, target, hand, movement.kind)
             self.q, hit = result.q, result.hit
             self.corrections += movement.kind == "corrective"
@@ -217,34 +216,42 @@ def _by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movem
     locked = [{"x": 0, "y": 1}[coordinate] for coordinate in task.locked_base]
     groups: list[tuple[int, list[Movement]]] = []
     for movement in solution:
+        if not isinstance(movement, Movement):
+            raise SolutionError(f"task {task.name!r}: {movement!r} is no Movement")
         if not groups or groups[-1][0] != movement.goal:
             groups.append((movement.goal, []))
-        groups[-1][1].append(movement)
         where = f"task {task.name!r}, goal {movement.goal}"
         if movement.hand not in task.hands:
-            raise CoarticError(f"{where}: the robot has no {movement.hand} hand")
-        if movement.hand != groups[-1][1][0].hand:
-            raise CoarticError(f"{where}: two hands for one goal")
+            raise SolutionError(f"{where}: the robot has no {movement.hand} hand")
+        if groups[-1][1] and movement.hand != groups[-1][1][0].hand:
+            raise SolutionError(f"{where}: two hands for one goal")
         if movement.kind not in KINDS:
-            raise CoarticError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
+            raise SolutionError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
         points: list[Array] = []
         if movement.kind == "path":
             points = [] if movement.waypoints is None else list(movement.waypoints)
             if not points:
-                raise CoarticError(f"{where}: a path needs waypoints")
+                raise SolutionError(f"{where}: a path needs waypoints")
+            end = np.array(points[-1], dtype=np.float64)
+            if movement.target is not None and not np.array_equal(movement.target, end):
+                raise SolutionError(f"{where}: a path's target is its last waypoint")
+            movement = replace(movement, target=end, waypoints=np.array(points, dtype=np.float64))
+        elif movement.waypoints is not None:
+            raise SolutionError(f"{where}: a {movement.kind} movement has no waypoints")
         elif movement.target is not None:
             points = [movement.target]
         elif movement.kind != "corrective":
-            raise CoarticError(f"{where}: a {movement.kind} movement needs a target")
+            raise SolutionError(f"{where}: a {movement.kind} movement needs a target")
         for point in points:
             try:
                 checked = configuration(task.robot, point)
             except ValueError as error:
-                raise CoarticError(f"{where}: {error}") from None
+                raise SolutionError(f"{where}: {error}") from None
             if np.any(checked[locked] != task.q0[locked]):
-                raise CoarticError(f"{where}: the target moves a locked base coordinate")
+                raise SolutionError(f"{where}: the target moves a locked base coordinate")
+        groups[-1][1].append(movement)
     wanted = list(range(1, len(task.goals) + 1))
     if [goal for goal, _ in groups] != wanted:
         given = [goal for goal, _ in groups]
-        raise CoarticError(f"task {task.name!r}: movements for goals {given}, wanted {wanted}")
+        raise SolutionError(f"task {task.name!r}: movements for goals {given}, wanted {wanted}")
     return groups

@@ -95,7 +95,7 @@ def fake_results(tmp_path, runs):
         },
     }  # fmt: skip
     frame = pd.DataFrame(runs).assign(
-        task="two-armed-1", method="dual-process/EC2", variant="", commit="abc"
+        task="two-armed-1", method="dual-process/EC2", variant="", commit="abc", packages="p"
     )
     frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})

@@ -6,8 +6,10 @@ import pytest
 
 from benchmarks.conformance import check_method, check_task_file
 from benchmarks.methods import registry
+from benchmarks.reproduce import perform_once
 from coartic.task import TASK_FOLDER
 
+from .test_sandbox import spec_of
 from .test_task import GOOD
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
@@ -32,6 +34,17 @@ def test_methods_that_keep_every_law(name):
     assert all(law.finding for law in laws)
 
 
+def test_what_a_session_shows_cannot_be_written():
+    laws = {law.name: law for law in check_method(KNOWN["test/forger"])}
+    assert all(law.passed for law in laws.values())
+    (spec,) = spec_of(KNOWN, "test/forger")
+    record = perform_once(spec)
+    assert record["meter"]["trials"] == 1
+    assert len(record["rewards"]) == 1
+    assert record["rewards"][0] < 0
+    assert "counter 'trials' cannot be stated" in record["details"]["said"]
+
+
 @pytest.mark.parametrize(
     ("name", "law", "finding"),
     [
@@ -43,6 +56,19 @@ def test_methods_that_keep_every_law(name):
         ("test/spendthrift", "limits", "did not keep to its budget: all 7 trials"),
         ("test/peeks", "information", "the method used 'Jacobian', which it does not declare"),
         ("test/overdeclares", "information", "declared but never used: Jacobian"),
+        ("test/taker", "information", "hand_over is for this project's own compiled methods"),
+        ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
+        ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
+        ("test/quits", "solution", "on ascending: crashed: SystemExit: 0"),
+        ("test/dies", "solution", "crashed: the worker process ended (exit code 7): last words"),
+        ("test/nothing", "solution", "solver-failed: the method returned NoneType, not a Result"),
+        ("test/nan", "solution", "solver-failed: the method's result cannot be kept"),
+        (
+            "test/wrong-hand",
+            "solution",
+            "solver-failed: task 'ascending', goal 1: the robot",
+        ),
+        ("test/smuggler", "solution", "a planned movement has no waypoints"),
         ("test/unhelpful", "failure", "gives crashed ZeroDivisionError: no goal is that far"),
     ],
 )
@@ -50,7 +76,7 @@ def test_each_law_can_be_broken(name, law, finding):
     laws = {found.name: found for found in check_method(KNOWN[name])}
     assert not laws[law].passed
     assert finding in laws[law].finding
-    if law not in ("solution", "information", "determinism"):  # these have consequences
+    if law not in ("solution", "information", "determinism"):  # those have consequences
         assert [found.name for found in laws.values() if not found.passed] == [law]
 
 

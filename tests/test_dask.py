@@ -53,9 +53,12 @@ def wait_for(log, pattern, seconds=60):
 
 @contextmanager
 def cluster(tmp_path):
-    """Address of a scheduler on loopback, and its two workers."""
+    """Address of a scheduler on loopback, its process, and those of its two workers."""
     arguments = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
-    with started(tmp_path, "scheduler", "distributed.cli.dask_scheduler", *arguments) as (_, log):
+    with started(tmp_path, "scheduler", "distributed.cli.dask_scheduler", *arguments) as (
+        scheduler,
+        log,
+    ):
         address = wait_for(log, r"Scheduler at:\s+(tcp://127\.0\.0\.1:\d+)")[1]
         options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
         worker = ("distributed.cli.dask_worker", address, *options)
@@ -65,14 +68,14 @@ def cluster(tmp_path):
         ):
             for log in (log_one, log_two):
                 wait_for(log, r"Registered to:")
-            yield address, [one, two]
+            yield address, [scheduler, one, two]
 
 
 def test_results_equal_the_local_ones_though_a_worker_dies(tmp_path):
     cells = paper_cells(tasks=["two-armed-1", "ascending"])
     local = run_and_write(tmp_path / "local", cells, runs=6, trials=1500)
     seen = []
-    with cluster(tmp_path) as (address, workers):
+    with cluster(tmp_path) as (address, (_, *workers)):
 
         def watch(progress, spec):
             if spec is not None:
@@ -87,6 +90,23 @@ def test_results_equal_the_local_ones_though_a_worker_dies(tmp_path):
         assert workers[1].poll() is None
     assert len(seen) == len(set(seen)) == 24
     same_tables(far, local)
+
+
+def test_a_scheduler_that_goes_away_is_said_so(tmp_path):
+    cells = paper_cells(tasks=["two-armed-1"])
+    with cluster(tmp_path) as (address, processes):
+        seen = []
+
+        def watch(progress, spec):
+            seen.append(spec)
+            if len(seen) == 3:
+                kill(processes[0])
+
+        with pytest.raises(CoarticError, match="lost the Dask scheduler"):
+            run_and_write(
+                tmp_path / "far", cells, runs=8, trials=4000, executor=Dask(address), watch=watch
+            )
+    assert len(list((tmp_path / "far" / "records").glob("*.json"))) >= 2
 
 
 def test_no_scheduler_is_said_so(tmp_path):

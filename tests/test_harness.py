@@ -1,12 +1,14 @@
 """Suites, the harness, and the tables it leaves behind."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from analysis.comparison import compare
 from analysis.results import load_results
 from benchmarks import tables
 from benchmarks.executors import Local
@@ -24,9 +26,10 @@ from benchmarks.suites import (
 )
 from benchmarks.tables import RUNS, TIMINGS, write_tables
 from benchmarks.worker import perform
-from coartic import CoarticError, execute, hand_sequences, learn, load_task
+from coartic import CoarticError, Movement, execute, hand_sequences, learn, load_task
 from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
+from coartic.method import Information, Session
 
 from .strategies import tiny_task
 
@@ -35,6 +38,7 @@ FIRST_COLUMNS = [
     *"replay_reward replay_hands initial_reward initial_hands best_trial trials".split(),
 ]
 KNOWN = registry()
+BROKEN = Path(__file__).parent / "plugins" / "broken.py"
 
 
 class InProcess:
@@ -258,10 +262,10 @@ def test_grid_and_fixed_parameters(tmp_path):
     )
     cells = select_cells(load_suite(str(path)), KNOWN)
     assert [cell.variant for cell in cells] == [
-        "noise_sd=0.02, epsilon=0.0",
-        "noise_sd=0.02, epsilon=0.5",
-        "noise_sd=0.1, epsilon=0.0",
-        "noise_sd=0.1, epsilon=0.5",
+        "trials=40, noise_sd=0.02, epsilon=0.0",
+        "trials=40, noise_sd=0.02, epsilon=0.5",
+        "trials=40, noise_sd=0.1, epsilon=0.0",
+        "trials=40, noise_sd=0.1, epsilon=0.5",
     ]
     runs = run_and_write(tmp_path / "out", cells, runs=1, trials=999).runs
     assert (runs.trials == 40).all()  # the suite's own parameter stands
@@ -295,6 +299,101 @@ def test_suite_files_that_cannot_be_used(block, words, tmp_path):
     assert words in str(caught.value)
 
 
+def suite_of(tmp_path, *blocks):
+    path = tmp_path / "own.toml"
+    head = 'title = "x"\ndescription = "x"\nruns = 3\ntrials = 30\n'
+    path.write_text(head + "".join(f"[[cells]]\n{block}\n" for block in blocks))
+    return select_cells(load_suite(str(path)), KNOWN)
+
+
+def test_cells_are_told_apart_by_their_parameters(tmp_path):
+    """Different parameters are different cells, compared with the paper only as it had them."""
+    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+    cells = suite_of(
+        tmp_path,
+        ec1,
+        ec1 + "parameters = { noise_sd = 0.5 }",
+        ec1 + "parameters = { noise_sd = 0.05 }",  # the default: the first cell again
+        ec1 + "parameters = { trials = 20 }",
+        'tasks = ["*"]\nmethods = ["dual-process/EC1"]',
+    )
+    labels = [(cell.task.name, cell.variant) for cell in cells]
+    assert labels[:3] == [
+        ("ascending", ""),
+        ("ascending", "noise_sd=0.5"),
+        ("ascending", "trials=20"),
+    ]
+    assert len(labels) == len(set(labels)) == 6
+    found = run_and_write(tmp_path / "out", cells, runs=3, trials=30)
+    assert found.runs.run_id.is_unique
+    assert set(found.runs.groupby(["task", "variant"]).size()) == {3}
+    rows = compare_cells(found)
+    assert rows["ascending", "dual-process/EC1"]["published"] == "-303 ± 2.9 (20)"
+    assert rows["ascending", "dual-process/EC1 noise_sd=0.5"]["published"] == "–"
+
+
+def compare_cells(found):
+    found.manifest["environment"] = {
+        "coartic": "0", "commit": None, "model_code": "c", "python": "3", "platform": "p",
+        "date": "d",
+    }  # fmt: skip
+    table = compare(found).tables[0]
+    rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+    return {(row["task"].removesuffix(" †"), row["method"]): row for row in rows}
+
+
+def test_verdicts_only_for_runs_as_long_as_the_papers(tmp_path):
+    cells = paper_cells(tasks=["ascending"])
+    long = run_and_write(tmp_path / "long", cells, runs=2, trials=10_000)
+    short = run_and_write(
+        tmp_path / "short", cells, runs=2, trials=10_000, limits=Limits(300.0, trials=40)
+    )
+    verdict = "verdict (margin ±1%)"
+    assert compare_cells(long)["ascending", "dual-process/EC1"][verdict] != "–"
+    assert compare_cells(short)["ascending", "dual-process/EC1"][verdict] == "–"
+
+
+def test_learner_columns_are_the_learners(tmp_path):
+    """A method's details never pass for columns that mean something else."""
+    known = registry([BROKEN])
+    found = run_and_write(
+        tmp_path, [Cell(load_task("ascending"), known["test/pretender"])], runs=1
+    )
+    assert found.runs[["replay_reward", "best_trial"]].isna().all(axis=None)
+
+
+def test_a_policys_search_counts_and_is_bounded(tmp_path):
+    task = tiny_task(initial_hands="best-of-all", goals=[[5.0, 1.0], [5.0, 2.0], [4.0, 3.0]])
+    names = ("dual-process/EC4", "corrective-alone/given")
+    cells = [Cell(task, KNOWN[name]) for name in names]
+    runs = run_and_write(tmp_path / "free", cells, runs=1, trials=20).runs
+    assert list(runs.trials) == [8 + 20, 8 + 1]
+    bounded = run_and_write(
+        tmp_path / "bounded", cells[:1], runs=1, trials=20, limits=Limits(300.0, trials=11)
+    ).runs
+    assert list(bounded.trials) == [11]
+    none_left = run_and_write(
+        tmp_path / "none", cells[:1], runs=1, trials=20, limits=Limits(300.0, trials=8)
+    ).runs
+    assert list(none_left.status) == ["infeasible"]
+    assert "the trial budget ends with the search" in none_left.reason[0]
+
+
+def test_a_session_counts_per_configuration():
+    session = Session(load_task("ascending"), 0, set(Information), trial_budget=2)
+    session.forward_kinematics(np.zeros((4, 5, 10)), "right")
+    session.jacobian(np.zeros((3, 10)), "right")
+    found = session.correct(session.q0, "right", 1)
+    execution = session.trial([Movement(k, "right", "corrective") for k in (1, 2, 3)])
+    meter = session.meter
+    assert meter.forward_kinematics == 20 + found.iterations + 1 + execution.evaluations
+    assert meter.jacobians == 3 + found.iterations + execution.iterations
+    assert (meter.trials, meter.movement_ticks, meter.corrections) == (1, 319, 3)
+    assert session.trials_left == 1
+    with pytest.raises(ValueError, match="goals are numbered 1 to 3"):
+        session.correct(session.q0, "right", 4)
+
+
 def test_deterministic_methods_run_once():
     cells = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
     assert [cell.method for cell in cells] == ["corrective-alone/every"]
@@ -310,7 +409,8 @@ def test_corrective_alone_as_a_method(tmp_path):
     assert by_cell["ascending", "corrective-alone/every"] == -319
     spent = found.set_index(["task", "method"])
     assert spent.trials["two-armed-1", "corrective-alone/every"] == 16
-    assert spent.trials["two-armed-1", "corrective-alone/given"] == 0
+    assert spent.trials["two-armed-1", "corrective-alone/given"] == 1
+    assert spent.movement_ticks["two-armed-1", "corrective-alone/given"] == 671
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):

@@ -71,7 +71,7 @@ def test_a_file_brings_a_method(tmp_path):
     run_id = runs.run_id[0]
     shown = coartic("show", run_id[:9], "--in", tmp_path)
     assert '"nearest-hand"' in shown.stdout
-    assert f"coartic reproduce {run_id} --in {out}" in shown.stdout
+    assert f"coartic reproduce {run_id} --in {out} --method-file {METHOD}" in shown.stdout
     again = ("reproduce", run_id, "--in", tmp_path)
     assert coartic(*again, "--method-file", METHOD).stdout.endswith("identical.\n")
     without = coartic(*again)
@@ -92,6 +92,49 @@ def test_a_changed_file_makes_its_records_stale(tmp_path):
     changed = coartic(*command)
     assert "0 were there, 1 done" in changed.stdout
     assert "1 records were made by other code and are not used" in changed.stderr
+
+
+def test_a_changed_helper_makes_records_stale_too(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    helper = tmp_path / "coartic_test_helper.py"
+    method = tmp_path / "mine.py"
+    text = METHOD.read_text(encoding="utf-8")
+    method.write_text("import coartic_test_helper\n" + text, encoding="utf-8")
+    codes = []
+    for version in ("x = 1", "x = 1", "x = 2"):
+        helper.write_text(version, encoding="utf-8")
+        codes.append(registry([method])["nearest-hand"].code)
+    assert codes[0] == codes[1] != codes[2]
+
+
+def test_a_broken_plugin_is_a_warning(tmp_path):
+    """One bad package does not take the command line with it."""
+    info = tmp_path / "bad-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bad\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[coartic.methods]\nbad = no_such_module:Method\n")
+    done = coartic("list", env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    assert done.returncode == 0
+    assert "warning: plug-in bad: entry point 'bad' cannot be used" in done.stderr
+    assert "dual-process/EC1" in done.stdout
+
+
+def test_a_method_that_cannot_say_where_it_applies(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from coartic.method import Method\nclass A(Method):\n    name = 'a'\n"
+        "    title = citation = 'x'\n    told = frozenset()\n"
+        "    def why_not(self, task): return 1 / 0\n"
+        "    def solve(self, session): ...",
+        encoding="utf-8",
+    )
+    listed = coartic("list", "--method-file", path)
+    assert listed.returncode == 0
+    ran = coartic(
+        "run", "paper", "--methods", "a", "--method-file", path, "--out", tmp_path / "out"
+    )
+    assert ran.returncode == 2
+    assert "cannot say whether it applies to task 'ascending': ZeroDivisionError" in ran.stderr
 
 
 @pytest.mark.parametrize(
@@ -158,9 +201,5 @@ def test_the_readme_suite_can_be_used(tmp_path):
     path = tmp_path / "noise.toml"
     path.write_text(block, encoding="utf-8")
     cells = select_cells(load_suite(str(path)), registry())
-    assert [cell.variant for cell in cells[:3]] == [
-        "noise_sd=0.02",
-        "noise_sd=0.05",
-        "noise_sd=0.1",
-    ]
+    assert [cell.variant for cell in cells[:3]] == ["noise_sd=0.02", "", "noise_sd=0.1"]
     assert len(cells) == 6

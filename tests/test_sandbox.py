@@ -66,6 +66,54 @@ def test_a_killed_worker_is_a_crash_with_its_signal(known):
     assert not sandbox.alive
 
 
+def test_a_worker_killed_from_outside_loses_nothing(known, tmp_path):
+    """The run is performed again in a fresh process, and nobody can tell."""
+    store = Store(tmp_path)
+
+    class Killing(Local):
+        def perform(self, jobs):
+            for index, answer in enumerate(super().perform(jobs)):
+                if index in (1, 4):
+                    for child in workers_of(os.getpid()):
+                        os.kill(child, signal.SIGKILL)
+                yield answer
+
+    task = load_task("two-armed-2")
+    cell = Cell(task, known["dual-process/EC4"])
+    specs = [spec for _, spec in run_specs([cell], runs=12, seed=0, trials=4000)]
+    progress = perform_plan(specs, store, Killing(2))
+    assert (progress.done, progress.failed) == (12, 0)
+
+
+def workers_of(pid):
+    """Process ids of the workers at work below a process."""
+    parents = {}
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (entry / "stat").read_text().rpartition(")")[2].split()
+            parents[int(entry.name)] = (int(fields[1]), (entry / "cmdline").read_bytes())
+        except (OSError, ValueError):
+            continue
+
+    def below(child):
+        while child in parents:
+            child = parents[child][0]
+            if child == pid:
+                return True
+        return False
+
+    return [p for p, (_, line) in parents.items() if b"benchmarks.worker" in line and below(p)]
+
+
+def test_a_method_that_kills_its_own_process_is_data_after_some_tries(known, tmp_path):
+    store = Store(tmp_path)
+    (spec,) = spec_of(known, "test/segfaults")
+    perform_plan([spec], store, Local(1))
+    record = store.read(spec.run_id)
+    assert record["status"] == "crashed"
+    assert "killed by SIGSEGV" in record["reason"]
+
+
 def test_one_sandbox_performs_many_jobs_and_says_warm(known):
     sandbox = Sandbox()
     try:
@@ -79,12 +127,14 @@ def test_one_sandbox_performs_many_jobs_and_says_warm(known):
     assert all(record["status"] == "ok" for record in records)
 
 
-def test_no_worker_outlives_a_killed_suite(tmp_path):
-    """SIGKILL to the suite's own process; its workers go with it."""
+@pytest.mark.parametrize("moment", ["at work", 0.3, 0.7, 1.0, 1.4])
+@pytest.mark.parametrize("word", [signal.SIGKILL, signal.SIGINT])
+def test_no_worker_outlives_its_suite(moment, word, tmp_path):
+    """Killed or interrupted at any moment, start-up included, a suite takes its workers along."""
     suite = subprocess.Popen(
         [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, "--jobs", "2"],
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         env={**os.environ, "COARTIC_TEST_MARK": str(tmp_path)},
     )
 
@@ -99,13 +149,20 @@ def test_no_worker_outlives_a_killed_suite(tmp_path):
         return [command for command in found if "resource_tracker" not in command]
 
     deadline = time.monotonic() + 120
-    while not list(tmp_path.glob("records/*.json")):
-        assert suite.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    assert sum("benchmarks.worker" in command for command in marked()) == 2
-    suite.kill()
-    suite.wait()
+    if moment == "at work":
+        while not list(tmp_path.glob("records/*.json")):
+            assert suite.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert sum("benchmarks.worker" in command for command in marked()) == 2
+    else:
+        time.sleep(moment)
+    suite.send_signal(word)
+    _, error = suite.communicate(timeout=60)
+    assert suite.returncode != 0
+    if moment == "at work" and word == signal.SIGINT:
+        assert suite.returncode == 130
+        assert b"runs done now are kept" in error
     while marked():
         assert time.monotonic() < deadline, marked()
         time.sleep(0.05)

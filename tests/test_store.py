@@ -1,7 +1,9 @@
 """Records: whole or not at all, checked, and never mixed with those of other code."""
 
 import dataclasses
+import hashlib
 import json
+import os
 import re
 from pathlib import Path
 
@@ -10,14 +12,14 @@ import pytest
 from benchmarks import store as store_module
 from benchmarks.harness import perform_plan
 from benchmarks.specification import Limits
-from benchmarks.store import Damage, RecordError, Store, encode
+from benchmarks.store import KEYS, Damage, RecordError, Store, encode
 from benchmarks.suites import run_specs
 from coartic import CoarticError
 
 from .test_harness import InProcess, paper_cells
 
 ROOT = Path(__file__).parent.parent
-RECORD = {"run_id": "aa-bb", "status": "ok", "word": "∅", "rewards": [-3, None]}
+RECORD = {**dict.fromkeys(KEYS), "run_id": "aa-bb", "reason": "∅", "rewards": [-3, None]}
 
 
 def specs(runs=3, **options):
@@ -45,9 +47,10 @@ def test_a_record_comes_back(tmp_path):
     store = Store(tmp_path)
     store.open()
     store.write("aa-bb", encode(RECORD))
+    store.close()
     assert store.read("aa-bb") == RECORD
     assert store.ids() == {"aa-bb"}
-    assert [path.name for path in store.records.iterdir()] == ["aa-bb.json"]
+    assert [path.name for path in store.records.glob("[!.]*")] == ["aa-bb.json"]
 
 
 @pytest.mark.parametrize(
@@ -153,9 +156,19 @@ def test_lost_runs_are_asked_for_again_and_given_up_with_words(tmp_path):
     assert progress.done == 5
 
     class Dead:
+        asked = 0
+
         def perform(self, jobs):
+            self.asked += 1
             return iter(())
 
+    class Slow(Counting):
+        """One answer a round, as where workers keep dying."""
+
+        def perform(self, jobs):
+            yield next(super().perform(jobs))
+
+    assert perform_plan(specs(runs=9), Store(tmp_path / "slow"), Slow()).done == 9
     with pytest.raises(CoarticError, match="5 runs were lost again and again"):
         perform_plan(planned, Store(tmp_path / "other"), Dead())
 
@@ -196,16 +209,47 @@ def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
         perform_counting(store, planned)
     monkeypatch.undo()
     assert store.ids() == {planned[0].run_id}
-    assert list(store.records.glob(".*")) == []
+    assert list(store.records.glob("*.part")) == []
     assert perform_counting(store, planned)[1] == [spec.run_id for spec in planned[1:]]
 
 
 def test_left_over_parts_are_cleared(tmp_path):
     store = Store(tmp_path)
-    store.open()
+    store.records.mkdir()
     (store.records / ".dead.part").write_text("half a rec")
     store.open()
-    assert list(store.records.iterdir()) == []
+    store.close()
+    assert list(store.records.glob("*.part")) == []
+
+
+def test_one_suite_at_a_time(tmp_path):
+    """A second writer is told so, and goes ahead once the first is done."""
+    one, two = Store(tmp_path), Store(tmp_path)
+    one.open()
+    with pytest.raises(CoarticError, match="another suite is at work"):
+        perform_counting(two, specs(runs=1))
+    one.close()
+    assert perform_counting(two, specs(runs=1))[0].done == 1
+
+
+@pytest.mark.parametrize("body", [b'{"a":1}', b"[]", b"not json", b'{"run_id":"x"}'])
+def test_a_checksum_that_fits_no_record(body, tmp_path):
+    store, planned = Store(tmp_path), specs(runs=1)
+    perform_counting(store, planned)
+    head = b"sha256:" + hashlib.sha256(body).hexdigest().encode() + b"\n"
+    store.path(planned[0].run_id).write_bytes(head + body + b"\n")
+    progress, performed = perform_counting(store, planned)
+    assert (len(progress.damaged), len(performed)) == (1, 1)
+    assert len(list(store.records.glob("damaged-*"))) == 1  # kept, out of the way
+
+
+def test_something_else_in_place_of_a_record(tmp_path):
+    store, planned = Store(tmp_path), specs(runs=2)
+    store.records.mkdir(parents=True)
+    store.path(planned[0].run_id).mkdir()
+    os.mkfifo(store.path(planned[1].run_id))
+    progress, performed = perform_counting(store, planned)
+    assert len(progress.damaged) == len(performed) == 2
 
 
 def test_unwritable_folder(tmp_path):

@@ -16,7 +16,7 @@ SEEN = []
 
 def by_correction(session, hands=None):
     """A plain solution: every goal by the corrective process, the last hand first."""
-    session.hand_over(Information.CORRECTIVE_PROCESS)
+    session.correct(session.q0, session.hands[-1], 1)
     hands = hands or [session.hands[-1]] * session.goals_count
     return tuple(Movement(k, hand, "corrective") for k, hand in enumerate(hands, 1))
 
@@ -116,3 +116,117 @@ class Dies(Good):
 
         print("last words", flush=True)
         os._exit(7)
+
+
+class Taker(Good):
+    """Takes the whole task, which is for this project's own methods."""
+
+    name = "test/taker"
+
+    def solve(self, session):
+        return Result((), {"goals": len(session.hand_over(Information.CORRECTIVE_PROCESS).goals)})
+
+
+class Freeloader(Good):
+    """Has the corrective process do the work without declaring it."""
+
+    name = "test/freeloader"
+    told = frozenset()
+
+    def solve(self, session):
+        hand = session.hands[-1]
+        goals = range(1, session.goals_count + 1)
+        return Result(tuple(Movement(goal, hand, "corrective") for goal in goals))
+
+
+class Forger(Good):
+    """Writes into what it is shown."""
+
+    name = "test/forger"
+    told = CORRECTIVE | {Information.REWARD_BY_TRIAL}
+
+    def solve(self, session):
+        solution = by_correction(session)
+        session.trial(solution)
+        session.meter.trials = 0
+        session.rewards.append(10**6)
+        session.q0[:] = 9.0
+        try:
+            session.spend(trials=-1)
+        except ValueError as error:
+            return Result(solution, {"said": str(error)})
+        return Result(solution)
+
+
+class Lucky(Good):
+    """Draws, though it says that no seed matters."""
+
+    name = "test/lucky"
+    stochastic = False
+
+    def solve(self, session):
+        return Result(by_correction(session), {"drawn": session.rng.random()})
+
+
+class Quits(Good):
+    name = "test/quits"
+
+    def solve(self, session):
+        raise SystemExit(0)
+
+
+class Nothing(Good):
+    name = "test/nothing"
+
+    def solve(self, session):
+        return None
+
+
+class NotANumber(Good):
+    name = "test/nan"
+
+    def solve(self, session):
+        return Result(by_correction(session), {"value": float("nan")})
+
+
+class Pretender(Good):
+    """Names its details like the learner's columns."""
+
+    name = "test/pretender"
+
+    def solve(self, session):
+        return Result(by_correction(session), {"replay_reward": -1, "best_trial": "third"})
+
+
+class WrongHand(Good):
+    name = "test/wrong-hand"
+    told = CORRECTIVE | {Information.REWARD_BY_TRIAL}
+
+    def solve(self, session):
+        session.trial([Movement(1, "middle", "corrective")])
+        return Result(())
+
+
+class Smuggler(Good):
+    """Puts waypoints, which move a locked base, where none are looked for."""
+
+    name = "test/smuggler"
+
+    def solve(self, session):
+        q = session.q0
+        away = q.copy()
+        away[1] -= 1.0
+        solution = by_correction(session)
+        first = Movement(1, session.hands[-1], "planned", q, waypoints=[away])
+        return Result((first, *solution))
+
+
+class SegFaults(Good):
+    name = "test/segfaults"
+
+    def solve(self, session):
+        import os
+        import signal
+
+        os.kill(os.getpid(), signal.SIGSEGV)
+        return Result(())
