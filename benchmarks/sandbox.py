@@ -1,10 +1,10 @@
 """Processes that runs are performed in, and the clock outside them.
 
 :func:`supervise` performs one job in a child process that lives on from job to job, until
-one of them times out or ends it. The child speaks JSON lines over pipes. Where a job exceeds its time limit, or the child dies,
-the child is killed and the outcome is data; a run whose child was killed by a signal is
-tried again in a fresh one first. Standard library only: workers of any
-executor import this module, and must do so fast.
+one of them times out or ends it. The child speaks JSON lines over pipes. Where a job
+exceeds its time limit, or the child dies, the child is killed and the outcome is data; a
+run whose child was killed by a signal is tried again in a fresh one first. Standard
+library only: workers of any executor import this module, and must do so fast.
 """
 
 from __future__ import annotations
