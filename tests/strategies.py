@@ -6,6 +6,16 @@ from hypothesis.extra.numpy import arrays
 
 from coartic import Robot, parse_task
 
+PAPER_CELLS = [
+    ("ascending", "EC1"),
+    ("descending", "EC1"),
+    ("two-armed-1", "EC2"),
+    ("two-armed-1", "EC3"),
+    ("two-armed-1", "EC4"),
+    ("two-armed-2", "EC3"),
+    ("two-armed-2", "EC4"),
+]
+
 UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9), left_shoulder=(-0.3, 0.2))
 
 

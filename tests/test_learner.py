@@ -22,17 +22,7 @@ from coartic import (
 from coartic.learner import TRIALS
 from coartic.robot import HANDS
 
-from .strategies import UNEVEN, tiny_task
-
-PAPER_CELLS = [
-    ("ascending", "EC1"),
-    ("descending", "EC1"),
-    ("two-armed-1", "EC2"),
-    ("two-armed-1", "EC3"),
-    ("two-armed-1", "EC4"),
-    ("two-armed-2", "EC3"),
-    ("two-armed-2", "EC4"),
-]
+from .strategies import PAPER_CELLS, UNEVEN, tiny_task
 
 
 def same_run(a, b):

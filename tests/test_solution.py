@@ -14,20 +14,10 @@ from coartic import (
     load_task,
 )
 
-from .strategies import tiny_task
-
-CELLS = [
-    ("ascending", "EC1"),
-    ("descending", "EC1"),
-    ("two-armed-1", "EC2"),
-    ("two-armed-1", "EC3"),
-    ("two-armed-1", "EC4"),
-    ("two-armed-2", "EC3"),
-    ("two-armed-2", "EC4"),
-]
+from .strategies import PAPER_CELLS, tiny_task
 
 
-@pytest.mark.parametrize(("name", "condition"), CELLS)
+@pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
 def test_best_trials_re_execute_exactly(name, condition):
     for seed in range(4):
         run = learn(load_task(name), condition, seed=seed, trials=1500)
