@@ -25,7 +25,7 @@ from benchmarks.suites import (
     suites,
 )
 from benchmarks.tables import RUNS, TIMINGS, write_tables
-from benchmarks.worker import perform
+from benchmarks.worker import ForeignCodeError, perform
 from coartic import CoarticError, Movement, execute, hand_sequences, learn, load_task
 from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
@@ -392,6 +392,19 @@ def test_a_session_counts_per_configuration():
     assert session.trials_left == 1
     with pytest.raises(ValueError, match="goals are numbered 1 to 3"):
         session.correct(session.q0, "right", 4)
+
+
+def test_a_worker_with_other_code_refuses():
+    (_, spec), *_ = run_specs(paper_cells(), runs=1, seed=0, trials=1)
+    with pytest.raises(ForeignCodeError, match="has code .* here and c0ffee"):
+        perform({**spec.job(), "code": "c0ffee"})
+    job = spec.job()
+    job["specification"] = {**job["specification"], "method": "not-here"}
+    with pytest.raises(ForeignCodeError, match="'not-here' is not installed on this worker"):
+        perform(job)
+    broken = {**spec.job(), "plugin": ["far.py", "import no_such_module_here"]}
+    with pytest.raises(ForeignCodeError, match="cannot be run: ModuleNotFoundError"):
+        perform(broken)
 
 
 def test_deterministic_methods_run_once():
