@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from analysis.published import (
     RUNS,
@@ -106,7 +106,7 @@ def difference(ours: Rewards, published: Summary) -> Difference:
     if total == 0.0:
         return Difference(value, value, value, margin)
     freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * math.sqrt(total)
+    half = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * math.sqrt(total)
     return Difference(value, value - half, value + half, margin)
 
 
