@@ -93,7 +93,7 @@ class Sandbox:
             how = f"killed by {_signal_name(-code)}" if code < 0 else f"exit code {code}"
             reason = f"the worker process ended ({how}): {self._last_words()}"
             self.close()
-            return {"failure": "crashed", "reason": reason, "wall_s": wall}
+            return {"failure": "crashed", "reason": reason, "wall_s": wall, "killed": code < 0}
         answer: dict[str, Any] = json.loads(line)
         record = self._read_line(_START_LIMIT_S)
         if not record:
@@ -149,7 +149,7 @@ def supervise(job: dict[str, Any]) -> dict[str, Any]:
         sandbox = _new_sandbox()
     answer = sandbox.perform(job)
     for _ in range(_RETRIES):
-        if "killed by" not in answer.get("reason", "") or "failure" not in answer:
+        if not answer.get("killed"):
             break
         # From outside (out of memory, an operator), or by its own fault: tried again.
         answer = _new_sandbox().perform(job)

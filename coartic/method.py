@@ -27,8 +27,6 @@ from coartic.robot import Array, Hand
 from coartic.solution import Execution, Movement, execute
 from coartic.task import Task
 
-Outcome = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
-
 
 class Information(StrEnum):
     """What a method can be told, beyond the start, the hands and the number of goals."""
