@@ -102,7 +102,8 @@ class _MethodChecks:
     @cached_property
     def defaults(self) -> dict[str, Any]:
         """Parameters of the check: few trials where the method has trials."""
-        return {"trials": CHECK_TRIALS} if "trials" in self.fields else {}
+        trials = {"trials": CHECK_TRIALS} if "trials" in self.fields else {}
+        return trials | dict(self.entry.method.quick)
 
     @cached_property
     def fields(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
@@ -411,6 +411,8 @@ class Method(ABC):
     stochastic: ClassVar[bool] = True
     """Whether the seed matters; the others are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
+    quick: ClassVar[Mapping[str, Any]] = {}
+    """Parameters for a check in seconds, where the defaults take longer than that."""
 
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
