@@ -20,6 +20,8 @@ from typing import Any
 from pydantic import ValidationError
 
 import baselines.corrective_alone
+import baselines.optimum
+import baselines.trajectory_optimisation
 from coartic import CoarticError, Task
 from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
@@ -28,7 +30,12 @@ from coartic.method import Method
 ENTRY_POINTS = "coartic.methods"
 BUILT_IN_ORIGIN = "built in"
 _PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
-BUILT_IN: tuple[type[Method], ...] = (*DUAL_PROCESS, *baselines.corrective_alone.METHODS)
+BUILT_IN: tuple[type[Method], ...] = (
+    *DUAL_PROCESS,
+    *baselines.corrective_alone.METHODS,
+    *baselines.trajectory_optimisation.METHODS,
+    *baselines.optimum.METHODS,
+)
 
 
 class MethodFileError(CoarticError):

@@ -1,0 +1,243 @@
+"""The optimum: the best reward that two independent global searches find.
+
+Reward is lost in proportion to the joint-space path, so the shortest path that touches
+every disc is sought over all hand sequences: once from the chains of a posture graph
+(layered dynamic programming), once from many random starts around what the corrective
+process finds. Either way every plan is then rounded to whole control ticks in every way,
+with and without goals that are hit as their turn comes because the other hand is already
+there. A reference for the gaps of all other methods, not a competitor.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from baselines.posture_graph import PostureGraph, spread_out
+from baselines.trajectory_problem import Instance, Plan, TrajectoryProblem, trajectory_problem
+from baselines.whole_ticks import Rounding, movements
+from coartic import Movement, Task, TaskError, execute, parse_task
+from coartic.corrective import correct
+from coartic.initial import hand_sequences, too_many_sequences
+from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.robot import Array, Hand
+from coartic.task import hands_of, letters_of
+
+Start = tuple[tuple[Hand, ...], Array]
+CITATION = "This package; the bound on reward is section 7 of docs/model.md."
+
+
+class OptimumParameters(Parameters):
+    """The restriction, and how long to search."""
+
+    other_arm: Literal["free", "still"] = "free"
+    """Whether the arm that is not chosen may move."""
+    base: Literal["task", "y", "xy"] = "task"
+    """Base coordinates that are locked: those of the task, or these in addition."""
+    sampling_seed: Annotated[int, Field(ge=0)] = 0
+
+
+class GraphParameters(OptimumParameters):
+    """As above, for the posture graph."""
+
+    nodes: Annotated[int, Field(ge=10, le=1000)] = 200
+    """Postures per goal and hand."""
+    graphs: Annotated[int, Field(ge=1)] = 3
+    """Independent graphs."""
+
+
+class MultistartParameters(OptimumParameters):
+    """As above, for the random starts."""
+
+    starts: Annotated[int, Field(ge=1)] = 60
+    """Starts per hand sequence. The first is the corrective process's own solution."""
+
+
+class Optimum(Method):
+    """The shortest path over all hand sequences, in whole ticks."""
+
+    stochastic = False
+
+    def why_not(self, task: Task) -> str | None:
+        """More hand sequences than can be planned one by one."""
+        return too_many_sequences(task, len(task.hands))
+
+    @abstractmethod
+    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+        """Hand sequences with a configuration per goal to start from."""
+
+    def solve(self, session: Session) -> Result:
+        """Search; the solution has the fewest ticks found."""
+        parameters: OptimumParameters = self.parameters
+        task = _locked(session.hand_over(*self.told), parameters.base)
+        with session.building():
+            problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
+        with session.solving():
+            best, solves, failed = self._shortest(session, task, problem)
+            if not best:
+                raise MethodError(
+                    "infeasible", f"none of {solves} solves found a path that hits every goal"
+                )
+            made = self._whole(session, task, problem, best)
+        ranked = sorted(best.values(), key=lambda entry: entry[1].cost)
+        details = {
+            "path_length": ranked[0][1].cost,
+            "path_lengths": {letters_of(i.hands): plan.cost for i, plan in ranked},
+            "solves": solves,
+            "failed_solves": failed,
+        }
+        return Result(made, details)
+
+    def _shortest(
+        self, session: Session, task: Task, problem: TrajectoryProblem
+    ) -> tuple[dict[tuple[Hand, ...], tuple[Instance, Plan]], int, int]:
+        """The shortest plan of each hand sequence; solves made; those that failed."""
+        best: dict[tuple[Hand, ...], tuple[Instance, Plan]] = {}
+        solves = failed = 0
+        for hands, start in self.starts(session, task):
+            instance = Instance.of(
+                task, hands, still=self.parameters.other_arm == "still", radius=task.radius
+            )
+            plan = problem.solve(instance, start)
+            session.spend(**plan.spent)
+            solves += 1
+            failed += not plan.converged
+            if plan.converged and (hands not in best or plan.cost < best[hands][1].cost):
+                best[hands] = instance, plan
+        return best, solves, failed
+
+    def _whole(
+        self,
+        session: Session,
+        task: Task,
+        problem: TrajectoryProblem,
+        best: dict[tuple[Hand, ...], tuple[Instance, Plan]],
+    ) -> tuple[Movement, ...]:
+        """The fewest ticks over all plans, roundings and mergers, as executed."""
+        found: tuple[int, int, tuple[Movement, ...]] | None = None
+        for instance, plan in sorted(best.values(), key=lambda entry: entry[1].cost):
+            rounding = Rounding(problem, instance, session.model.step)
+            # A merger saves one tick a goal and never shortens the path.
+            most = len(instance.hands) - 1
+            if found is not None and rounding.least(plan) - most >= found[0]:
+                continue
+            for merged, shortest in (((), plan), *rounding.mergers(plan)):
+                for whole in rounding.every(shortest, merged):
+                    if found is not None and whole.ticks >= found[0]:
+                        break
+                    made, evaluations = movements(
+                        task,
+                        whole.hands,
+                        whole.configurations,
+                        instance.held,
+                        session.model,
+                        whole.steps,
+                    )
+                    execution = execute(task, made, model=session.model)
+                    session.spend(forward_kinematics=evaluations + execution.evaluations)
+                    entry = execution.ticks, execution.corrections, tuple(made)
+                    if execution.completed and (found is None or entry[:2] < found[:2]):
+                        found = entry
+            session.spend(**rounding.spent)
+        if found is None:
+            raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
+        return found[2]
+
+
+class DynamicProgramming(Optimum):
+    """From the cheapest chains of posture graphs."""
+
+    name = "optimum/dynamic-programming"
+    title = "Optimum: dynamic programming over postures and hands, polished"
+    citation = CITATION
+    told = frozenset(
+        {
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.JACOBIAN,
+            Information.KINEMATIC_MODEL,
+            Information.REWARD_FORMULA,
+        }
+    )
+    Parameters = GraphParameters
+    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1}
+
+    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+        """The chain of every sequence; with a free other arm also with that arm spread out."""
+        rng = np.random.default_rng(self.parameters.sampling_seed)
+        for _ in range(self.parameters.graphs):
+            graph = PostureGraph.sampled(task, self.parameters.nodes, rng)
+            session.spend(
+                forward_kinematics=graph.spent.forward_kinematics, jacobians=graph.spent.jacobians
+            )
+            missing = graph.why_none()
+            if missing:
+                raise MethodError("infeasible", missing)
+            for chain in graph.chains():
+                yield chain.hands, chain.configurations
+                if self.parameters.other_arm == "free":
+                    yield chain.hands, spread_out(task, chain)
+
+
+class Multistart(Optimum):
+    """From random starts around what the corrective process finds."""
+
+    name = "optimum/multistart"
+    title = "Optimum: random starts for every hand sequence"
+    citation = CITATION
+    told = frozenset(
+        {
+            Information.GOALS,
+            Information.CORRECTIVE_PROCESS,
+            Information.KINEMATIC_MODEL,
+            Information.REWARD_FORMULA,
+        }
+    )
+    Parameters = MultistartParameters
+    quick: ClassVar[dict[str, Any]] = {"starts": 2}
+
+    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+        """The corrective process's configurations, and Gaussian noise of many sizes on them."""
+        rng = np.random.default_rng(self.parameters.sampling_seed)
+        for letters in hand_sequences(task):
+            hands = hands_of(letters)
+            corrected = _corrected(session, task, hands)
+            for number in range(self.parameters.starts):
+                spread = 0.0 if number == 0 else 0.05 * 30.0 ** rng.random()
+                yield hands, corrected + spread * rng.standard_normal(corrected.shape)
+
+
+def _corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
+    """A configuration per goal, each from **A**; the last iterate where it does not converge."""
+    q, configurations = np.array(task.q0), []
+    for hand, goal in zip(hands, task.goals, strict=True):
+        found = correct(
+            task.robot, q, hand, goal, locked_base=task.locked_base, model=session.model
+        )
+        session.spend(
+            corrective_iterations=found.iterations,
+            jacobians=found.iterations,
+            forward_kinematics=found.iterations + 1,
+        )
+        q = found.q
+        configurations.append(q)
+    return np.array(configurations)
+
+
+def _locked(task: Task, base: str) -> Task:
+    """The task with further base coordinates locked."""
+    if base == "task":
+        return task
+    locked = sorted({*task.locked_base, *base})
+    content = {**task.model_dump(mode="json"), "locked_base": locked}
+    try:
+        return parse_task(content, f"task {task.name!r} with base {' and '.join(locked)} locked")
+    except TaskError as error:
+        raise MethodError("infeasible", str(error)) from None
+
+
+METHODS: tuple[type[Optimum], ...] = (DynamicProgramming, Multistart)

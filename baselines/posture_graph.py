@@ -1,0 +1,202 @@
+"""Layered dynamic programming over sampled inverse-kinematics postures and hands.
+
+A layer is a goal; its nodes are postures (base and one arm) that put a hand inside the
+goal's disc. A movement moves the base and the arm that is chosen; the other arm keeps the
+posture it was last used in. The state at a goal is therefore a pair of nodes, one for
+each arm, and the cheapest chain for a hand sequence follows exactly, given the nodes.
+It is the global part of a search whose local part is :mod:`baselines.trajectory_problem`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.robot import BASE_DOF, HANDS, Array, Hand
+from coartic.task import Task
+
+_PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
+_NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
+
+
+@dataclass
+class Spent:
+    """Kinematics evaluated while sampling."""
+
+    forward_kinematics: int = 0
+    jacobians: int = 0
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The cheapest chain of nodes for one hand sequence."""
+
+    hands: tuple[Hand, ...]
+    length: float
+    """Joint-space path length, length unit and rad."""
+    configurations: Array
+    """Configuration at each goal, shape ``(G, dof)``."""
+
+
+def sample_postures(
+    task: Task, goal: int, hand: Hand, count: int, rng: np.random.Generator, spent: Spent
+) -> Array:
+    """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
+
+    Gaussian samples around the start, spread log-uniformly between narrow and wide, each
+    brought to a random point of the disc by Gauss-Newton steps of least norm; ``n`` may be
+    less than ``count`` where some do not get there. The other arm stays at its start.
+    """
+    robot = task.robot
+    moving = np.zeros(robot.dof, dtype=np.bool_)
+    moving[robot.joints(hand)] = True
+    moving[:BASE_DOF] = ["x" not in task.locked_base, "y" not in task.locked_base]
+    spread = _NARROWEST * (_WIDEST / _NARROWEST) ** rng.random((count, 1))
+    q = task.q0 + spread * rng.standard_normal((count, robot.dof)) * moving
+    # Anywhere in the disc, more often towards its rim, where short paths end.
+    offset = rng.standard_normal((count, 2))
+    offset *= (
+        task.radius * rng.random((count, 1)) ** 0.25 / np.linalg.norm(offset, axis=1)[:, None]
+    )
+    aim = task.goal_array[goal] + 0.98 * offset
+    for _ in range(_PROJECTIONS):
+        miss = aim - robot.forward_kinematics(q, hand)
+        jacobian = robot.jacobian(q, hand) * moving
+        spent.forward_kinematics += count
+        spent.jacobians += count
+        square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-6 * np.eye(2)
+        step = (jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, miss[..., None]))[..., 0]
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        q = q + step * np.minimum(1.0, 0.5 / np.maximum(length, 1e-12))
+    miss = task.goal_array[goal] - robot.forward_kinematics(q, hand)
+    spent.forward_kinematics += count
+    return np.asarray(q[np.hypot(*miss.T) <= task.radius])
+
+
+@dataclass
+class PostureGraph:
+    """The layers of a task and the dynamic programme over them."""
+
+    task: Task
+    layers: dict[tuple[int, Hand], Array]
+    """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
+    spent: Spent = field(default_factory=Spent)
+
+    @classmethod
+    def sampled(cls, task: Task, count: int, rng: np.random.Generator) -> PostureGraph:
+        """A graph with at most ``count`` nodes per goal and hand."""
+        spent = Spent()
+        layers = {
+            (goal, hand): sample_postures(task, goal, hand, count, rng, spent)
+            for goal in range(len(task.goals))
+            for hand in HANDS
+            if hand in task.hands
+        }
+        return cls(task, layers, spent)
+
+    def chains(self, only: tuple[Hand, ...] | None = None) -> Iterator[Chain]:
+        """The cheapest chain of every hand sequence that has one, left before right.
+
+        ``only`` asks for one sequence.
+        """
+        start = dict.fromkeys(HANDS, self._start[None, :])
+        yield from self._extend(only, (), start, np.zeros((1, 1)), [])
+
+    def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
+        """Why there is no chain: the first goal without a posture; empty where there is one."""
+        for goal in range(len(self.task.goals)):
+            hands = self.task.hands if only is None else (only[goal],)
+            if not any(len(self.layers[goal, hand]) for hand in hands):
+                return (
+                    f"goal {goal + 1}: no posture was found that puts the "
+                    f"{' or the '.join(hands)} hand inside its disc"
+                )
+        return ""
+
+    @property
+    def _start(self) -> Array:
+        return np.array(self.task.q0)
+
+    def _extend(
+        self,
+        only: tuple[Hand, ...] | None,
+        hands: tuple[Hand, ...],
+        nodes: dict[Hand, Array],
+        cost: Array,
+        back: list[NDArray[np.intp]],
+    ) -> Iterator[Chain]:
+        """All chains that begin with ``hands``.
+
+        ``cost[i, j]`` is the cheapest way to node ``i`` of the hand used last and node
+        ``j`` of the other; ``back`` holds, for each goal, the node that a state came from.
+        """
+        goal = len(hands)
+        if goal == len(self.task.goals):
+            yield self._chain(hands, cost, back)
+            return
+        for hand in HANDS if only is None else (only[goal],):
+            layer = self.layers.get((goal, hand))
+            if layer is None or not len(layer):
+                continue
+            last = hands[-1] if hands else hand
+            base = _squares(nodes[last], layer, slice(0, BASE_DOF))
+            arm = _squares(nodes[hand], layer, self.task.robot.joints(hand))
+            if hand == last:
+                # (i, j) -> (k, j): the least over i.
+                step = np.sqrt(base + arm)
+                came = np.empty((len(layer), cost.shape[1]), dtype=np.intp)
+                reached = np.empty(came.shape)
+                for j in range(cost.shape[1]):
+                    total = cost[:, j, None] + step
+                    came[:, j] = total.argmin(axis=0)
+                    reached[:, j] = total.min(axis=0)
+            else:
+                # (i, j) -> (k, i): the hand comes from its own node j; the least over j.
+                came = np.empty((len(layer), cost.shape[0]), dtype=np.intp)
+                reached = np.empty(came.shape)
+                for i in range(cost.shape[0]):
+                    total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
+                    came[:, i] = total.argmin(axis=0)
+                    reached[:, i] = total.min(axis=0)
+            yield from self._extend(
+                only, (*hands, hand), {**nodes, hand: layer}, reached, [*back, came]
+            )
+
+    def _chain(self, hands: tuple[Hand, ...], cost: Array, back: list[NDArray[np.intp]]) -> Chain:
+        i, j = np.unravel_index(cost.argmin(), cost.shape)
+        picked = []
+        for goal in reversed(range(len(hands))):
+            picked.append(self.layers[goal, hands[goal]][i])
+            came = back[goal][i, j]
+            same = goal == 0 or hands[goal - 1] == hands[goal]
+            i, j = (came, j) if same else (j, came)
+        configurations, q = [], self._start
+        for hand, node in zip(hands, reversed(picked), strict=True):
+            q = q.copy()
+            q[:BASE_DOF] = node[:BASE_DOF]
+            q[self.task.robot.joints(hand)] = node[self.task.robot.joints(hand)]
+            configurations.append(q)
+        return Chain(hands, float(cost.min()), np.array(configurations))
+
+
+def spread_out(task: Task, chain: Chain) -> Array:
+    """A chain's configurations with each arm moving steadily between the goals it hits."""
+    configurations = chain.configurations.copy()
+    for hand in task.hands:
+        joints = task.robot.joints(hand)
+        used = [0, *(g for g, chosen in enumerate(chain.hands, 1) if chosen == hand)]
+        corners = np.vstack([task.q0, chain.configurations])[used, joints]
+        at = np.arange(1, len(chain.hands) + 1)
+        configurations[:, joints] = np.stack(
+            [np.interp(at, used, joint) for joint in corners.T], axis=1
+        )
+    return configurations
+
+
+def _squares(before: Array, after: Array, joints: slice) -> Array:
+    """Squared distances of every pair, over some joints, shape ``(before, after)``."""
+    difference = before[:, None, joints] - after[None, :, joints]
+    return np.asarray((difference**2).sum(axis=-1))

@@ -1,0 +1,316 @@
+"""The trajectory problem: one configuration per goal, its hand inside the goal's disc.
+
+One nonlinear programme per robot, number of goals and cost, compiled once. The start, the
+goals and the hand sequence are its parameters; whatever a task or a restriction holds
+still (a locked base, the arm that is not chosen) is a variable bound, so a single solver
+serves every hand sequence of a task. Solved by IPOPT (Wächter & Biegler 2006) with exact
+derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not thread-safe:
+parallelise over processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Literal
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.robot import HANDS, Array, Hand, Robot
+from coartic.task import Task
+
+Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
+COSTS: tuple[Cost, ...] = ("path-length", "squared-changes", "acceleration", "jerk")
+
+_RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
+_SHORTEST = 0.05  # of a segment's duration, where the mean is 1
+_DERIVATIVES: dict[Cost, int] = {
+    "path-length": 0,
+    "squared-changes": 0,
+    "acceleration": 1,
+    "jerk": 2,
+}
+_OPTIONS: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "expand": True,
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "tol": 1e-9,
+        "constr_viol_tol": 1e-9,
+        "bound_relax_factor": 0.0,
+        "max_iter": 400,
+        "mu_strategy": "monotone",
+    },
+}
+
+
+@dataclass(frozen=True)
+class Instance:
+    """What one solve is about: a task, a hand per goal, a restriction."""
+
+    q0: Array
+    goals: Array
+    """Goal centres, shape ``(G, 2)``."""
+    hands: tuple[Hand, ...]
+    held: NDArray[np.bool_]
+    """Joints that cannot move on the way to each goal, bool, shape ``(G, dof)``."""
+    radius: float
+    """The hand ends within this distance of each goal's centre, length unit."""
+
+    @classmethod
+    def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
+        """The instance of a task; ``still`` holds the arm that is not chosen."""
+        held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
+        held[:, [{"x": 0, "y": 1}[axis] for axis in task.locked_base]] = True
+        for goal, hand in enumerate(hands):
+            for other in HANDS:
+                if other != hand and (still or other not in task.hands):
+                    held[goal, task.robot.joints(other)] = True
+        return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a solve came to."""
+
+    converged: bool
+    reason: str
+    """IPOPT's word."""
+    configurations: Array
+    """Configuration at each goal, shape ``(G, dof)``."""
+    cost: float
+    durations: Array
+    """Of the segments, shape ``(G,)``; their mean is 1. Of use for smoothness costs only."""
+    rates: Array
+    """Time derivatives at start and goals, shape ``(derivatives, G + 1, dof)``."""
+    spent: dict[str, int] = field(default_factory=dict)
+    """Counters of the solver, ready for ``Session.spend``."""
+
+    def lengths(self, q0: Array) -> Array:
+        """Joint-space distances between successive configurations, shape ``(G,)``."""
+        steps = np.diff(np.vstack([q0, self.configurations]), axis=0)
+        return np.asarray(np.sqrt((steps**2).sum(axis=1)))
+
+
+class TrajectoryProblem:
+    """The compiled programme of one cost, for every task of a robot with so many goals."""
+
+    def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
+        self.robot, self.goals, self.cost = robot, goals, cost
+        self._order = _DERIVATIVES[cost]
+        dof, order = robot.dof, self._order
+        steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
+        lengths = casadi.SX.sym("lengths", goals)
+        rates = [casadi.SX.sym(f"rates{d}", dof, goals + 1) for d in range(order)]
+        durations = casadi.SX.sym("durations", goals)
+        depth = casadi.SX.sym("depth")  # inside the rim, for the goals that are deep
+        rim = casadi.SX.sym("rim")
+        deep = casadi.SX.sym("deep", goals)
+        q0 = casadi.SX.sym("q0", dof)
+        centres = casadi.SX.sym("centres", 2, goals)
+        right = casadi.SX.sym("right", goals)  # 1 where the right hand is chosen
+        weights = casadi.SX.sym("weights", 2)  # of path length and of depth
+
+        misses, q = [], q0
+        for g in range(goals):
+            q = q + steps[:, g]
+            positions = {hand: robot.symbolic_hand(q, hand) for hand in hands}
+            hand = (
+                right[g] * positions["right"] + (1 - right[g]) * positions["left"]
+                if len(hands) == 2
+                else positions[hands[0]]
+            )
+            misses.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
+        limits = list(misses)
+        lower = [-np.inf] * goals
+        if cost == "path-length":
+            # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
+            limits += [casadi.sumsqr(steps[:, g]) - lengths[g] ** 2 for g in range(goals)]
+            lower += [-np.inf] * goals
+            objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
+        else:
+            objective = sum(
+                (
+                    _segment_cost(
+                        cost,
+                        steps[:, g],
+                        durations[g],
+                        [(r[:, g], r[:, g + 1]) for r in rates],
+                    )
+                    for g in range(goals)
+                ),
+                casadi.SX(0),
+            )
+        upper = [0.0] * len(limits)
+        if order:
+            limits.append(casadi.sum1(durations) - goals)
+            lower.append(0.0)
+            upper.append(0.0)
+        self._lower, self._upper = np.array(lower), np.array(upper)
+        self._evaluations = goals * len(hands)  # kinematics in one evaluation of the limits
+        self._solver = casadi.nlpsol(
+            "trajectory",
+            "ipopt",
+            {
+                "x": casadi.veccat(steps, lengths, durations, depth, *rates),
+                "p": casadi.veccat(q0, centres, right, rim, deep, weights),
+                "f": objective,
+                "g": casadi.vertcat(*limits),
+            },
+            _OPTIONS,
+        )
+
+    def solve(
+        self,
+        instance: Instance,
+        start: Array,
+        *,
+        lengths: Array | None = None,
+        free_times: bool = False,
+        deep: Sequence[int] | None = None,
+    ) -> Plan:
+        """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
+
+        ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
+        cost only); ``deep`` then asks for hands as deep inside the discs of these goals
+        (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
+        segments' durations vary at a constant total (smoothness costs only). A solve that
+        fails is a plan that has not converged.
+        """
+        goals, dof, order = self.goals, self.robot.dof, self._order
+        steps = np.diff(np.vstack([instance.q0, start]), axis=0)
+        steps[instance.held] = 0.0
+        step_bound = np.where(instance.held, 0.0, np.inf)
+
+        at = np.sqrt((steps**2).sum(axis=1))
+        low, high = np.zeros(goals), np.full(goals, np.inf)
+        if self.cost != "path-length":
+            at, high = np.zeros(goals), np.zeros(goals)
+        elif lengths is not None:
+            given = ~np.isnan(lengths)
+            at[given] = low[given] = high[given] = lengths[given]
+        times = np.ones(goals)
+        shortest, longest = times, times
+        if free_times and order:
+            times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
+            times = np.maximum(times * (goals / times.sum()), 2 * _SHORTEST)
+            times *= goals / times.sum()
+            shortest, longest = np.full(goals, _SHORTEST), np.full(goals, float(goals))
+        rim = instance.radius - _RIM
+        chosen = np.zeros(goals)
+        chosen[[] if deep is None else list(deep)] = 1.0
+        deepest = 0.0 if deep is None else rim
+        # A rate is zero at rest (start and end) and for joints held on either side.
+        still = np.vstack([instance.held[:1] | True, instance.held])
+        still[:-1] |= instance.held
+        still[-1] = True
+        rate_bound = np.tile(np.where(still, 0.0, np.inf).ravel(), order)
+
+        solution = self._solver(
+            x0=np.concatenate([steps.ravel(), at, times, [0.0], np.zeros(rate_bound.size)]),
+            lbx=np.concatenate([-step_bound.ravel(), low, shortest, [0.0], -rate_bound]),
+            ubx=np.concatenate([step_bound.ravel(), high, longest, [deepest], rate_bound]),
+            lbg=self._lower,
+            ubg=self._upper,
+            p=np.concatenate(
+                [
+                    instance.q0,
+                    instance.goals.ravel(),
+                    [float(hand == "right") for hand in instance.hands],
+                    [rim],
+                    chosen,
+                    [1.0, 0.0] if deep is None else [0.0, 1.0],
+                ]
+            ),
+        )
+        x = np.asarray(solution["x"]).ravel()
+        limits = np.asarray(solution["g"]).ravel()
+        statistics = self._solver.stats()
+        end = goals * dof
+        configurations = instance.q0 + np.cumsum(x[:end].reshape(goals, dof), axis=0)
+        # IPOPT's word is checked: every limit it was given holds.
+        violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
+        converged = statistics["return_status"] in (
+            "Solve_Succeeded",
+            "Solved_To_Acceptable_Level",
+        ) and bool(np.isfinite(x).all() and violation < 1e-8)
+        return Plan(
+            converged=converged,
+            reason=statistics["return_status"],
+            configurations=configurations,
+            cost=float(solution["f"]),
+            durations=x[end + goals : end + 2 * goals],
+            rates=x[end + 2 * goals + 1 :].reshape(order, goals + 1, dof),
+            spent={
+                "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
+                "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),
+                "gradients": statistics.get("n_call_nlp_grad_f", 0),
+                "hessians": statistics.get("n_call_nlp_hess_l", 0),
+                "solver_iterations": statistics["iter_count"],
+            },
+        )
+
+
+def _segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
+    """Cost of the best segment between given end states, which is a polynomial.
+
+    ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals
+    are written out in the end states, so that nothing is discretised.
+    """
+    if cost == "squared-changes":
+        return casadi.sumsqr(step)
+    v0, v1 = rates[0]
+    # End states relative to the straight line at constant speed, which costs nothing.
+    a, b = v0 - step / time, v1 - step / time
+    if cost == "acceleration":
+        return 4 * (casadi.sumsqr(a) + casadi.dot(a, b) + casadi.sumsqr(b)) / time
+    a0, a1 = rates[1]
+    quadratic = 192 * (casadi.sumsqr(a) + casadi.sumsqr(b)) + 336 * casadi.dot(a, b)
+    mixed = 72 * (casadi.dot(a, a0) - casadi.dot(b, a1)) + 48 * (
+        casadi.dot(b, a0) - casadi.dot(a, a1)
+    )
+    bending = 9 * (casadi.sumsqr(a0) + casadi.sumsqr(a1)) - 6 * casadi.dot(a0, a1)
+    return quadratic / time**3 + mixed / time**2 + bending / time
+
+
+@lru_cache(maxsize=32)
+def trajectory_problem(
+    robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
+) -> TrajectoryProblem:
+    """The compiled problem, built once per process."""
+    return TrajectoryProblem(robot, hands, goals, cost)
+
+
+def spline(plan: Plan, q0: Array, samples: int) -> list[Array]:
+    """Configurations along a smooth plan, one piece ``(samples, dof)`` per goal.
+
+    Hermite cubics (one rate) or quintics (two) between start and goals.
+    """
+    corners = np.vstack([q0, plan.configurations])
+    at = np.linspace(0.0, 1.0, samples + 1)[1:, None]
+    pieces = []
+    for g, time in enumerate(plan.durations):
+        p0, p1 = corners[g], corners[g + 1]
+        v0, v1 = plan.rates[0, g] * time, plan.rates[0, g + 1] * time
+        if len(plan.rates) == 1:
+            rest = p1 - p0 - v0
+            piece = p0 + v0 * at + (3 * rest - (v1 - v0)) * at**2 + ((v1 - v0) - 2 * rest) * at**3
+        else:
+            a0, a1 = plan.rates[1, g] * time**2, plan.rates[1, g + 1] * time**2
+            d = p1 - p0 - v0 - a0 / 2
+            v, a = v1 - v0 - a0, a1 - a0
+            piece = (
+                p0
+                + v0 * at
+                + a0 / 2 * at**2
+                + (10 * d - 4 * v + a / 2) * at**3
+                + (-15 * d + 7 * v - a) * at**4
+                + (6 * d - 3 * v + a / 2) * at**5
+            )
+        pieces.append(piece)
+    return pieces

@@ -1,0 +1,173 @@
+"""From a shortest path to movements in whole control ticks.
+
+A movement lasts a whole number of steps of length m, so a plan whose segments are not
+multiples of m pays for the rest of each. Here the segments are rounded and the plan is
+solved again around them, and each movement aims *through* the goal's rim: a target a
+little beyond it on the same joint-space line, so that the movement ends by hitting the
+goal and not by arriving short of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
+from coartic import MotionModel, Movement, Task
+from coartic.movement import move
+from coartic.robot import Array, Hand
+
+_SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
+_BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the rim
+
+
+@dataclass(frozen=True)
+class TickPlan:
+    """A plan in whole steps."""
+
+    hands: tuple[Hand, ...]
+    steps: tuple[int, ...]
+    """Movement steps to each goal; 0 where the goal is hit as its turn comes."""
+    configurations: Array
+    """Configuration at each goal, shape ``(G, dof)``."""
+
+    @property
+    def ticks(self) -> int:
+        """What it costs: a movement of k steps takes k + 1 ticks, none takes none."""
+        return sum(steps + 1 for steps in self.steps if steps)
+
+
+class Rounding:
+    """Rounds plans of one problem and instance, and keeps count of the solver.
+
+    ``merged`` names goals (0-based) that are hit as their turn comes, without a movement.
+    """
+
+    def __init__(self, problem: TrajectoryProblem, instance: Instance, step: float) -> None:
+        self._problem, self._instance, self._step = problem, instance, step
+        self.spent: dict[str, int] = {}
+
+    def nearest(self, plan: Plan, merged: tuple[int, ...] = ()) -> TickPlan | None:
+        """Every segment but the last rounded to the nearest step, the last one up.
+
+        At a shortest path the total does not change with the division to first order, so
+        this is nearly always the least number of ticks. None where a solve fails.
+        """
+        exact = plan.lengths(self._instance.q0)[:-1] / self._step
+        return self._divided(plan, [round(length) for length in exact], merged)
+
+    def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> list[TickPlan]:
+        """All roundings up and down of all but the last segment, the cheapest first."""
+        exact = plan.lengths(self._instance.q0)[:-1] / self._step
+        choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
+        found = [self._divided(plan, list(steps), merged) for steps in itertools.product(*choices)]
+        return sorted((p for p in found if p is not None), key=lambda plan: plan.ticks)
+
+    def least(self, plan: Plan, merged: tuple[int, ...] = ()) -> int:
+        """Ticks that no rounding of a plan as long as this one can go below."""
+        length = float(plan.lengths(self._instance.q0).sum())
+        moved = len(self._instance.hands) - len(merged)
+        return math.ceil(length / self._step - _SLACK) + moved
+
+    def mergers(self, plan: Plan) -> Iterator[tuple[tuple[int, ...], Plan]]:
+        """Shortest plans in which some goals are merged with the ones before them.
+
+        Possible where another hand takes over or the discs overlap; worth it where the
+        path grows by less than the ticks it saves.
+        """
+        instance, goals = self._instance, len(self._instance.hands)
+        able = [
+            g
+            for g in range(1, goals)
+            if instance.hands[g] != instance.hands[g - 1]
+            or math.dist(instance.goals[g], instance.goals[g - 1]) <= 2 * instance.radius
+        ]
+        for count in range(1, len(able) + 1):
+            for merged in itertools.combinations(able, count):
+                found = self._solve(plan.configurations, np.full(goals, np.nan), merged)
+                if found.converged:
+                    yield merged, found
+
+    def _divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
+        """The plan with these steps to all goals but the last, and as few as can be to that."""
+        lengths = np.array([*steps, np.nan]) * self._step
+        found = self._solve(plan.configurations, lengths, merged)
+        if not found.converged:
+            return None
+        last = found.lengths(self._instance.q0)[-1] / self._step
+        lengths[-1] = math.ceil(last - _SLACK) * self._step
+        # Hands as deep inside the discs as these lengths allow: safe against rounding, and
+        # above all those that are to be there before another hand hits.
+        deep = merged or range(len(lengths))
+        centred = self._solve(found.configurations, lengths, merged, deep=deep)
+        if not centred.converged:
+            return None
+        lengths[list(merged)] = 0.0
+        whole = tuple(round(length / self._step) for length in lengths)
+        return TickPlan(self._instance.hands, whole, centred.configurations)
+
+    def _solve(
+        self,
+        start: Array,
+        lengths: Array,
+        merged: tuple[int, ...],
+        *,
+        deep: Sequence[int] | None = None,
+    ) -> Plan:
+        instance = self._instance
+        if merged:
+            lengths, held = lengths.copy(), instance.held.copy()
+            lengths[list(merged)] = 0.0
+            held[list(merged)] = True
+            instance = replace(instance, held=held)
+        plan = self._problem.solve(instance, start, lengths=lengths, deep=deep)
+        add(self.spent, plan.spent)
+        return plan
+
+
+def add(total: dict[str, int], spent: Mapping[str, int]) -> None:
+    """Add what one solve spent to a total."""
+    for name, count in spent.items():
+        total[name] = total.get(name, 0) + count
+
+
+def movements(
+    task: Task,
+    hands: tuple[Hand, ...],
+    configurations: Array,
+    held: NDArray[np.bool_],
+    model: MotionModel,
+    steps: tuple[int, ...] | None = None,
+) -> tuple[list[Movement], int]:
+    """Movements to one configuration per goal; forward-kinematics evaluations.
+
+    Joints that are ``held`` (bool, ``(G, dof)``) on the way to a goal stay where they are,
+    also where an earlier movement hit before it was where the plan has it. With ``steps``,
+    each movement aims through the rim to hit after so many; where no target beyond does,
+    it aims at the plan's own configuration.
+    """
+    made: list[Movement] = []
+    q, evaluations = np.array(task.q0), 0
+    for goal, hand in enumerate(hands):
+        wanted = np.where(held[goal], q, configurations[goal])
+        if steps is not None and not steps[goal]:
+            made.append(Movement(goal + 1, hand, "corrective", wanted))
+            continue
+        targets = [wanted]
+        if steps is not None:
+            beyond = model.step / max(float(np.linalg.norm(wanted - q)), model.step)
+            through = (q + (wanted - q) * (1.0 + k * beyond) for k in _BEYOND)
+            targets = [*through, wanted]
+        for target in targets:
+            result = move(task.robot, q, target, hand, task.goals[goal], task.radius, model=model)
+            evaluations += result.evaluations
+            if steps is None or (result.hit and result.ticks <= steps[goal] + 1):
+                break
+        q = result.q
+        made.append(Movement(goal + 1, hand, "planned", target))
+    return made, evaluations
