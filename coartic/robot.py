@@ -223,3 +223,9 @@ class Robot:
         plain = arm._replace(links=[float(length) for length in arm.links])
         chain(q, plain, xs, ys, casadi.cos, casadi.sin)
         return xs, ys
+
+
+def directions(angles: ArrayLike) -> Array:
+    """Unit vectors of links at absolute angles (rad), shape ``(..., 2)``."""
+    absolute = np.asarray(angles, dtype=np.float64)
+    return np.stack([np.cos(absolute), np.sin(absolute)], axis=-1)

@@ -1,0 +1,335 @@
+"""A proof that no solution takes fewer ticks: spatial branch and bound over relaxations.
+
+Whatever a method does, a solution in which every goal is hit passes through one
+configuration per goal, moves at most m per tick and pays one further tick for each
+movement, so that its ticks are at least
+
+    (shortest path through such configurations) / m + (goals that are moved for).
+
+The path is bounded from below by a second-order cone programme. Its variables are the
+configurations and, for the chosen arm at each goal, the direction (c, s) of every link.
+What is not convex is that (c, s) are the cosine and sine of the link's absolute angle φ.
+For φ within an interval the points (c, s, φ) lie within a set of half-spaces, whose
+offsets are exact maxima; the narrower the interval, the tighter they are. Intervals are
+split until every one of them is bounded above the ticks that are to be beaten
+(McCormick 1976; Horst & Tuy 1996). Every hand sequence, with every choice of goals that
+are hit without a movement, is a root. The proof holds up to the accuracy of the conic
+solver (Clarabel; Goulart & Chen 2024): each bound is lowered by ``_TOLERANCE``.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import clarabel
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from coartic import MotionModel, Task
+from coartic.initial import hand_sequences
+from coartic.robot import HANDS, Array, Hand, directions
+from coartic.task import hands_of, letters_of
+
+_TOLERANCE = 1e-6  # of a bound, length unit
+_RESIDUAL = 1e-8  # of dual feasibility
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was proven."""
+
+    ticks: int
+    """No solution takes fewer; the reward of any is at most minus this."""
+    proven: bool
+    """Whether that is the number of ticks that was to be proven least."""
+    nodes: int
+    """Cone programmes solved."""
+    open_nodes: int
+    """Of them, those that were neither split nor bounded when the search ended."""
+    root_length: float
+    """Bound on the path before any split, length unit and rad."""
+    iterations: int
+    """Iterations of the conic solver."""
+
+
+@dataclass(order=True)
+class _Node:
+    ticks: int
+    length: float
+    number: int
+    root: _Relaxation = field(compare=False)
+    box: Array = field(compare=False)
+    """Intervals of the absolute link angles, shape ``(links, 2)``, rad."""
+    point: Array = field(compare=False)
+    """Where the relaxation has its minimum."""
+
+
+def certify(
+    task: Task, ticks: int, *, still: bool, model: MotionModel, most_nodes: int
+) -> Certificate:
+    """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
+
+    ``still`` holds the arm that is not chosen. The search ends when all is proven or after
+    ``most_nodes`` cone programmes.
+    """
+    heap: list[_Node] = []
+    numbers = itertools.count()
+    longest = (ticks - 1) * model.step  # path of any solution that takes fewer
+    solved = iterations = 0
+    root_length = math.inf
+
+    def bound(root: _Relaxation, box: Array, parent: float) -> None:
+        nonlocal solved, iterations
+        length, point, count = root.solve(box)
+        solved += 1
+        iterations += count
+        length = max(length, parent)
+        least = root.moves + math.ceil(length / model.step - 1e-9) if length < math.inf else ticks
+        if least < ticks:
+            heapq.heappush(heap, _Node(least, length, next(numbers), root, box, point))
+
+    for root in _roots(task, still):
+        box = root.first_box(longest)
+        before = len(heap)
+        bound(root, box, 0.0)
+        if len(heap) > before:
+            root_length = min(root_length, max(node.length for node in heap if node.root is root))
+    while heap and solved < most_nodes:
+        node = heapq.heappop(heap)
+        for box in node.root.split(node.box, node.point):
+            bound(node.root, box, node.length)
+    least = heap[0].ticks if heap else ticks
+    return Certificate(
+        ticks=least,
+        proven=not heap,
+        nodes=solved,
+        open_nodes=len(heap),
+        root_length=root_length if math.isfinite(root_length) else longest,
+        iterations=iterations,
+    )
+
+
+def _roots(task: Task, still: bool) -> Iterator[_Relaxation]:
+    """Every hand sequence with every set of goals that can be hit without a movement."""
+    goals = task.goal_array
+    for letters in hand_sequences(task):
+        hands = hands_of(letters)
+        able = [
+            g
+            for g in range(1, len(hands))
+            if hands[g] != hands[g - 1] or math.dist(goals[g], goals[g - 1]) <= 2 * task.radius
+        ]
+        for count in range(len(able) + 1):
+            for merged in itertools.combinations(able, count):
+                yield _Relaxation(task, hands, merged, still)
+
+
+class _Relaxation:
+    """The cone programme of one hand sequence, all but the half-spaces of a box."""
+
+    def __init__(
+        self, task: Task, hands: tuple[Hand, ...], merged: tuple[int, ...], still: bool
+    ) -> None:
+        robot, dof, goals = task.robot, task.robot.dof, len(hands)
+        arms = [robot.arm(hand) for hand in hands]
+        self.hands = letters_of(hands)
+        self.moves = goals - len(merged)
+        links = [(g, k) for g in range(goals) for k in range(len(arms[g].links))]
+        q0 = np.array(task.q0)
+
+        # Variables: configurations, link directions, lengths of the movements.
+        self._directions = goals * dof + 2 * np.arange(len(links))
+        lengths = goals * dof + 2 * len(links) + np.arange(goals)
+        self._size = int(lengths[-1]) + 1
+        self._objective = np.zeros(self._size)
+        self._objective[lengths] = 1.0
+        # Absolute angle of each link, as a row over the variables.
+        self._angles = np.zeros((len(links), self._size))
+        for row, (g, k) in zip(self._angles, links, strict=True):
+            first = g * dof + arms[g].first
+            row[first : first + k + 1] = 1.0
+        start = np.zeros(self._size)
+        start[: goals * dof] = np.tile(q0, goals)
+        self._start_angles = self._angles @ start
+        self._relative = np.array([k + 1 for _, k in links])
+        self._lengths = np.array([arms[g].links[k] for g, k in links])
+
+        rows: list[Array] = []
+        right: list[float] = []
+        self._cones: list[object] = []
+
+        def add(entries: dict[int, float], constant: float) -> None:
+            """One row of a cone: it holds ``constant + entries · x``."""
+            dense = np.zeros(self._size)
+            for column, value in entries.items():
+                dense[column] -= value
+            rows.append(dense)
+            right.append(constant)
+
+        def change(g: int, joint: int) -> None:
+            if g:
+                add({g * dof + joint: 1.0, (g - 1) * dof + joint: -1.0}, 0.0)
+            else:
+                add({joint: 1.0}, -q0[joint])
+
+        held = 0
+        for g, hand in enumerate(hands):
+            stiff = {{"x": 0, "y": 1}[axis] for axis in task.locked_base}
+            for other in HANDS:
+                if other != hand and (still or other not in task.hands):
+                    stiff |= set(range(dof)[robot.joints(other)])
+            for joint in range(dof) if g in merged else sorted(stiff):
+                change(g, joint)
+                held += 1
+        if held:
+            self._cones.append(clarabel.ZeroConeT(held))
+        for g, arm in enumerate(arms):
+            add({int(lengths[g]): 1.0}, 0.0)
+            for joint in range(dof):
+                change(g, joint)
+            self._cones.append(clarabel.SecondOrderConeT(dof + 1))
+            own = [
+                (int(column), link)
+                for column, (goal, k) in zip(self._directions, links, strict=True)
+                if goal == g
+                for link in [arm.links[k]]
+            ]
+            add({}, task.radius)
+            for axis, shoulder in enumerate((arm.shoulder_x, arm.shoulder_y)):
+                reach = {column + axis: link for column, link in own}
+                add({g * dof + axis: 1.0, **reach}, shoulder - task.goals[g][axis])
+            self._cones.append(clarabel.SecondOrderConeT(3))
+            for column, _ in own:
+                add({}, 1.0)
+                add({column: 1.0}, 0.0)
+                add({column + 1: 1.0}, 0.0)
+                self._cones.append(clarabel.SecondOrderConeT(3))
+        self._fixed = sparse.csr_matrix(np.array(rows))
+        self._right = np.array(right)
+        self._settings = clarabel.DefaultSettings()
+        self._settings.verbose = False
+        self._settings.max_threads = 1
+
+    def first_box(self, longest: float) -> Array:
+        """Intervals that hold every link angle on a path no longer than ``longest``.
+
+        An absolute angle is a sum of k relative ones, so it changes by at most √k times
+        the joint-space distance.
+        """
+        reach = np.sqrt(self._relative) * longest
+        return np.stack([self._start_angles - reach, self._start_angles + reach], axis=1)
+
+    def solve(self, box: Array) -> tuple[float, Array, int]:
+        """Lower bound on the path within a box, the minimiser, iterations.
+
+        Infinite where the box holds no path, minus infinite where the solver does not say.
+        """
+        half_spaces, offsets = self._half_spaces(box)
+        solution = clarabel.DefaultSolver(
+            sparse.csc_matrix((self._size, self._size)),
+            self._objective,
+            sparse.csc_matrix(sparse.vstack([self._fixed, half_spaces])),
+            np.concatenate([self._right, offsets]),
+            [*self._cones, clarabel.NonnegativeConeT(len(offsets))],
+            self._settings,
+        ).solve()
+        point, status = np.array(solution.x), str(solution.status)
+        if status == "PrimalInfeasible":
+            return math.inf, np.nan_to_num(point), solution.iterations
+        # A dual feasible point bounds the minimum, however good the primal one is.
+        if status not in ("Solved", "AlmostSolved") or solution.r_dual > _RESIDUAL:
+            return -math.inf, np.nan_to_num(point), solution.iterations
+        return solution.obj_val_dual - _TOLERANCE, point, solution.iterations
+
+    def split(self, box: Array, point: Array) -> tuple[Array, Array]:
+        """Two halves, across the angle whose direction the relaxation has most wrong."""
+        angles = self._angles @ point
+        relaxed = np.stack([point[self._directions], point[self._directions + 1]], axis=1)
+        wrong = np.linalg.norm(relaxed - directions(angles), axis=1) * self._lengths
+        # Where all agree, the widest one: the bound is then as good as it gets here.
+        width = box[:, 1] - box[:, 0]
+        link = int(np.argmax(wrong if wrong.max() > 1e-7 else width))
+        low, high = box[link]
+        at = 0.5 * (0.5 * (low + high) + min(max(angles[link], low), high))
+        at = min(max(at, low + 0.1 * width[link]), high - 0.1 * width[link])
+        below, above = box.copy(), box.copy()
+        below[link, 1] = above[link, 0] = at
+        return below, above
+
+    def _half_spaces(self, box: Array) -> tuple[sparse.csr_matrix, Array]:
+        """Half-spaces ``A x <= b`` that hold (c, s, φ) of every link in its interval."""
+        middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
+        normals = _normals(half)
+        offsets = _support(normals, half)
+        along, across, turn = normals
+        # From the interval's own frame, where its middle is the angle zero.
+        cosine, sine = directions(middle).T
+        c = along * cosine - across * sine
+        s = along * sine + across * cosine
+        count, links = c.shape
+        index = np.arange(count * links)
+        entries = sparse.csr_matrix(
+            (
+                np.concatenate([c.ravel(), s.ravel()]),
+                (
+                    np.concatenate([index, index]),
+                    np.concatenate(
+                        [np.tile(self._directions, count), np.tile(self._directions + 1, count)]
+                    ),
+                ),
+            ),
+            shape=(count * links, self._size),
+        )
+        angles = sparse.diags_array(turn.ravel()) @ sparse.csr_matrix(
+            np.tile(self._angles, (count, 1))
+        )
+        return sparse.csr_matrix(entries + angles), (offsets + turn * middle).ravel()
+
+
+def _normals(half: Array) -> Array:
+    """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, n, links)``.
+
+    The interval's ends; the chord; tangents to cosine and sine; the chord of the sine.
+    Any normal is valid: the offsets make it so.
+    """
+    zero, one = np.zeros_like(half), np.ones_like(half)
+    found = [(zero, zero, one), (zero, zero, -one), (-one, zero, zero), (one, zero, zero)]
+    for share in (0.25, 0.5, 0.75, 1.0):
+        cosine, sine = directions(np.minimum(share * half, math.pi / 2)).T
+        found += [
+            (zero, one, -cosine),
+            (zero, -one, cosine),
+            (one, zero, sine),
+            (one, zero, -sine),
+        ]
+    sine = directions(np.minimum(half, math.pi))[..., 1]
+    slope = sine / np.maximum(half, 1e-12)
+    found += [(zero, one, -slope), (zero, -one, slope)]
+    return np.array(found).swapaxes(0, 1)
+
+
+def _support(normals: Array, half: Array) -> Array:
+    """Maximum of ``a cos δ + b sin δ + k δ`` over |δ| <= half, exactly; ``(n, links)``."""
+    a, b, k = normals
+    cosine, sine = directions(half).T
+    best = np.asarray(
+        np.maximum(a * cosine + b * sine + k * half, a * cosine - b * sine - k * half)
+    )
+    # Stationary where r sin(δ - θ) = k, with (a, b) = r (cos θ, sin θ).
+    r, theta = np.hypot(a, b), np.arctan2(b, a)
+    exists = np.abs(k) <= r
+    angle = np.arcsin(np.clip(k / np.maximum(r, 1e-300), -1.0, 1.0))
+    turns = int(np.ceil(half.max(initial=0.0) / _TURN)) + 1
+    for root in (angle, math.pi - angle):
+        for turn in range(-turns, turns + 1):
+            delta = theta + root + turn * _TURN
+            value = r * directions(delta - theta)[..., 0] + k * delta
+            inside: NDArray[np.bool_] = exists & (np.abs(delta) <= half)
+            best = np.where(inside, np.maximum(best, value), best)
+    return best
