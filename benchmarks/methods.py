@@ -22,6 +22,7 @@ from pydantic import ValidationError
 import baselines.corrective_alone
 import baselines.optimum
 import baselines.trajectory_optimisation
+import baselines.posture_based
 from coartic import CoarticError, Task
 from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
@@ -35,6 +36,7 @@ BUILT_IN: tuple[type[Method], ...] = (
     *baselines.corrective_alone.METHODS,
     *baselines.trajectory_optimisation.METHODS,
     *baselines.optimum.METHODS,
+    *baselines.posture_based.METHODS,
 )
 
 

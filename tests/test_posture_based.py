@@ -1,0 +1,261 @@
+"""Posture-based planning against closed forms and an independent optimiser."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from baselines.posture_based import OneGoal, TwoGoals
+from coartic import Robot, execute, load_task
+from coartic.method import MethodError, Session
+
+from .strategies import UNEVEN, tiny_task
+
+ACCURACY = 0.09  # θ^g − θ^a
+STEP = 0.01  # m
+QUICK = {"stored": 20, "rounds": 10, "batch": 20}
+
+
+def solve(task, method, seed=0, **parameters):
+    session = Session(task, seed, method.told)
+    return method(method.Parameters(**parameters)).solve(session), session
+
+
+def shortest(task, hands, starts=12):
+    """Least joint-space distance through the goals' discs, by SLSQP from many starts."""
+    free = []
+    for hand in hands:
+        mask = np.zeros(task.robot.dof, bool)
+        mask[:2] = [c not in task.locked_base for c in "xy"]
+        mask[task.robot.joints(hand)] = True
+        free.append(mask)
+
+    def chain(z):
+        postures, z = [task.q0], list(z)
+        for mask in free:
+            posture = postures[-1].copy()
+            posture[mask] = [z.pop(0) for _ in range(mask.sum())]
+            postures.append(posture)
+        return np.array(postures)
+
+    def length(z):
+        return np.sqrt((np.diff(chain(z), axis=0) ** 2).sum(axis=1) + 1e-14).sum()
+
+    def room(z):
+        hits = zip(chain(z)[1:], hands, task.goals, strict=True)
+        return [
+            ACCURACY - math.dist(task.robot.forward_kinematics(q, hand), goal)
+            for q, hand, goal in hits
+        ]
+
+    rng = np.random.default_rng(7)
+    found = []
+    for _ in range(starts):
+        start = [(task.q0 + rng.normal(0, 0.6, len(task.q0)))[mask] for mask in free]
+        result = minimize(
+            length,
+            np.concatenate(start),
+            method="SLSQP",
+            constraints={"type": "ineq", "fun": room},
+            options={"maxiter": 300, "ftol": 1e-9},
+        )
+        if result.success and min(room(result.x)) > -1e-6:
+            found.append(result.fun)
+    return min(found)
+
+
+def bent(**changes):
+    start = {"base": [0.0, 0.0], "left": [2.2, -0.4, -0.3, 0.2], "right": [0.8, 0.4, -0.3, 0.5]}
+    return tiny_task(start=start, **changes)
+
+
+def uneven(**changes):
+    start = {"base": [0.1, 0.0], "left": [2.0], "right": [0.6, 0.5, -0.4]}
+    robot = {key: getattr(UNEVEN, key) for key in ("left_links", "right_links", "left_shoulder")}
+    return tiny_task(robot=robot, start=start, **changes)
+
+
+@pytest.mark.parametrize(
+    ("task", "hand"),
+    [
+        (bent(goals=[[5.0, 1.0]], initial_hands="R"), "right"),
+        (bent(goals=[[-2.0, -1.5]], initial_hands="L"), "left"),
+        (bent(goals=[[3.0, -2.0]], initial_hands="R", locked_base=["y"]), "right"),
+        (bent(goals=[[1.0, -2.0]], initial_hands="L", locked_base=["x", "y"]), "left"),
+        (uneven(goals=[[-0.5, 2.0]], initial_hands="R"), "right"),
+    ],
+    ids=["free", "behind", "rail", "fixed", "uneven"],
+)
+def test_a_dense_store_gives_the_nearest_posture(task, hand):
+    result, _ = solve(task, OneGoal, stored=1000, rounds=100, hands="given")
+    (movement,) = result.solution
+    assert movement.hand == hand
+    travelled = float(np.linalg.norm(movement.target - task.q0))
+    assert travelled == pytest.approx(shortest(task, [hand]), abs=0.01)
+
+
+@pytest.mark.parametrize("hands", ["RR", "RL"])
+def test_two_goals_give_the_shortest_way_through_both(hands):
+    task = bent(goals=[[5.0, 1.0], [4.0, 2.5]], initial_hands=hands)
+    result, _ = solve(task, TwoGoals, rounds=100, hands="given")
+    # The second posture is planned anew from where the first movement ends.
+    first, second = (movement.target for movement in result.solution)
+    travelled = math.dist(task.q0, first) + math.dist(first, second)
+    least = shortest(task, [{"R": "right", "L": "left"}[letter] for letter in hands])
+    assert least - 0.005 < travelled < least + 0.04
+
+
+SHOULDER, REACH = 0.5, 1.0
+
+
+def one_link(left, right, second=0.0):
+    """One link an arm on a fixed base: each joint angle is a position on a circle.
+
+    Goal 1 is where the circles meet: left angle 60°, right angle 120°. Goal 2 is the
+    right hand's at angle ``second``.
+    """
+    meet = [0.0, 0.1 + math.sqrt(REACH**2 - SHOULDER**2)]
+    return tiny_task(
+        robot={"left_links": [REACH], "right_links": [REACH]},
+        goals=[meet, [SHOULDER + math.cos(second), 0.1 + math.sin(second)]],
+        locked_base=["x", "y"],
+        start={"base": [0.0, 0.0], "left": [left], "right": [right]},
+    )
+
+
+def ticks(angle):
+    """Of a movement of one joint that starts so far from the goal's centre."""
+    rim = 2 * math.asin(0.1 / 2 / REACH)
+    return math.ceil((angle - rim) / STEP) + 1
+
+
+def test_looking_ahead_takes_the_other_hand_where_that_pays():
+    left, right = math.radians(60 + 45), math.radians(120 - 40)
+    task = one_link(left, right)
+    one, _ = solve(task, OneGoal)
+    assert [movement.hand for movement in one.solution] == ["right", "right"]
+    two, _ = solve(task, TwoGoals)
+    assert [movement.hand for movement in two.solution] == ["left", "right"]
+    assert two.details["expected_ticks"] == [ticks(math.radians(45)), ticks(right)]
+    reached = right + (ticks(math.radians(40)) - 1) * STEP
+    assert one.details["expected_ticks"] == [ticks(math.radians(40)), ticks(reached)]
+    # Trying every sequence finds the same without looking ahead.
+    every, _ = solve(task, OneGoal, hands="every")
+    assert every.details == two.details
+    assert -sum(two.details["expected_ticks"]) == execute(task, two.solution).reward
+
+
+def test_a_free_arm_is_preshaped():
+    a, b = 1.2, 0.9
+    task = one_link(math.radians(60) + a, b)
+    result, _ = solve(task, TwoGoals, other_arm="free", rounds=100)
+    first, second = result.solution
+    assert (first.hand, second.hand) == ("left", "right")
+    # Both joints at once, along the diagonal: the other hand is there when this one is.
+    inside = 2 * math.asin(ACCURACY / 2 / REACH)
+    diagonal = math.hypot(a - inside, b - inside)
+    assert math.dist(task.q0, first.target) == pytest.approx(diagonal, abs=0.02)
+    assert math.dist(first.target, second.target) < 0.03
+    still, _ = solve(task, TwoGoals)
+    assert still.solution[0].target[3] == task.q0[3]
+    assert sum(still.details["expected_ticks"]) > sum(result.details["expected_ticks"]) + 40
+
+
+def test_without_diffusion_the_base_takes_the_hand_there():
+    task = bent(goals=[[5.0, 1.0]], initial_hands="R")
+    result, session = solve(task, OneGoal, stored=0, rounds=0, hands="given")
+    (movement,) = result.solution
+    hand = task.robot.forward_kinematics(task.q0, "right")
+    expected = np.array(task.q0)
+    expected[:2] += np.array(task.goals[0]) - hand
+    assert movement.target == pytest.approx(expected)
+    points = math.ceil(math.dist(hand, task.goals[0]) / STEP) + 1
+    assert session.meter.forward_kinematics == 2 + points  # evaluated, placed, simulated
+    assert session.meter.jacobians == 0
+
+
+def test_every_evaluation_is_counted(monkeypatch):
+    made = {"forward_kinematics": 0, "jacobians": 0}
+    chain, jacobian = Robot.forward_kinematics, Robot.jacobian
+
+    def counted_chain(self, q, hand):
+        made["forward_kinematics"] += np.asarray(q)[..., 0].size
+        return chain(self, q, hand)
+
+    def counted_jacobian(self, q, hand):
+        made["jacobians"] += np.asarray(q)[..., 0].size
+        return jacobian(self, q, hand)
+
+    monkeypatch.setattr(Robot, "forward_kinematics", counted_chain)
+    monkeypatch.setattr(Robot, "jacobian", counted_jacobian)
+    _, session = solve(load_task("two-armed-1"), TwoGoals, **QUICK)
+    meter = session.meter.as_dict()
+    assert {key: meter[key] for key in made} == made
+    assert made["jacobians"] > 1000
+    assert meter["trials"] == meter["corrective_iterations"] == 0
+
+
+@settings(max_examples=15)
+@given(
+    st.lists(st.tuples(st.floats(-8, 8), st.floats(-3, 3)), min_size=1, max_size=3),
+    st.sampled_from([[], ["x"], ["y"]]),
+    st.sampled_from([OneGoal, TwoGoals]),
+    st.integers(0, 99),
+)
+def test_what_is_planned_is_what_happens(goals, locked, method, seed):
+    if locked == ["x"]:
+        goals = [(x / 3, y) for x, y in goals]
+    task = bent(goals=[list(goal) for goal in goals], initial_hands="best-of-all")
+    task = task.model_copy(update={"locked_base": tuple(locked)})
+    result, _ = solve(task, method, seed, **QUICK)
+    execution = execute(task, result.solution)  # refuses a locked base that moves
+    assert execution.completed
+    assert execution.corrections == 0
+    assert list(execution.ticks_by_goal()) == result.details["expected_ticks"]
+    before = [task.q0, *execution.configurations]
+    for movement, q in zip(result.solution, before, strict=False):
+        miss = task.robot.forward_kinematics(movement.target, movement.hand)
+        assert math.dist(miss, task.goals[movement.goal - 1]) <= ACCURACY + 1e-12
+        other = task.robot.joints("left" if movement.hand == "right" else "right")
+        assert np.array_equal(movement.target[other], q[other])
+
+
+def test_a_goal_out_of_reach_is_infeasible():
+    task = one_link(1.5, 1.5, second=0.0)
+    far = task.model_copy(update={"goals": (task.goals[0], (2.0, 0.1))})
+    for method, hands in itertools.product((OneGoal, TwoGoals), ("chosen", "given", "every")):
+        with pytest.raises(MethodError, match=r"^goal 2: no correction of any of \d+") as error:
+            solve(far, method, hands=hands, **QUICK)
+        assert error.value.outcome == "infeasible"
+    # Out of reach for the hand that is given, not for the one that is chosen.
+    left = task.model_copy(update={"initial_hands": "LL"})
+    with pytest.raises(MethodError, match="goal 2: .* puts the left hand within 0.09 of it"):
+        solve(left, OneGoal, hands="given", **QUICK)
+    assert solve(left, OneGoal, **QUICK)[0].solution[1].hand == "right"
+
+
+def test_hands_that_cannot_be_had_are_refused_beforehand():
+    policy = bent(initial_hands="best-of-all")
+    assert OneGoal().why_not(policy) is None
+    named = OneGoal(OneGoal.Parameters(hands="given"))
+    assert "names no hand sequence but 'best-of-all'" in named.why_not(policy)
+    every = TwoGoals(TwoGoals.Parameters(hands="every"))
+    assert every.why_not(policy) is None
+    long = bent(goals=[[5.0, 1.0 + k] for k in range(13)], initial_hands="best-of-all")
+    assert "8192 hand sequences" in every.why_not(long)
+
+
+@pytest.mark.parametrize(
+    ("name", "one_goal", "two_goals"),
+    [("ascending", -319, -303), ("descending", -333, -315), ("two-armed-1", -671, -505)],
+)
+def test_shipped_tasks(name, one_goal, two_goals):
+    """One goal does as well as the corrective process, two as well as the learner."""
+    task = load_task(name)
+    rewards = [execute(task, solve(task, m)[0].solution).reward for m in (OneGoal, TwoGoals)]
+    assert rewards[0] >= one_goal
+    assert rewards[1] >= two_goals
