@@ -19,7 +19,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+import baselines.cma_es
 import baselines.corrective_alone
+import baselines.random_search
 from coartic import CoarticError, Task
 from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
@@ -28,7 +30,12 @@ from coartic.method import Method
 ENTRY_POINTS = "coartic.methods"
 BUILT_IN_ORIGIN = "built in"
 _PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
-BUILT_IN: tuple[type[Method], ...] = (*DUAL_PROCESS, *baselines.corrective_alone.METHODS)
+BUILT_IN: tuple[type[Method], ...] = (
+    *DUAL_PROCESS,
+    *baselines.corrective_alone.METHODS,
+    *baselines.random_search.METHODS,
+    *baselines.cma_es.METHODS,
+)
 
 
 class MethodFileError(CoarticError):
