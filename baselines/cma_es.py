@@ -161,6 +161,8 @@ class Every(_OverSequences):
     def _allot(self, strategies: list[Strategy], practice: Practice) -> None:
         rounds = math.ceil(math.log2(len(strategies))) + 1  # the last is for one alone
         budget = practice.left / rounds
+        # Best first from the start: of very many sequences a round does not reach all.
+        strategies = sorted(strategies, key=lambda s: -s.reward)
         for _ in range(rounds):
             for strategy in strategies:
                 enough = strategy.trials + budget / len(strategies)

@@ -93,6 +93,8 @@ class Practice:
 
     def result(self, **details: Any) -> Result:
         """The best trial's movements; MethodError where no trial hit every goal."""
+        if not self.made:
+            raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
         if not self.hands:
             raise MethodError(
                 "infeasible",

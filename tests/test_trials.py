@@ -28,7 +28,7 @@ TASKS = [
 ]
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     st.sampled_from(TASKS),
     st.integers(0, 10**6),
