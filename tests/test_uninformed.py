@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from baselines import cma_es, random_search
-from baselines.uninformed import TOLD, Practice, UninformedParameters
+from baselines.uninformed import TOLD, Attempt, Practice, UninformedParameters
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.method import MethodError, Session
 
@@ -180,8 +180,38 @@ def test_sequences_that_cannot_be_completed_are_left(method):
     assert execute(task, result.solution).hands[1] == "R"
 
 
+class HalfOfAPlain:
+    """A quadratic reward around (1, 1, 1); beyond 0.5 in the first joint trials fail."""
+
+    left = 10**6
+
+    def explored(self, hands):
+        return np.ones((1, 3), dtype=bool)
+
+    def by_correction(self, hands):
+        return Attempt(np.array([-300.0]), np.zeros((1, 1, 3)))
+
+    def by_targets(self, hands, mask, values):
+        self.failed = values[:, 0] > 0.5
+        rewards = -100.0 * ((values - 1.0) ** 2).sum(axis=1)
+        return Attempt(np.where(self.failed, -np.inf, rewards), values[:, None])
+
+
+def test_failed_trials_rank_last():
+    """The best that does not fail is (0.5, 1, 1), with -25."""
+    practice = HalfOfAPlain()
+    session = Session(ONE_GOAL, 0, TOLD, trusted=True)
+    strategy = cma_es.Strategy(session, practice, "R", 0.05)
+    failed = []
+    for _ in range(80):
+        strategy.generation()
+        failed.append(practice.failed.mean())
+    assert -26.0 < strategy.reward <= -25.0
+    assert 0.0 < np.mean(failed) < 0.7
+
+
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-def test_failed_trials_rank_last(method):
+def test_failed_trials_are_counted_and_survived(method):
     """Noise so large that some corrections take more iterations than there are."""
     task, model = load_task("ascending"), MotionModel(max_iterations=100)
     assert corrective_trial(task, "RRR", model=model).completed
