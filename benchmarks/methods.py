@@ -19,10 +19,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
+import baselines.cma_es
 import baselines.corrective_alone
 import baselines.optimum
-import baselines.trajectory_optimisation
 import baselines.posture_based
+import baselines.random_search
+import baselines.trajectory_optimisation
 from coartic import CoarticError, Task
 from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
@@ -34,9 +36,11 @@ _PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
 BUILT_IN: tuple[type[Method], ...] = (
     *DUAL_PROCESS,
     *baselines.corrective_alone.METHODS,
+    *baselines.random_search.METHODS,
+    *baselines.cma_es.METHODS,
+    *baselines.posture_based.METHODS,
     *baselines.trajectory_optimisation.METHODS,
     *baselines.optimum.METHODS,
-    *baselines.posture_based.METHODS,
 )
 
 

@@ -34,6 +34,7 @@ from coartic.movement import move_kernel, scratch_for
 from coartic.robot import HANDS, Array
 from coartic.solution import Execution, Movement, execute
 from coartic.task import Task, hands_of, letters_of
+from coartic.trials import make_trials
 
 TRIALS = 10_000  # trials of one run (printed)
 METHOD_PREFIX = "dual-process/"
@@ -563,6 +564,7 @@ def warm_up() -> None:
 
     task = load_task("ascending")
     learn(task, "EC1", seed=0, trials=1).execute()
+    make_trials(task, "RRR", np.empty((0, len(task.goals), task.robot.dof)))
 
 
 def _problem(task: Task, condition: ExplorationCondition, model: MotionModel) -> _Problem:

@@ -1,0 +1,138 @@
+"""The learner's trials for methods that see nothing of them but the total reward.
+
+As in the learner, a trial moves towards one target configuration per goal, the
+corrective process **A** finishes what that misses, and the configurations in which the
+goals were hit are known afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from coartic import Movement, execute
+from coartic.learner import TRIALS
+from coartic.method import Information, MethodError, Parameters, Result, Session
+from coartic.robot import HANDS, Array
+from coartic.task import hands_of
+from coartic.trials import make_trials
+
+TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+
+
+class UninformedParameters(Parameters):
+    """What the uninformed methods have in common; the defaults are the learner's."""
+
+    trials: Annotated[int, Field(gt=0)] = TRIALS
+    sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
+    """SD of the (first) perturbations, length unit (base) or rad (joints)."""
+    other_arm: Literal["free", "still"] = "free"
+    """Whether the arm that does not hit the goal is explored, too (exploration conditions
+    4 and 3 of the learner)."""
+
+
+class Attempt(NamedTuple):
+    """What is known of trials after making them."""
+
+    rewards: Array
+    """Total rewards, shape ``(N,)``; -inf where a trial failed."""
+    reached: Array
+    """Configuration when each goal was hit, shape ``(N, G, dof)``."""
+
+
+class Practice:
+    """The physical trials of one run: makes them, counts them, remembers the best."""
+
+    def __init__(self, session: Session, parameters: UninformedParameters) -> None:
+        self._session = session
+        self._task = session.hand_over(*TOLD)
+        self._other_arm = parameters.other_arm
+        left = session.trials_left
+        self.left = parameters.trials if left is None else min(parameters.trials, left)
+        """Trials left."""
+        self.made = 0
+        self.reward = -math.inf
+        """Best reward so far."""
+        self.hands = ""
+        """Hand sequence of the best trial, empty before the first success."""
+        self._best_trial = -1
+        self._targets: Array = np.empty(0)
+
+    def explored(self, hands: str) -> NDArray[np.bool_]:
+        """Joints that a hand sequence explores, shape ``(G, dof)``.
+
+        Never a locked base coordinate, nor an arm that hits neither this goal nor a later
+        one: moving it can only cost.
+        """
+        session, names = self._session, hands_of(hands)
+        mask = np.zeros((len(names), session.dof), dtype=np.bool_)
+        mask[:, :2] = [coordinate not in session.locked_base for coordinate in "xy"]
+        for goal, chosen in enumerate(names):
+            useful = names[goal:] if self._other_arm == "free" else (chosen,)
+            for hand in HANDS:
+                mask[goal, session.joints(hand)] = hand in useful
+        return mask
+
+    def by_correction(self, hands: str) -> Attempt:
+        """One trial by **A** alone."""
+        shape = (1, self._session.goals_count, self._session.dof)
+        return self._make(hands, np.full(shape, np.nan))
+
+    def by_targets(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Attempt:
+        """Trials with targets for the joints in ``mask`` (G, dof); the others keep still.
+
+        ``values`` has shape ``(N, number of joints in the mask)``.
+        """
+        targets = np.full((len(values), *mask.shape), np.nan)
+        targets[:, mask] = values
+        return self._make(hands, targets)
+
+    def result(self, **details: Any) -> Result:
+        """The best trial's movements; MethodError where no trial hit every goal."""
+        if not self.made:
+            raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
+        if not self.hands:
+            raise MethodError(
+                "infeasible",
+                f"the corrective process failed in all {self.made} trials made; "
+                "no trial hit every goal",
+                details,
+            )
+        movements = [
+            Movement(number, hand, "corrective")
+            if np.isnan(target).all()
+            else Movement(number, hand, "learned", target)
+            for number, (hand, target) in enumerate(
+                zip(hands_of(self.hands), self._targets, strict=True), 1
+            )
+        ]
+        # Only the log of a trial that was made and counted, so not another trial.
+        log = execute(self._task, movements, model=self._session.model)
+        return Result(log.movements, {"best_trial": self._best_trial, **details})
+
+    def _make(self, hands: str, targets: Array) -> Attempt:
+        trials = make_trials(self._task, hands, targets, model=self._session.model)
+        rewards = np.where(trials.completed, -trials.ticks, -math.inf)
+        self._session.spend(
+            trials=len(rewards),
+            movement_ticks=int(trials.ticks.sum()),
+            forward_kinematics=trials.evaluations,
+            jacobians=trials.iterations,
+            corrective_iterations=trials.iterations,
+            corrections=trials.corrections,
+            failed_trials=int((~trials.completed).sum()),
+        )
+        self._session.record_rewards(
+            int(reward) if math.isfinite(reward) else None for reward in rewards
+        )
+        best = int(rewards.argmax())
+        if rewards[best] > self.reward:
+            self.reward, self.hands = float(rewards[best]), hands
+            self._best_trial, self._targets = self.made + best, trials.targets[best]
+        self.made += len(rewards)
+        self.left -= len(rewards)
+        return Attempt(rewards, trials.reached)

@@ -1,0 +1,259 @@
+"""Random search and CMA-ES against closed forms, brute force and their own rules."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from baselines import cma_es, random_search
+from baselines.uninformed import TOLD, Attempt, Practice, UninformedParameters
+from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic.method import MethodError, Session
+
+from .strategies import tiny_task
+
+METHODS = (*random_search.METHODS, *cma_es.METHODS)
+ONE_GOAL = tiny_task(
+    hands=["right"],
+    goals=[[-3.0, 0.0]],
+    initial_hands="R",
+    start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.0, 0.3, 0.4, -0.2]},
+)
+
+
+def solve(method, task, seed=0, budget=None, model=None, **parameters):
+    session = Session(
+        task, seed, method.told, trial_budget=budget, trusted=True, model=model or MotionModel()
+    )
+    result = method(method.Parameters(**parameters)).solve(session)
+    return session, result
+
+
+def shortest_reach(task):
+    """Ticks of the shortest joint-space line to a one-goal task's disc, by SLSQP."""
+    free = [0, 1, 6, 7, 8, 9]
+    goal = np.array(task.goals[0])
+
+    def q(x):
+        full = np.array(task.q0)
+        full[free] = x
+        return full
+
+    def inside(x):
+        return task.radius**2 - ((task.robot.forward_kinematics(q(x), "right") - goal) ** 2).sum()
+
+    rng = np.random.default_rng(0)
+    found = [
+        minimize(
+            lambda x: ((x - task.q0[free]) ** 2).sum(),
+            task.q0[free] + rng.normal(0, 1.0, len(free)),
+            constraints={"type": "ineq", "fun": inside},
+            method="SLSQP",
+        )
+        for _ in range(20)
+    ]
+    return math.ceil(min(math.sqrt(f.fun) for f in found if f.success) / 0.01) + 1
+
+
+def test_one_goal_is_reached_on_the_shortest_line():
+    shortest = shortest_reach(ONE_GOAL)
+    alone = -corrective_trial(ONE_GOAL, "R").reward
+    assert alone > shortest + 5
+    for method in cma_es.METHODS:
+        session, _ = solve(method, ONE_GOAL, trials=1500)
+        assert shortest - 1 <= -max(session.rewards) <= shortest + 1
+    climbing, _ = solve(random_search.Climbing, ONE_GOAL, trials=1500)
+    assert max(climbing.rewards) > -alone
+
+
+@pytest.mark.parametrize(
+    ("other_arm", "left", "right"),
+    [("free", [1, 1, 1, 0], [1, 1, 1, 1]), ("still", [1, 0, 1, 0], [0, 1, 0, 1])],
+)
+def test_joints_explored_for_a_hand_sequence(other_arm, left, right):
+    session = Session(load_task("two-armed-1"), 0, TOLD, trusted=True)
+    practice = Practice(session, UninformedParameters(other_arm=other_arm))
+    mask = practice.explored("LRLR")
+    assert mask[:, 0].all()
+    assert not mask[:, 1].any()  # the base is locked in y
+    np.testing.assert_array_equal(mask[:, 2:6].T, [left] * 4)
+    np.testing.assert_array_equal(mask[:, 6:].T, [right] * 4)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("name", ["ascending", "two-armed-1"])
+def test_trials_counted_kept_and_made_again(method, name):
+    task = load_task(name)
+    session, result = solve(method, task, trials=301)
+    assert session.meter.trials == len(session.rewards) == 301
+    completed = [reward for reward in session.rewards if reward is not None]
+    again = execute(task, result.solution)
+    assert again.reward == max(completed)
+    assert session.rewards.index(again.reward) == result.details["best_trial"]
+    assert [m.ticks for m in again.movements] == [m.ticks for m in result.solution]
+    assert -sum(completed) == session.meter.movement_ticks  # none failed
+    limited, _ = solve(method, task, budget=23, trials=301)
+    assert limited.meter.trials == 23
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_the_other_arm_can_be_kept_still(method):
+    task = load_task("two-armed-2")
+    _, result = solve(method, task, trials=400, other_arm="still")
+    execution = execute(task, result.solution)
+    q = task.q0
+    for letter, reached in zip(execution.hands, execution.configurations, strict=True):
+        other = task.robot.joints("left" if letter == "R" else "right")
+        np.testing.assert_array_equal(reached[other], q[other])
+        q = reached
+
+
+def test_search_improves_on_where_it_begins():
+    """Ascending: -319 by the corrective process alone, about -303 learned."""
+    task = load_task("ascending")
+    rewards = {}
+    for method in METHODS:
+        session, _ = solve(method, task, trials=2000)
+        assert session.rewards[0] == -319
+        rewards[method.name] = max(session.rewards)
+    assert rewards["random-search/pure"] > -319
+    assert rewards["random-search/climbing"] > rewards["random-search/pure"]
+    assert rewards["cma-es/bandit"] > rewards["random-search/climbing"]
+    assert rewards["cma-es/every"] == rewards["cma-es/bandit"]  # one sequence, nothing to choose
+
+
+def test_every_sequence_begins_with_its_corrective_trial():
+    task = load_task("two-armed-2")
+    alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
+    session, result = solve(cma_es.Every, task, trials=500)
+    assert session.rewards[0] == alone["RRRR"]
+    assert sorted(session.rewards[:16]) == sorted(alone.values())
+    spent = result.details["trials"]
+    assert set(spent) == set(alone)
+    assert sum(spent.values()) == 500
+
+
+def test_halving_gives_equal_shares_first_and_the_rest_to_the_best():
+    _, result = solve(cma_es.Every, load_task("two-armed-1"), trials=2400)
+    spent = sorted(result.details["trials"].values(), reverse=True)
+    share = (2400 - 16) / 5 / 16  # of the first of five rounds
+    generation = 14  # the default population in 32 dimensions, the largest here
+    assert all(share <= trials <= share + generation + 1 for trials in spent[8:])
+    assert all(trials >= 3 * share for trials in spent[:8])
+    assert spent[0] > 2400 / 4
+    assert result.details["trials"]["LRLR"] == spent[0]
+
+
+def test_the_bandit_exploits_explores_and_goes_where_rewards_are():
+    task = load_task("two-armed-1")
+    _, greedy = solve(cma_es.Bandit, task, trials=600, exploration=0.0)
+    assert greedy.details["trials"]["LRLR"] == 600 - 15  # -533 at first; the next one has -586
+    _, even = solve(cma_es.Bandit, task, trials=800, exploration=100.0)
+    assert min(even.details["trials"].values()) > 30
+    _, balanced = solve(cma_es.Bandit, task, trials=1200)
+    spent = balanced.details["trials"]
+    assert spent["LRLR"] > 600
+    assert spent["LRLR"] == max(spent.values())
+
+
+def test_hill_climbing_explores_hands_as_often_as_told():
+    task = load_task("two-armed-1")
+    _, fixed = solve(random_search.Climbing, task, trials=200, epsilon=0.0)
+    assert {movement.hand for movement in fixed.solution} == {"right"}
+    assert fixed.details["sequences"] == 1
+    _, free = solve(random_search.Climbing, task, trials=200, epsilon=1.0)
+    assert free.details["sequences"] == 16
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_sequences_that_cannot_be_completed_are_left(method):
+    """The base is locked and the second goal out of the left hand's reach."""
+    task = tiny_task(
+        goals=[[2.0, 2.0], [4.3, 0.8]],
+        locked_base=["x", "y"],
+        start={"base": [0.0, 0.0], "left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
+    )
+    session, result = solve(method, task, trials=150)
+    assert session.meter.trials == 150
+    assert session.rewards.count(None) == session.meter.failed_trials == 2
+    assert execute(task, result.solution).hands[1] == "R"
+
+
+class HalfOfAPlain:
+    """A quadratic reward around (1, 1, 1); beyond 0.5 in the first joint trials fail."""
+
+    left = 10**6
+
+    def explored(self, hands):
+        return np.ones((1, 3), dtype=bool)
+
+    def by_correction(self, hands):
+        return Attempt(np.array([-300.0]), np.zeros((1, 1, 3)))
+
+    def by_targets(self, hands, mask, values):
+        self.failed = values[:, 0] > 0.5
+        rewards = -100.0 * ((values - 1.0) ** 2).sum(axis=1)
+        return Attempt(np.where(self.failed, -np.inf, rewards), values[:, None])
+
+
+def test_failed_trials_rank_last():
+    """The best that does not fail is (0.5, 1, 1), with -25."""
+    practice = HalfOfAPlain()
+    session = Session(ONE_GOAL, 0, TOLD, trusted=True)
+    strategy = cma_es.Strategy(session, practice, "R", 0.05)
+    failed = []
+    for _ in range(80):
+        strategy.generation()
+        failed.append(practice.failed.mean())
+    assert -26.0 < strategy.reward <= -25.0
+    assert 0.0 < np.mean(failed) < 0.7
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_failed_trials_are_counted_and_survived(method):
+    """Noise so large that some corrections take more iterations than there are."""
+    task, model = load_task("ascending"), MotionModel(max_iterations=100)
+    assert corrective_trial(task, "RRR", model=model).completed
+    session, result = solve(method, task, trials=400, sigma=1.0, model=model)
+    assert 0 < session.meter.failed_trials < 399
+    completed = [reward for reward in session.rewards if reward is not None]
+    assert execute(task, result.solution).reward == max(completed)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_no_trial_completed_is_infeasible(method):
+    with pytest.raises(MethodError, match="no trial hit every goal") as caught:
+        solve(method, load_task("two-armed-2"), trials=50, model=MotionModel(max_iterations=2))
+    assert caught.value.outcome == "infeasible"
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_no_trial_left_is_infeasible(method):
+    with pytest.raises(MethodError, match="leaves no trial") as caught:
+        solve(method, tiny_task(), budget=0)
+    assert caught.value.outcome == "infeasible"
+
+
+def test_a_policy_for_the_first_hands_is_paid_for():
+    task = tiny_task(initial_hands="best-of-all")
+    session, _ = solve(random_search.Climbing, task, trials=50)
+    assert session.meter.trials == 4 + 50
+    with pytest.raises(MethodError, match="leaves no trial"):
+        solve(random_search.Climbing, task, budget=4)
+
+
+def test_a_single_joint_to_explore():
+    """One link, the base locked: CMA-ES in one dimension."""
+    task = tiny_task(
+        hands=["right"],
+        goals=[[0.5, 1.1]],
+        locked_base=["x", "y"],
+        initial_hands="R",
+        robot={"right_links": [1.0]},
+        start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.5]},
+    )
+    session, _ = solve(cma_es.Every, task, trials=60)
+    # Turns by pi/2 - 0.5 less the angle under which half the disc's chord is seen.
+    turn = math.pi / 2 - 0.5 - 2 * math.asin(0.1 / 2)
+    assert max(session.rewards) == -(math.ceil(turn / 0.01) + 1)
