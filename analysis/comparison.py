@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from analysis.methods import methods_notes, methods_tables
 from analysis.published import (
     RUNS,
     TRIALS,
@@ -23,11 +24,11 @@ from analysis.published import (
     published_initial,
 )
 from analysis.results import CellRuns, Results
+from analysis.table import NONE, Table
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
 CONFIDENCE = 0.95
-NONE = "–"
 Rewards = Sequence[float] | NDArray[np.float64]
 
 
@@ -54,15 +55,6 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table of text, ready for a terminal or for Markdown."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
-@dataclass(frozen=True)
 class Comparison:
     """All tables of a comparison, and the notes that belong to them."""
 
@@ -75,7 +67,7 @@ class Comparison:
         parts = [f"# {self.title}"]
         for table in self.tables:
             parts.append(f"## {table.title}")
-            parts.append(_markdown(table))
+            parts.append(table.to_markdown())
         parts.append("## Notes")
         parts.append("\n".join(f"- {note}" for note in self.notes))
         return "\n\n".join(parts) + "\n"
@@ -115,12 +107,13 @@ def compare(results: Results) -> Comparison:
     tables = [
         _cells_table(results),
         _sequences_table(results.cells),
+        *methods_tables(results),
         _initial_table(results),
     ]
     return Comparison(
         title="Published and ours",
         tables=tuple(table for table in tables if table.rows),
-        notes=tuple(_notes(results)),
+        notes=(*_notes(results), *methods_notes(results)),
     )
 
 
@@ -129,6 +122,8 @@ def _cells_table(results: Results) -> Table:
     rows = []
     for cell in results.cells:
         paper, good = _published(cell), cell.good
+        if paper is None:
+            continue
         rewards = good.reward.to_numpy(dtype=np.float64)
         same_length = bool((good.trials == TRIALS).all())
         rows.append(
@@ -137,12 +132,10 @@ def _cells_table(results: Results) -> Table:
                 cell.label,
                 _published_text(paper),
                 _mean_sd(rewards),
-                _difference_text(rewards, paper.summary if paper else None),
-                _verdict(cell.task, rewards, paper.summary if paper and same_length else None),
+                _difference_text(rewards, paper.summary),
+                _verdict(cell.task, rewards, paper.summary if same_length else None),
                 _beside(_distinct(cell.runs.initial_reward), _initial_text(cell.task)),
-                _counts(good.hands)
-                if paper is None
-                else _beside(_counts(good.hands), _published_hands(paper)),
+                _beside(_counts(good.hands), _published_hands(paper)),
             )
         )
     columns = (
@@ -155,7 +148,7 @@ def _cells_table(results: Results) -> Table:
         "initial (published)",
         "hands: runs (published)",
     )
-    return Table("Learned reward", columns, tuple(rows))
+    return Table("Learned reward, published and ours", columns, tuple(rows))
 
 
 def _sequences_table(cells: Iterable[CellRuns]) -> Table:
@@ -163,7 +156,9 @@ def _sequences_table(cells: Iterable[CellRuns]) -> Table:
     rows = []
     for cell in cells:
         paper, good = _published(cell), cell.good
-        printed = {s.hands: s for s in paper.sequences} if paper else {}
+        if paper is None:
+            continue
+        printed = {s.hands: s for s in paper.sequences}
         if not printed and good.hands.nunique() < 2:
             continue
         found = list(good.hands.value_counts().index)
@@ -294,9 +289,7 @@ def _starred(cell: CellRuns) -> bool:
     return bool((paper and paper.summary and paper.summary.derived) or (initial and initial[2]))
 
 
-def _published_text(paper: PublishedCell | None) -> str:
-    if paper is None:
-        return NONE
+def _published_text(paper: PublishedCell) -> str:
     if paper.summary is None:
         return f"not printed ({paper.remark})" if paper.remark else "not printed"
     return _summary_text(paper.summary)
@@ -351,8 +344,8 @@ def _printed_runs(printed: dict[str, SequenceResult], hands: str) -> str:
     return "0" if complete else NONE
 
 
-def _published_hands(paper: PublishedCell | None) -> str:
-    if paper is None or not paper.sequences:
+def _published_hands(paper: PublishedCell) -> str:
+    if not paper.sequences:
         return NONE
     return ", ".join(f"{s.hands} {s.runs or ''}".strip() for s in paper.sequences)
 
@@ -373,12 +366,3 @@ def _initial_text(task: str) -> str:
 
 def _distinct(values: pd.Series) -> str:
     return ", ".join(str(value) for value in sorted(values.dropna().unique())) or NONE
-
-
-def _markdown(table: Table) -> str:
-    def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-    return "\n".join(
-        [line(table.columns), line(["---"] * len(table.columns)), *map(line, table.rows)]
-    )

@@ -28,7 +28,7 @@ from coartic.initial import ranked_sequences
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Meter
 
-FORMAT = 2  # of the tables below; raised when a column changes its meaning
+FORMAT = 3  # of the tables below; raised when a column changes its meaning
 
 RUNS = pa.schema(
     [
@@ -50,6 +50,8 @@ RUNS = pa.schema(
         ("best_trial", pa.int64()),
         *((name, pa.int64()) for name in Meter.COUNTS),
         ("solution_corrections", pa.int64()),  # corrective movements the solution needed
+        ("other_arm_travel", pa.float64()),  # of the arm that is not chosen, rad
+        ("proven_bound", pa.int64()),  # reward that no solution exceeds, where proven
         ("told", pa.string()),  # what the method was told, comma-separated
         ("parameters", pa.string()),  # all of them, JSON
         ("build_s", pa.float64()),
@@ -153,6 +155,8 @@ def _run_row(suite: str, cell: Cell, record: dict[str, Any]) -> dict[str, Any]:
         "hands": score and score["hands"],
         "reward": score and score["reward"],
         "solution_corrections": score and score["corrections"],
+        "other_arm_travel": score and score["other_arm_travel"],
+        "proven_bound": details.get("proven_bound"),
         **meter_of(record),
         "told": ", ".join(record["told"]),
         "parameters": json.dumps(specification["parameters"], sort_keys=True),

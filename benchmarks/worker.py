@@ -41,6 +41,7 @@ from coartic.errors import SolutionError
 from coartic.frames import movement_rows
 from coartic.learner import warm_up
 from coartic.method import BudgetError, MethodError, Result, Session, UndeclaredError
+from coartic.solution import other_arm_travel
 
 _solved_before: set[str] = set()
 
@@ -156,6 +157,7 @@ def _score(
         "hands": execution.hands,
         "ticks_by_goal": list(execution.ticks_by_goal()),
         "corrections": execution.corrections,
+        "other_arm_travel": other_arm_travel(task, execution),
     }
     return "ok", "", score, movements
 

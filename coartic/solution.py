@@ -108,6 +108,21 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     return run.outcome()
 
 
+def other_arm_travel(task: Task, execution: Execution) -> float:
+    """Joint travel of the arm that is not chosen, summed over the movements to each goal.
+
+    In rad, from hit to hit; 0 where that arm keeps still, as in exploration conditions 1
+    and 3 of the learner.
+    """
+    travel, before = 0.0, np.array(task.q0)
+    for letter, q in zip(execution.hands, execution.configurations, strict=True):
+        other: Hand = "right" if letter == "L" else "left"
+        joints = task.robot.joints(other)
+        travel += float(np.linalg.norm(q[joints] - before[joints]))
+        before = q
+    return travel
+
+
 class _Run:
     """An execution while it goes on."""
 
