@@ -95,7 +95,8 @@ def collect(results: Results) -> dict[str, Any]:
     runs["base"] = parameters.map(lambda values: values["base"])
     movements = results.solutions()
     rows = []
-    for (name, base, arm), group in runs.groupby(["task", "base", "other_arm"], sort=False):
+    for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
+        name, base, arm = map(str, key)
         task = results.tasks[name]
         good = group[group.status == "ok"]
         entry: dict[str, Any] = {

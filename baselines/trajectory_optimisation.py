@@ -27,8 +27,7 @@ from baselines.trajectory_problem import (
 )
 from baselines.whole_ticks import Rounding, movements
 from coartic import Movement, Task
-from coartic.dual_process import spend_search
-from coartic.initial import search_initial_hands, too_many_sequences
+from coartic.initial import too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.robot import Array, Hand
 from coartic.task import hands_of, letters_of
@@ -39,8 +38,8 @@ SAMPLES = 200  # points of a smooth path between goals; four times as many chang
 class TrajectoryParameters(Parameters):
     """What is planned over, and how it is started."""
 
-    hands: Literal["every", "given"] = "every"
-    """Every hand sequence, or the task's initial hands."""
+    hands: Annotated[str, Field(pattern="^(every|given|[LR]+)$")] = "every"
+    """Every hand sequence; the one that the task names; or one such as ``LRLR``."""
     other_arm: Literal["free", "still"] = "free"
     nodes: Annotated[int, Field(ge=10, le=1000)] = 150
     """Postures per goal and hand in the graph that a start is taken from. 100 missed the
@@ -72,20 +71,26 @@ class TrajectoryOptimisation(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40}
 
     def why_not(self, task: Task) -> str | None:
-        """More hand sequences than can be planned one by one."""
-        if self.parameters.hands == "given":
-            return None
-        return too_many_sequences(task, len(task.hands))
+        """A sequence that does not fit the task, or more than can be planned one by one."""
+        hands = self.parameters.hands
+        if hands == "every":
+            return too_many_sequences(task, len(task.hands))
+        if hands == "given" and task.initial_is_policy:
+            return f"task {task.name!r} names no hand sequence but {task.initial_hands!r}"
+        if hands != "given" and (
+            len(hands) != len(task.goals) or not set(hands_of(hands)) <= set(task.hands)
+        ):
+            return f"hands {hands!r} do not fit task {task.name!r}"
+        return None
 
     def solve(self, session: Session) -> Result:
         """Plan every sequence, keep the cheapest, hand over its movements."""
         parameters: TrajectoryParameters = self.parameters
         task = session.hand_over(*self.told - {Information.SECONDARY_OBJECTIVES})
         only: tuple[Hand, ...] | None = None
-        if parameters.hands == "given":
-            search = search_initial_hands(task, model=session.model)
-            spend_search(session, search)
-            only = hands_of(search.hands)
+        if parameters.hands != "every":
+            named = parameters.hands == "given"
+            only = hands_of(task.initial_hands if named else parameters.hands)
         with session.building():
             goals = len(task.goals)
             problem = trajectory_problem(task.robot, task.hands, goals, self.cost)

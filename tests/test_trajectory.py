@@ -1,0 +1,273 @@
+"""Trajectory optimisation: costs against integrals, plans against another optimiser."""
+
+import itertools
+import math
+
+import casadi
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from baselines.posture_graph import PostureGraph
+from baselines.trajectory_optimisation import METHODS
+from baselines.trajectory_problem import (
+    COSTS,
+    Instance,
+    _segment_cost,
+    spline,
+    trajectory_problem,
+)
+from baselines.whole_ticks import Rounding, movements
+from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task, parse_task
+from coartic.method import MethodError, Session
+
+ORDERS = {"acceleration": 2, "jerk": 3}
+SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
+
+
+def small_task(**change):
+    content = {
+        "name": "small",
+        "robot": SMALL,
+        "start": {"base": (0.0, 0.0), "left": (1.5,), "right": (0.4, 0.3)},
+        "goals": ((2.6, 1.0), (3.2, -0.4)),
+        "initial_hands": "RR",
+    }
+    return Task(**{**content, **change})
+
+
+def changed(name, **update):
+    content = {**load_task(name).model_dump(mode="json"), **update}
+    return parse_task(content, "test", reach=False)
+
+
+def polynomial(order, start, end, time):
+    """Coefficients of the one polynomial with these derivatives at both ends."""
+    size = 2 * order
+    rows = []
+    for at in (0.0, time):
+        for d in range(order):
+            rows.append(
+                [math.perm(k, d) * (at ** (k - d) if k >= d else 0.0) for k in range(size)]
+            )
+    return np.linalg.solve(rows, [*start, *end])
+
+
+@pytest.mark.parametrize("cost", ["acceleration", "jerk"])
+@pytest.mark.parametrize("seed", range(5))
+def test_segment_costs_are_the_integrals(cost, seed):
+    rng = np.random.default_rng(seed)
+    order, time = ORDERS[cost], rng.uniform(0.3, 3.0)
+    start, end = rng.normal(size=order), rng.normal(size=order)
+    k = polynomial(order, start, end, time)
+    derivative = np.polynomial.Polynomial(k).deriv(order)
+    expected = (derivative**2).integ()(time)
+    step, rates = (
+        casadi.DM(end[0] - start[0]),
+        [(casadi.DM(a), casadi.DM(b)) for a, b in zip(start[1:], end[1:], strict=True)],
+    )
+    assert float(_segment_cost(cost, step, time, rates)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_minimum_jerk_from_rest_to_rest_is_the_textbook_one():
+    zero = [(casadi.DM(0.0), casadi.DM(0.0))] * 2
+    assert float(_segment_cost("jerk", casadi.DM(1.5), 2.0, zero)) == pytest.approx(
+        720 * 1.5**2 / 2.0**5
+    )
+
+
+def test_a_goal_in_line_with_a_straight_arm_is_reached_by_the_base_alone():
+    task = changed("ascending", goals=[[6.5, 0.1]], initial_hands="R")
+    problem = trajectory_problem(task.robot, task.hands, 1, "path-length")
+    instance = Instance.of(task, ("right",), still=False, radius=task.radius)
+    plan = problem.solve(instance, np.array([task.q0]) + 0.1)
+    assert plan.converged
+    assert plan.cost == pytest.approx(1.9, abs=1e-6)
+    assert plan.configurations[0] - task.q0 == pytest.approx([1.9] + 9 * [0.0], abs=1e-4)
+
+
+@pytest.mark.parametrize("cost", ["path-length", "squared-changes"])
+@pytest.mark.parametrize("hands", list(itertools.product(("left", "right"), repeat=2)))
+@pytest.mark.parametrize("still", [False, True])
+def test_plans_agree_with_another_optimiser(cost, hands, still):
+    task = small_task()
+    instance = Instance.of(task, hands, still=still, radius=task.radius)
+    graph = PostureGraph.sampled(task, 60, np.random.default_rng(0))
+    (chain,) = graph.chains(hands)
+    problem = trajectory_problem(task.robot, task.hands, 2, cost)
+    plan = problem.solve(instance, chain.configurations)
+    assert plan.converged, plan.reason
+    free = ~instance.held
+
+    def configurations(x):
+        steps = np.zeros_like(chain.configurations)
+        steps[free] = x
+        return task.q0 + np.cumsum(steps, axis=0)
+
+    def objective(x):
+        steps = np.diff(np.vstack([task.q0, configurations(x)]), axis=0)
+        squares = (steps**2).sum(axis=1)
+        return float(np.sqrt(squares + 1e-14).sum() if cost == "path-length" else squares.sum())
+
+    def inside(x):
+        q = configurations(x)
+        return [
+            task.radius**2
+            - ((task.robot.forward_kinematics(q[g], hands[g]) - task.goals[g]) ** 2).sum()
+            for g in range(2)
+        ]
+
+    rng = np.random.default_rng(1)
+    start = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)[free]
+    best = math.inf
+    for _ in range(6):
+        found = minimize(
+            objective,
+            start + 0.1 * rng.standard_normal(start.shape),
+            method="SLSQP",
+            constraints={"type": "ineq", "fun": inside},
+            options={"maxiter": 500, "ftol": 1e-12},
+        )
+        if min(inside(found.x)) > -1e-8:
+            best = min(best, found.fun)
+    assert plan.cost <= best + 1e-5
+    assert plan.cost == pytest.approx(
+        objective(np.diff(np.vstack([task.q0, plan.configurations]), axis=0)[free]), abs=1e-5
+    )
+    assert min(inside(np.diff(np.vstack([task.q0, plan.configurations]), axis=0)[free])) > -1e-8
+    moved = np.diff(np.vstack([task.q0, plan.configurations]), axis=0)
+    assert np.all(moved[instance.held] == 0.0)
+
+
+@pytest.mark.parametrize("cost", ["acceleration", "jerk"])
+@pytest.mark.parametrize("free_times", [False, True])
+def test_smooth_plans_are_smooth_and_pass_the_goals(cost, free_times):
+    task = load_task("two-armed-2")
+    hands = ("right", "left", "right", "right")
+    instance = Instance.of(task, hands, still=False, radius=0.09)
+    start = corrective_trial(task, "RLRR").configurations
+    problem = trajectory_problem(task.robot, task.hands, 4, cost)
+    plan = problem.solve(instance, start, free_times=free_times)
+    assert plan.converged
+    assert plan.durations.sum() == pytest.approx(4.0)
+    assert np.allclose(plan.durations, 1.0) != free_times
+    pieces = spline(plan, task.q0, 400)
+    for goal, (piece, hand) in enumerate(zip(pieces, hands, strict=True)):
+        assert piece[-1] == pytest.approx(plan.configurations[goal], abs=1e-9)
+        miss = task.robot.forward_kinematics(piece[-1], hand) - task.goals[goal]
+        assert np.hypot(*miss) <= 0.09
+    # One-sided slopes on either side of each goal agree; so do they with rest at the ends.
+    path = [task.q0[None], *pieces]
+    for goal in range(4):
+        into = (pieces[goal][-1] - pieces[goal][-2]) * 400 / plan.durations[goal]
+        after = (
+            (pieces[goal + 1][0] - pieces[goal][-1]) * 400 / plan.durations[goal + 1]
+            if goal < 3
+            else 0.0
+        )
+        assert np.abs(into - after).max() < 0.05 * max(1.0, np.abs(into).max())
+    assert np.abs(path[1][0] - task.q0).max() < 1e-3
+    # Integrated by differences, the cost is the plan's.
+    order, total = ORDERS[cost], 0.0
+    for goal, piece in enumerate(pieces):
+        points = np.vstack([path[goal][-1], piece])
+        h = plan.durations[goal] / 400
+        total += ((np.diff(points, n=order, axis=0) / h**order) ** 2).sum() * h
+    assert total == pytest.approx(plan.cost, rel=0.03)
+
+
+def test_times_that_are_free_cost_no_more():
+    task = load_task("ascending")
+    instance = Instance.of(task, ("right",) * 3, still=True, radius=0.09)
+    start = corrective_trial(task, "RRR").configurations
+    for cost in ("acceleration", "jerk"):
+        problem = trajectory_problem(task.robot, task.hands, 3, cost)
+        fixed = problem.solve(instance, start)
+        free = problem.solve(instance, start, free_times=True)
+        assert free.cost < fixed.cost
+
+
+def test_given_lengths_are_kept():
+    task = load_task("ascending")
+    instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
+    problem = trajectory_problem(task.robot, task.hands, 3, "path-length")
+    plan = problem.solve(instance, corrective_trial(task, "RRR").configurations)
+    lengths = np.array([1.7, math.nan, 0.9])
+    given = problem.solve(instance, plan.configurations, lengths=lengths)
+    assert given.converged
+    assert np.all(given.lengths(task.q0)[[0, 2]] <= [1.7 + 1e-7, 0.9 + 1e-7])
+    assert given.cost > plan.cost
+
+
+def test_a_solve_that_fails_says_so():
+    task = changed("ascending", goals=[[9, 9]], locked_base=["x", "y"], initial_hands="R")
+    problem = trajectory_problem(task.robot, task.hands, 1, "path-length")
+    instance = Instance.of(task, ("right",), still=True, radius=task.radius)
+    plan = problem.solve(instance, np.array([task.q0]))
+    assert not plan.converged
+    assert plan.reason != "Solve_Succeeded"
+
+
+def test_whole_ticks_are_what_is_executed():
+    for name, hands in (("ascending", "RRR"), ("two-armed-1", "LRLR"), ("two-armed-2", "RRRR")):
+        task = load_task(name)
+        sequence = tuple({"L": "left", "R": "right"}[letter] for letter in hands)
+        instance = Instance.of(task, sequence, still=True, radius=task.radius)
+        problem = trajectory_problem(task.robot, task.hands, len(hands), "path-length")
+        plan = problem.solve(instance, corrective_trial(task, hands).configurations)
+        rounding = Rounding(problem, instance, PAPER.step)
+        whole = rounding.nearest(plan)
+        made, _ = movements(
+            task, whole.hands, whole.configurations, instance.held, PAPER, whole.steps
+        )
+        execution = execute(task, made)
+        assert execution.corrections == 0
+        assert execution.ticks <= whole.ticks
+        assert rounding.least(plan) <= whole.ticks <= rounding.least(plan) + 1
+        assert min(p.ticks for p in rounding.every(plan)) <= whole.ticks
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("name", ["ascending", "two-armed-2"])
+@pytest.mark.parametrize("other_arm", ["free", "still"])
+def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, name, other_arm):
+    task = load_task(name)
+    session = Session(task, 0, method.told, trusted=True)
+    hands = {"ascending": "given", "two-armed-2": "RLRR"}[name]
+    parameters = method.Parameters(other_arm=other_arm, nodes=60, hands=hands)
+    result = method(parameters).solve(session)
+    execution = execute(task, result.solution)
+    assert execution.hands == {"given": "RRR"}.get(hands, hands)
+    assert execution.corrections == 0
+    assert session.meter.solver_iterations > 0
+    assert session.meter.trials == 0
+    if other_arm == "still":
+        before = task.q0
+        for letter, q in zip(execution.hands, execution.configurations, strict=True):
+            other = "left" if letter == "R" else "right"
+            joints = task.robot.joints(other)
+            assert np.array_equal(q[joints], before[joints])
+            before = q
+
+
+def test_hands_that_do_not_fit_are_refused():
+    method = METHODS[1]
+    one = method(method.Parameters(hands="LLLR"))
+    assert one.why_not(load_task("two-armed-1")) is None
+    assert "do not fit" in one.why_not(load_task("ascending"))
+    policy = changed("two-armed-1", initial_hands="best-of-all")
+    assert "names no" in method(method.Parameters(hands="given")).why_not(policy)
+    assert method().why_not(load_task("two-armed-1")) is None
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_goals_out_of_reach_are_infeasible(method):
+    goals = [[6, 0.1], [6, 90]]
+    task = changed("ascending", goals=goals, locked_base=["y"], initial_hands="RR")
+    with pytest.raises(MethodError, match="goal 2: no posture was found") as failure:
+        method().solve(Session(task, 0, method.told, trusted=True))
+    assert failure.value.outcome == "infeasible"
+
+
+def test_costs_have_names():
+    assert {method.cost for method in METHODS} == set(COSTS)
