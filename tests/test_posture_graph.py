@@ -1,0 +1,98 @@
+"""The posture graph: its dynamic programme against every chain, one by one."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from baselines.posture_graph import PostureGraph, Spent, sample_postures, spread_out
+from coartic import load_task
+
+from .test_trajectory import changed
+
+TASKS = {
+    "two-armed-2": load_task("two-armed-2"),
+    "two-armed-1": load_task("two-armed-1"),
+    "ascending": load_task("ascending"),
+}
+
+
+def cheapest(graph, hands):
+    """Every combination of nodes, one by one."""
+    task, best = graph.task, np.inf
+    layers = [graph.layers[goal, hand] for goal, hand in enumerate(hands)]
+    for nodes in itertools.product(*layers):
+        length, before = 0.0, np.array(task.q0)
+        for hand, node in zip(hands, nodes, strict=True):
+            q = before.copy()
+            q[:2], joints = node[:2], task.robot.joints(hand)
+            q[joints] = node[joints]
+            length += np.linalg.norm(q - before)
+            before = q
+        best = min(best, length)
+    return best
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_chains_are_the_cheapest(name):
+    task = TASKS[name]
+    graph = PostureGraph.sampled(task, 5, np.random.default_rng(3))
+    chains = list(graph.chains())
+    assert len(chains) == len(task.hands) ** len(task.goals)
+    assert len({chain.hands for chain in chains}) == len(chains)
+    for chain in chains:
+        steps = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)
+        assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(chain.length)
+        assert chain.length == pytest.approx(cheapest(graph, chain.hands))
+        for goal, hand in enumerate(chain.hands):
+            (other,) = {"left", "right"} - {hand}
+            assert np.all(steps[goal][task.robot.joints(other)] == 0.0)
+            miss = task.robot.forward_kinematics(chain.configurations[goal], hand)
+            assert np.hypot(*(miss - task.goals[goal])) <= task.radius
+
+
+def test_one_sequence_alone_is_the_same():
+    graph = PostureGraph.sampled(TASKS["two-armed-2"], 20, np.random.default_rng(4))
+    for chain in graph.chains():
+        (alone,) = graph.chains(chain.hands)
+        assert np.array_equal(alone.configurations, chain.configurations)
+
+
+@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("hand", ["left", "right"])
+def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
+    task = TASKS[name]
+    if hand not in task.hands:
+        return
+    spent = Spent()
+    samples = sample_postures(task, 1, hand, 80, np.random.default_rng(5), spent)
+    assert len(samples) > 60
+    assert spent.forward_kinematics > spent.jacobians > 0
+    miss = task.robot.forward_kinematics(samples, hand) - task.goals[1]
+    assert np.hypot(*miss.T).max() <= task.radius
+    (other,) = {"left", "right"} - {hand}
+    fixed = task.robot.joints(other)
+    assert np.all(samples[:, fixed] == task.q0[fixed])
+    for axis in task.locked_base:
+        column = "xy".index(axis)
+        assert np.all(samples[:, column] == task.q0[column])
+
+
+def test_a_free_arm_is_spread_over_its_way():
+    task = TASKS["two-armed-2"]
+    graph = PostureGraph.sampled(task, 10, np.random.default_rng(6))
+    (chain,) = graph.chains(("left", "right", "right", "left"))
+    spread = spread_out(task, chain)
+    left = task.robot.joints("left")
+    first, last = chain.configurations[0, left], chain.configurations[3, left]
+    assert spread[1, left] == pytest.approx(first + (last - first) / 3)
+    assert np.array_equal(spread[[0, 3]][:, left], chain.configurations[[0, 3]][:, left])
+    assert np.array_equal(spread[:, :2], chain.configurations[:, :2])
+
+
+def test_a_goal_without_a_posture_is_named():
+    task = changed("two-armed-1", goals=[[2, 3.6], [2, 40]], locked_base=["y"], initial_hands="RR")
+    graph = PostureGraph.sampled(task, 20, np.random.default_rng(7))
+    assert graph.why_none().startswith("goal 2: no posture was found that puts the left or")
+    assert "the right hand" in graph.why_none(("right", "right"))
+    assert list(graph.chains()) == []
