@@ -20,6 +20,7 @@ from typing import Any
 from pydantic import ValidationError
 
 import baselines.corrective_alone
+import baselines.nullspace_qp
 from coartic import CoarticError, Task
 from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
@@ -28,7 +29,11 @@ from coartic.method import Method
 ENTRY_POINTS = "coartic.methods"
 BUILT_IN_ORIGIN = "built in"
 _PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
-BUILT_IN: tuple[type[Method], ...] = (*DUAL_PROCESS, *baselines.corrective_alone.METHODS)
+BUILT_IN: tuple[type[Method], ...] = (
+    *DUAL_PROCESS,
+    *baselines.corrective_alone.METHODS,
+    *baselines.nullspace_qp.METHODS,
+)
 
 
 class MethodFileError(CoarticError):
