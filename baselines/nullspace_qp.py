@@ -55,9 +55,10 @@ CONCURRENT = (
 )
 
 _HIT_MARGIN = 1e-9  # the scorer's interpolation along the path rounds
-_STALL_STEPS = 100  # without coming nearer by a hundredth of a control step
+_STALL_STEPS = 50  # without coming nearer by a tenth of a control step
 _POSTURE_STEPS = 50  # at most, when a posture is first looked for
 _POSTURE_STEP = 0.2  # longest of them, length unit and rad: longer ones end far off
+_POSTURE_GAIN = 0.3  # of the way back to the robot in one of them: 1 goes on swinging
 _POSTURE_TOLERANCE = 1e-3  # of such a step, length unit and rad
 
 
@@ -67,7 +68,7 @@ class NullspaceParameters(Parameters):
     hands: Annotated[str, Field(pattern=r"^(every|nearest|[LR]+)$")] = "every"
     """``every``: all hand sequences are simulated and the shortest is kept; ``nearest``:
     at each goal the hand that is nearest when the last one is hit, without a secondary
-    objective; or a sequence such as ``LRLR``."""
+    objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
     solver: SolverName = "daqp"
     """Of both levels; ``python -m benchmarks.qp_solvers`` compares them."""
     period: Annotated[int, Field(ge=1, le=20)] = 1
@@ -87,6 +88,7 @@ class Aim(NamedTuple):
 
     hand: Hand
     goal: int  # 0-based
+    arm_only: bool = False  # the hand's own joints, and not the base
 
 
 @dataclass(frozen=True)
@@ -129,14 +131,14 @@ class Controller:
         length = self.session.model.step * self.parameters.period
         start = q
         waypoints: list[Array] = []
-        posture = None if aim is None else self._settled_posture(q, aim)
+        posture = None if aim is None else self.posture(q, aim)
         nearest, since = np.inf, 0
         while True:
             error = self._error(q, hand, goal)
             distance = float(np.hypot(*error))
             if distance <= self.task.radius - _HIT_MARGIN:
                 break
-            if distance < nearest - 0.01 * length:
+            if distance < nearest - 0.1 * length:
                 nearest, since = distance, 0
             since += 1
             if since > _STALL_STEPS or len(waypoints) == self.parameters.max_steps:
@@ -149,8 +151,7 @@ class Controller:
                 preferred = self.parameters.gain * rates
             elif aim is not None and posture is not None:
                 posture, _ = self._nearer_posture(posture, q, aim)
-                way = (posture - q)[self.moving]
-                preferred = self.parameters.gain * way / max(float(np.linalg.norm(way)), length)
+                preferred = self._towards(posture - q, aim, length)
             rates = self._rates(q, hand, error, distance / length, preferred)
             q = self._moved(q, length * rates)
             waypoints.append(q)
@@ -168,10 +169,19 @@ class Controller:
         movement = Movement(goal + 1, hand, "path", path[-1], waypoints=path)
         return Leg(movement, found.ticks, found.q, rates)
 
-    def nearest_hand(self, q: Array, goal: int) -> Hand:
-        """The hand nearest to a goal, the left one of equally near ones."""
+    def posture(self, q: Array, aim: Aim) -> Array:
+        """The posture near ``q`` in which a hand hits its goal, shape ``(dof,)``."""
+        posture = q
+        for _ in range(_POSTURE_STEPS):
+            posture, change = self._nearer_posture(posture, q, aim)
+            if change <= _POSTURE_TOLERANCE:
+                break
+        return posture
+
+    def nearest_hands(self, q: Array, goal: int) -> list[Hand]:
+        """The hands, the nearest to a goal first, the left one of equally near ones."""
         hands = [hand for hand in HANDS if hand in self.session.hands]
-        return min(hands, key=lambda hand: float(np.hypot(*self._error(q, hand, goal))))
+        return sorted(hands, key=lambda hand: float(np.hypot(*self._error(q, hand, goal))))
 
     def _rates(
         self, q: Array, hand: Hand, error: Array, most: float, preferred: Array | None
@@ -196,23 +206,26 @@ class Controller:
         rates /= max(1.0, float(np.linalg.norm(rates)))
         return rates
 
-    def _settled_posture(self, q: Array, aim: Aim) -> Array:
-        posture = q
-        for _ in range(_POSTURE_STEPS):
-            posture, change = self._nearer_posture(posture, q, aim)
-            if change <= _POSTURE_TOLERANCE:
-                break
-        return posture
-
     def _nearer_posture(self, posture: Array, q: Array, aim: Aim) -> tuple[Array, float]:
         """One Gauss-Newton step to the posture nearest to ``q`` that hits a goal."""
         change = self.cascade.solve(
             self._jacobian(posture, aim.hand),
             self._error(posture, aim.hand, aim.goal),
-            (q - posture)[self.moving],
+            _POSTURE_GAIN * (q - posture)[self.moving],
         )
         length = float(np.linalg.norm(change))
         return self._moved(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
+
+    def _towards(self, way: Array, aim: Aim, length: float) -> Array:
+        """Rates of norm ``gain`` along ``way``, of which an arm alone makes its share."""
+        rates = self.parameters.gain * way / max(float(np.linalg.norm(way)), length)
+        if aim.arm_only:
+            arm = self.session.joints(aim.hand)
+            share = np.zeros_like(rates)
+            share[arm] = rates[arm]
+            rates = share
+        moving: Array = rates[self.moving]
+        return moving
 
     def _moved(self, q: Array, change: Array) -> Array:
         moved = q.copy()
@@ -243,7 +256,7 @@ class NullspaceQP(Method):
     )
     stochastic = False
     Parameters = NullspaceParameters
-    quick: ClassVar[dict[str, Any]] = {"hands": "nearest", "period": 10}
+    quick: ClassVar[dict[str, Any]] = {"hands": "nearest", "period": 20}
     keeps_velocity: ClassVar[bool] = False
 
     def why_not(self, task: Task) -> str | None:
@@ -334,15 +347,23 @@ class NullspaceQP(Method):
             return list(itertools.product(ordered, repeat=session.goals_count))
         if choice != "nearest":
             return [hands_of(choice)]
-        hands: list[Hand] = []
         way: tuple[Leg, ...] = ()
         for goal in range(session.goals_count):
-            hands.append(controller.nearest_hand(way[-1].q if way else session.q0, goal))
-            leg = self._leg(controller, way, hands[-1], None)
-            if isinstance(leg, StuckError):
-                raise MethodError("infeasible", str(leg))
-            way = (*way, leg)
-        return [tuple(hands)]
+            nearest = controller.nearest_hands(way[-1].q if way else session.q0, goal)
+            legs = [self._leg(controller, way, nearest[0], None)]
+            if isinstance(legs[0], StuckError):  # only then is it another hand's turn
+                legs += [self._leg(controller, way, hand, None) for hand in nearest[1:]]
+            reached = [leg for leg in legs if isinstance(leg, Leg)]
+            if not reached:
+                raise MethodError("infeasible", "; ".join(map(str, legs)))
+            way = (*way, reached[0])
+        return [tuple(leg.movement.hand for leg in way)]
+
+
+class VelocityParameters(GainParameters):
+    """The same, with a gain that forgets: with 1 no velocity is ever given up."""
+
+    gain: Annotated[float, Field(ge=0, le=10)] = 0.5
 
 
 class KeepVelocity(NullspaceQP):
@@ -352,7 +373,7 @@ class KeepVelocity(NullspaceQP):
     title = "Prioritised nullspace QP, keeping velocity"
     told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
     secondary = ("smoothness: joint velocity is kept",)
-    Parameters = GainParameters
+    Parameters = VelocityParameters
     keeps_velocity = True
 
 
@@ -384,7 +405,7 @@ class Preshaping(NullspaceQP):
     def aim(self, hands: tuple[Hand, ...], goal: int) -> Aim | None:
         """The first goal to come that the other hand hits."""
         later = range(goal + 1, len(hands))
-        return next((Aim(hands[g], g) for g in later if hands[g] != hands[goal]), None)
+        return next((Aim(hands[g], g, True) for g in later if hands[g] != hands[goal]), None)
 
 
 METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, KeepVelocity, NextGoal, Preshaping)
