@@ -30,7 +30,7 @@ singular value of J is 1, and rates stay bounded where it is 0."""
 LIMIT = 2.0
 """Largest rate of any joint. Level 1 is asked for a full step (norm 1) and level 2 adds to
 it; only their sum is scaled to the step. With a limit of 1, a hand carried by the base at
-full speed would leave level 2 nothing (ascending: -331 where 2 gives -307)."""
+full speed would leave level 2 nothing (next goal on ascending: -318 where 2 gives -304)."""
 
 SETTINGS: dict[SolverName, dict[str, Any]] = {
     # Tighter than their defaults, which leave 1e-5 and more in the rates.
