@@ -33,7 +33,7 @@ it; only their sum is scaled to the step. With a limit of 1, a hand carried by t
 full speed would leave level 2 nothing (next goal on ascending: -318 where 2 gives -304)."""
 
 SETTINGS: dict[SolverName, dict[str, Any]] = {
-    # Tighter than their defaults, which leave 1e-5 and more in the rates.
+    # Tighter than their defaults, which are seen in the rates (up to 1e-5).
     "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "daqp": {},
     "osqp": {

@@ -73,6 +73,10 @@ def test_without_active_limits_the_cascade_is_the_closed_form(solver):
         np.testing.assert_allclose(cascade.solve(*problem[:2]), least, atol=1e-7)
 
 
+def test_numbers_are_filled_in_without_building_anew():
+    assert all(level.is_dcp(dpp=True) for level in cascade_for(ROBOT.dof, "daqp")._levels)
+
+
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_singular_jacobians_leave_the_rates_bounded(solver):
     """Both arms straight along x on a base locked in x: nothing moves the hand along x."""
