@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 import baselines.cma_es
 import baselines.corrective_alone
+import baselines.nullspace_qp
 import baselines.optimum
 import baselines.posture_based
 import baselines.random_search
@@ -38,6 +39,7 @@ BUILT_IN: tuple[type[Method], ...] = (
     *baselines.corrective_alone.METHODS,
     *baselines.random_search.METHODS,
     *baselines.cma_es.METHODS,
+    *baselines.nullspace_qp.METHODS,
     *baselines.posture_based.METHODS,
     *baselines.trajectory_optimisation.METHODS,
     *baselines.optimum.METHODS,

@@ -17,6 +17,9 @@ from coartic.compiled import PACKAGE, source_fingerprint
 
 _LIBRARIES = (
     "casadi",
+    "clarabel",
+    "cvxpy",
+    "daqp",
     "dask",
     "distributed",
     "joblib",
@@ -24,7 +27,9 @@ _LIBRARIES = (
     "matplotlib",
     "numba",
     "numpy",
+    "osqp",
     "pandas",
+    "proxsuite",
     "pyarrow",
     "pydantic",
     "rich",

@@ -1,0 +1,273 @@
+"""Prioritised nullspace control by quadratic programs, one method a secondary objective.
+
+The controller of :mod:`baselines.nullspace_control` moves the hand towards the current goal
+(level 1) and, as far as that leaves it free to, serves a secondary objective (level 2):
+
+- none: the least joint rates;
+- velocity: the joint rates of the step before, times the gain (smoothness);
+- next goal: towards the posture in which the next goal is hit, at ``gain`` times full speed
+  (coarticulation by concurrent subgoals of lower priority);
+- preshaping: the other arm's share of the way to the posture in which it hits the goal it
+  is to hit next, which may lie several goals ahead.
+
+With the default of trying every sequence a two-armed task takes some seconds to half a
+minute, nearly all of it inside cvxpy.
+
+Gains tried, one for all tasks; reward on ascending, descending, two-armed-1 (LRLR) and
+two-armed-2 (RLRR), with * the default:
+
+====  ====================  ====================  ==========
+gain  velocity              next goal             preshaping
+====  ====================  ====================  ==========
+0.25  -326 -341 -683 -373   -317 -331 -584 -348   -590 -355
+0.5   -326 -341 -683 -373*  -311 -324 -542 -334   -552 -344
+0.75  -326 -341 -685 -373   -307 -319 -525 -326   -530 -340
+1     -335 -351 -737 -379   -304 -317 -512 -318*  -513 -337*
+1.5                         -306 -319 -517 -319   -517 -337
+2                           -312 -327 -532 -328   -527 -338
+====  ====================  ====================  ==========
+
+Without an objective it is -325 -340 -683 -373. Other forms were tried in closed form: a
+level 1 that only asks for less distance, which leaves the hand free sideways (best
+sequences: none -348 -364 -622 -366, next goal -316 -328 -512 -374), and aiming at the rim
+of the goal on the side of the posture to come (next goal -305 -318 -504 -318). Smoothness
+is no part of the reward: keeping velocity does not gain any.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from baselines.cascade import Cascade, CascadeError, SolverName, cascade_for
+from baselines.nullspace_control import Aim, Controller, Leg, StuckError
+from coartic import Task
+from coartic.initial import changes_of_hand, too_many_sequences
+from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.robot import HANDS, Hand
+from coartic.task import LETTERS, hands_of, letters_of
+
+CITATION = (
+    "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
+    "robot manipulators. International Journal of Robotics Research; as quadratic programs "
+    "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics. "
+)
+CONCURRENT = (
+    "K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen (2004), Coarticulation in Markov "
+    "decision processes, NIPS; B. Thibodeau, S. Hart, D. Karuppiah, J. Sweeney, O. Brock "
+    "(2004), Cascaded filter approach to multi-objective control, ICRA."
+)
+
+
+class NullspaceParameters(Parameters):
+    """Parameters of the controller."""
+
+    hands: Annotated[str, Field(pattern=r"^(every|nearest|[LR]+)$")] = "every"
+    """``every``: all hand sequences are simulated and the shortest is kept; ``nearest``:
+    at each goal the hand that is nearest when the last one is hit, without a secondary
+    objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
+    solver: SolverName = "daqp"
+    """Of both levels; ``python -m benchmarks.qp_solvers`` compares them."""
+    period: Annotated[int, Field(ge=1, le=20)] = 1
+    """Ticks from one control step to the next."""
+    max_steps: Annotated[int, Field(ge=1)] = 5000
+    """Control steps for one goal after which the controller gives up."""
+
+
+class GainParameters(NullspaceParameters):
+    """With the gain of the secondary objective."""
+
+    gain: Annotated[float, Field(ge=0, le=10)] = 1.0
+
+
+class NullspaceQP(Method):
+    """The controller without a secondary objective; base of those with one."""
+
+    name = "nullspace-qp/none"
+    title = "Prioritised nullspace QP"
+    citation = CITATION
+    told = frozenset(
+        {
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.JACOBIAN,
+            Information.REWARD_FORMULA,
+        }
+    )
+    stochastic = False
+    Parameters = NullspaceParameters
+    quick: ClassVar[dict[str, Any]] = {"hands": "nearest", "period": 20}
+    keeps_velocity: ClassVar[bool] = False
+
+    def why_not(self, task: Task) -> str | None:
+        """Too many sequences to simulate, or a given one that does not fit."""
+        hands = self.parameters.hands
+        if hands == "every":
+            return too_many_sequences(task, len(task.hands))
+        if hands == "nearest":
+            return None
+        if len(hands) != len(task.goals):
+            return f"hands {hands!r} names {len(hands)} hands for {len(task.goals)} goals"
+        absent = sorted({LETTERS[letter] for letter in hands} - set(task.hands))
+        return f"hands {hands!r}: the robot has no {absent[0]} hand" if absent else None
+
+    def aim(self, hands: tuple[Hand, ...], goal: int) -> Aim | None:
+        """What the secondary objective prepares on the way to ``goal`` (0-based)."""
+        return None
+
+    def cascade(self, joints: int) -> Cascade:
+        """The solver of every control step."""
+        return cascade_for(joints, self.parameters.solver)
+
+    def solve(self, session: Session) -> Result:
+        """Simulate the candidate hand sequences and hand over the best one's paths."""
+        task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
+        try:
+            with session.building():
+                cascade = self.cascade(task.robot.dof - len(task.locked_base))
+        except CascadeError as error:
+            raise MethodError("solver-failed", str(error)) from None
+        parameters = self.parameters
+        controller = Controller(
+            session,
+            task,
+            cascade,
+            parameters.period,
+            parameters.max_steps,
+            parameters.gain if isinstance(parameters, GainParameters) else 0.0,
+            self.keeps_velocity,
+        )
+        iterations = cascade.iterations
+        try:
+            with session.solving():
+                return self._solve(controller)
+        except CascadeError as error:
+            raise MethodError("solver-failed", str(error)) from None
+        finally:
+            session.spend(solver_iterations=cascade.iterations - iterations)
+
+    def _solve(self, controller: Controller) -> Result:
+        """Extend the sequence with the fewest ticks so far until one is complete.
+
+        No other can be better then, since ticks only add up. Of equal ones the one with
+        the fewest changes of hand is kept, then the first.
+        """
+        candidates = self._candidates(controller)
+        heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
+            (0, changes_of_hand(letters_of(hands)), index, ())
+            for index, hands in enumerate(candidates)
+        ]
+        heapq.heapify(heap)
+        solves = controller.cascade.solves
+        legs: dict[Any, Leg | StuckError] = {}  # sequences share their beginnings
+        stuck: list[str] = []
+        while heap:
+            ticks, changes, index, way = heapq.heappop(heap)
+            hands, goal = candidates[index], len(way)
+            if goal == len(hands):
+                details = {
+                    "sequences": len(candidates),
+                    "stuck_sequences": len(stuck),
+                    "simulated_movements": len(legs),
+                    "solves": controller.cascade.solves - solves,
+                }
+                return Result(tuple(leg.movement for leg in way), details)
+            plan = tuple((hands[g], self.aim(hands, g)) for g in range(goal + 1))
+            if plan not in legs:
+                legs[plan] = self._leg(controller, way, *plan[-1])
+            leg = legs[plan]
+            if isinstance(leg, StuckError):
+                stuck.append(f"hands {letters_of(hands)}: {leg}")
+            else:
+                heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*way, leg)))
+        raise MethodError("infeasible", stuck[0])
+
+    def _leg(
+        self, controller: Controller, way: tuple[Leg, ...], hand: Hand, aim: Aim | None
+    ) -> Leg | StuckError:
+        q = way[-1].q if way else controller.session.q0
+        rates = way[-1].rates if way else np.zeros(len(controller.moving))
+        try:
+            return controller.leg(q, rates, hand, len(way), aim)
+        except StuckError as error:
+            return error
+
+    def _candidates(self, controller: Controller) -> list[tuple[Hand, ...]]:
+        session, choice = controller.session, self.parameters.hands
+        if choice == "every":
+            ordered = [hand for hand in HANDS if hand in session.hands]
+            return list(itertools.product(ordered, repeat=session.goals_count))
+        if choice != "nearest":
+            return [hands_of(choice)]
+        way: tuple[Leg, ...] = ()
+        for goal in range(session.goals_count):
+            nearest = controller.nearest_hands(way[-1].q if way else session.q0, goal)
+            legs = [self._leg(controller, way, nearest[0], None)]
+            if isinstance(legs[0], StuckError):  # only then is it another hand's turn
+                legs += [self._leg(controller, way, hand, None) for hand in nearest[1:]]
+            reached = [leg for leg in legs if isinstance(leg, Leg)]
+            if not reached:
+                raise MethodError("infeasible", "; ".join(map(str, legs)))
+            way = (*way, reached[0])
+        return [tuple(leg.movement.hand for leg in way)]
+
+
+class VelocityParameters(GainParameters):
+    """The same, with a gain that forgets: with 1 no velocity is ever given up."""
+
+    gain: Annotated[float, Field(ge=0, le=10)] = 0.5
+
+
+class KeepVelocity(NullspaceQP):
+    """Level 2 keeps the joint rates of the step before."""
+
+    name = "nullspace-qp/velocity"
+    title = "Prioritised nullspace QP, keeping velocity"
+    told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("smoothness: joint velocity is kept",)
+    Parameters = VelocityParameters
+    keeps_velocity = True
+
+
+class NextGoal(NullspaceQP):
+    """Level 2 approaches the posture in which the next goal is hit."""
+
+    name = "nullspace-qp/next-goal"
+    title = "Prioritised nullspace QP, next goal as lower priority"
+    citation = CITATION + CONCURRENT
+    told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("coarticulation: posture at the next goal",)
+    Parameters = GainParameters
+
+    def aim(self, hands: tuple[Hand, ...], goal: int) -> Aim | None:
+        """The next goal and its hand."""
+        return Aim(hands[goal + 1], goal + 1) if goal + 1 < len(hands) else None
+
+
+class Preshaping(NullspaceQP):
+    """Level 2 prepares the other hand for the goal it hits next."""
+
+    name = "nullspace-qp/preshaping"
+    title = "Prioritised nullspace QP, preshaping of the other arm"
+    citation = CITATION + CONCURRENT
+    told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("preshaping: the other arm's posture at the goal it hits next",)
+    Parameters = GainParameters
+
+    def why_not(self, task: Task) -> str | None:
+        """Nothing to preshape, or the reasons of the others."""
+        if len(task.hands) < 2:
+            return f"task {task.name!r} has one hand; there is no other arm to preshape"
+        return super().why_not(task)
+
+    def aim(self, hands: tuple[Hand, ...], goal: int) -> Aim | None:
+        """The first goal to come that the other hand hits."""
+        later = range(goal + 1, len(hands))
+        return next((Aim(hands[g], g, True) for g in later if hands[g] != hands[goal]), None)
+
+
+METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, KeepVelocity, NextGoal, Preshaping)
