@@ -141,6 +141,7 @@ def run(
     Interrupted by whatever, the same command goes on where it stopped.
     """
     from analysis.comparison import compare, plain
+    from analysis.methods import methods_frame
     from analysis.results import load_results
     from benchmarks.executors import Dask, Local
     from benchmarks.harness import perform_plan
@@ -199,9 +200,11 @@ def run(
     write_tables(
         out, chosen.name, [(cell, store.read(spec.run_id)) for cell, spec in planned], manifest
     )
-    comparison = compare(load_results(out))
+    results = load_results(out)
+    comparison = compare(results)
     try:
         write_atomically(out / "comparison.md", comparison.to_markdown().encode())
+        write_atomically(out / "methods.csv", methods_frame(results).to_csv(index=False).encode())
     except OSError as error:
         raise CoarticError(f"cannot write to {out}: {error.strerror or error}") from None
 

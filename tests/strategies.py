@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from coartic import Robot, parse_task
+from coartic import Robot, load_task, parse_task
 
 PAPER_CELLS = [
     ("ascending", "EC1"),
@@ -33,3 +33,9 @@ def tiny_task(**changes):
     }
     content.update(changes)
     return parse_task({key: value for key, value in content.items() if value is not None}, "tiny")
+
+
+def changed(like, **update):
+    """A shipped task with some keys changed, reachable or not."""
+    content = {**load_task(like).model_dump(mode="json"), **update}
+    return parse_task(content, "test", reach=False)

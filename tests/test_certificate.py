@@ -13,7 +13,7 @@ from coartic.robot import directions
 from coartic.solution import Movement
 from coartic.task import hands_of
 
-from .test_trajectory import changed
+from .strategies import changed
 
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 

@@ -44,6 +44,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
         "sequences.parquet",
         "manifest.json",
         "comparison.md",
+        "methods.csv",
     }
     page = (out / "comparison.md").read_text(encoding="utf-8")
     for words in ("-303 ± 2.9 (20)", "-319 (-319*)", "Reconstructed: goals", "LRLR -533"):

@@ -98,6 +98,11 @@ def fake_results(tmp_path, runs):
         task="two-armed-1", method="dual-process/EC2", variant="", commit="abc", packages="p"
     )
     frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
+    frame = frame.assign(
+        told="corrective process, reward by trial", parameters="{}", other_arm_travel=1.0,
+        movement_ticks=1, forward_kinematics=1, jacobians=1, solver_iterations=0, build_s=0.0,
+        solve_s=0.1, wall_s=0.2, warm=True, solution_corrections=0, proven_bound=None,
+    )  # fmt: skip
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
     sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
     return Results(tmp_path, manifest, frame, sequences)
@@ -117,7 +122,8 @@ def test_cells_and_sequences(tmp_path):
             },
         )
     )
-    cells, sequences = page.tables
+    cells, sequences, methods = page.tables
+    assert methods.title.startswith("two-armed-1 †: all methods; optimum")
     row = dict(zip(cells.columns, cells.rows[0], strict=True))
     assert row["published"] == "-560.0 ± 47.1 (20)*"
     assert row["ours: mean ± SD (n)"] == "-565.0 ± 63.6 (2)"

@@ -8,7 +8,7 @@ import pytest
 from baselines.posture_graph import PostureGraph, Spent, sample_postures, spread_out
 from coartic import load_task
 
-from .test_trajectory import changed
+from .strategies import changed
 
 TASKS = {
     "two-armed-2": load_task("two-armed-2"),

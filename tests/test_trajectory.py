@@ -18,8 +18,10 @@ from baselines.trajectory_problem import (
     trajectory_problem,
 )
 from baselines.whole_ticks import Rounding, movements
-from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task, parse_task
+from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.method import MethodError, Session
+
+from .strategies import changed
 
 ORDERS = {"acceleration": 2, "jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
@@ -34,11 +36,6 @@ def small_task(**change):
         "initial_hands": "RR",
     }
     return Task(**{**content, **change})
-
-
-def changed(name, **update):
-    content = {**load_task(name).model_dump(mode="json"), **update}
-    return parse_task(content, "test", reach=False)
 
 
 def polynomial(order, start, end, time):

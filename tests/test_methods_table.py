@@ -1,0 +1,113 @@
+"""Methods side by side: gaps, counts, and what must never happen."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.methods import TOLD, methods_frame, methods_notes, methods_tables
+from analysis.optimum import optima
+from analysis.results import Results
+from coartic import load_task
+from coartic.method import Information
+
+from .strategies import changed
+
+
+def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
+    return {
+        "task": task, "method": method, "variant": "", "run": run, "status": status,
+        "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
+        "told": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
+        "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
+        "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "warm": run > 0,
+        "solution_corrections": 0, "other_arm_travel": travel, "proven_bound": None, **more,
+    }  # fmt: skip
+
+
+def results(rows, tmp_path, task=None):
+    task = task or load_task("two-armed-1")
+    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    cells = runs[["task", "method", "variant"]].drop_duplicates().to_dict("records")
+    specification = {"tasks": {task.name: task.model_dump(mode="json")}, "cells": cells}
+    return Results(tmp_path, {"specification": specification}, runs, pd.DataFrame())
+
+
+def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):
+    found = methods_frame(
+        results(
+            [
+                row("moving", -475, travel=0.3),
+                row("still", -500, run=0),
+                row("still", -510, run=1),
+                row("still", None, run=2, status="infeasible"),
+            ],
+            tmp_path,
+        )
+    ).set_index("method")
+    assert found.loc["moving", "gap"] == 10
+    assert np.isnan(found.loc["moving", "gap_still"])
+    assert found.loc["still", "gap"] == 40
+    assert found.loc["still", "gap_still"] == 15
+    assert found.loc["still", "gap_share"] == pytest.approx(40 / 465)
+    assert list(found[["runs", "solved"]].loc["still"]) == [3, 2]
+    assert list(found.other_arm) == ["moves", "still"]  # best reward first
+    assert found.loc["still", "reward_sd"] == pytest.approx(np.std([-500, -510], ddof=1))
+
+
+def test_what_is_shown(tmp_path):
+    (table,) = methods_tables(results([row("m", -475, travel=0.3)], tmp_path))
+    assert table.title == (
+        "two-armed-1 †: all methods; optimum, by the other arm: "
+        "free -465 LRLR (proven), still -490 LRLR (proven)"
+    )
+    shown = dict(zip(table.columns, table.rows[0], strict=True))
+    assert shown["told"] == "AT"
+    assert shown["reward: mean ± SD (n)"] == "-475 (1)"
+    assert shown["gap"] == "10 (2.2%)"
+    assert shown["kinematics"] == "1.23 M"
+    assert (shown["Jacobians"], shown["ticks"], shown["iterations"]) == ("950", "5 k", "–")
+
+
+def test_a_reward_above_the_optimum_is_shouted(tmp_path):
+    folder = results([row("miracle", -464, travel=1.0)], tmp_path)
+    assert methods_frame(folder).beaten.sum() == 1
+    assert any("better than the optimum: it is not one" in note for note in methods_notes(folder))
+    folder = results([row("good", -465, travel=1.0)], tmp_path)
+    assert methods_frame(folder).beaten.sum() == 0
+
+
+def test_times_are_of_warm_runs(tmp_path):
+    rows = [row("m", -500, run=0, solve_s=9.0), row("m", -500, run=1, solve_s=0.2)]
+    assert methods_frame(results(rows, tmp_path)).solve_s.item() == 0.2
+    unmarked = [row("m", -500, run=1, solve_s=0.0, wall_s=0.7)]
+    assert methods_frame(results(unmarked, tmp_path)).solve_s.item() == 0.7
+
+
+def test_a_task_of_the_users_own_has_the_optimum_of_its_own_runs(tmp_path):
+    task = changed("two-armed-1", goals=[[2.1, 3.6], [4.4, 3.5]], initial_hands="RR", name="own")
+    rows = [row("m", -400, task="own")]
+    assert methods_frame(results(rows, tmp_path, task)).gap.isna().all()
+    parameters = json.dumps({"other_arm": "still", "base": "task"})
+    rows += [
+        row("optimum/multistart", -390, task="own", parameters=parameters),
+        row("optimum/branch-and-bound", -391, task="own", parameters=parameters,
+            proven_bound=-380),
+        row("optimum/multistart", -350, task="own", run=1,
+            parameters=json.dumps({"other_arm": "free", "base": "y"})),
+    ]  # fmt: skip
+    folder = results(rows, tmp_path, task)
+    found = optima(folder)["own", "still"]
+    assert (found.reward, found.bound, found.proven) == (-390, -380, False)
+    assert ("own", "free") not in optima(folder)
+
+
+def test_a_task_that_only_shares_a_name_has_no_gap(tmp_path):
+    task = changed("two-armed-1", radius=0.2)
+    assert optima(results([row("m", -475)], tmp_path, task)) == {}
+
+
+def test_every_kind_of_information_has_a_letter():
+    assert set(TOLD) == set(Information)
+    assert len(set(TOLD.values())) == len(TOLD)

@@ -1,0 +1,149 @@
+"""The optimum: what is shipped holds, and can be found again."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.optimum import collect, entries, essence
+from analysis.results import Results
+from baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
+from coartic import builtin_tasks, execute, load_task
+from coartic.frames import movement_rows, movements_from
+from coartic.method import MethodError, Session
+from coartic.solution import other_arm_travel
+
+from .strategies import changed
+
+SOLVED = [entry for entry in entries() if "reward" in entry]
+
+
+def name_of(entry):
+    return f"{entry['task']}-{entry['other_arm']}-{entry['base']}"
+
+
+def test_every_task_and_restriction_is_there():
+    known = {(entry["task"], entry["other_arm"], entry["base"]) for entry in entries()}
+    for name in builtin_tasks():
+        for arm in ("free", "still"):
+            assert {(name, arm, "task"), (name, arm, "xy")} <= known
+    assert {name for name, _, base in known if base == "y"} == {
+        "ascending",
+        "descending",
+        "two-armed-2",
+    }
+
+
+@pytest.mark.parametrize("entry", SOLVED, ids=name_of)
+def test_what_is_shipped_holds(entry):
+    """The solution gives its reward; the searches agree; the bound is not above it."""
+    task = load_task(entry["task"])
+    assert entry["essence"] == essence(task)
+    solution = movements_from(task, pd.DataFrame(entry["solution"]))
+    execution = execute(task, solution)
+    assert execution.reward == entry["reward"]
+    assert execution.hands == entry["hands"]
+    assert execution.corrections == 0
+    if entry["other_arm"] == "still":
+        assert other_arm_travel(task, execution) == 0.0
+    locked = {"task": "", "y": "y", "xy": "xy"}[entry["base"]]
+    for axis in (*locked, *task.locked_base):
+        column = "xy".index(axis)
+        assert np.all(execution.configurations[:, column] == task.q0[column])
+    assert set(entry["searches"]) == {method.name for method in METHODS}
+    assert max(entry["searches"].values()) == entry["reward"]
+    assert entry["reward"] - min(entry["searches"].values()) <= 1
+    assert entry["bound"] >= entry["reward"]
+
+
+@pytest.mark.parametrize("name", builtin_tasks())
+@pytest.mark.parametrize("arm", ["free", "still"])
+def test_the_optimum_of_every_task_is_proven(name, arm):
+    (entry,) = (e for e in SOLVED if name_of(e) == f"{name}-{arm}-task")
+    assert entry["bound"] == entry["reward"]
+
+
+def test_restrictions_only_cost():
+    rewards = {name_of(entry): entry["reward"] for entry in SOLVED}
+    for name in builtin_tasks():
+        assert rewards[f"{name}-still-task"] <= rewards[f"{name}-free-task"]
+    assert rewards["two-armed-2-free-y"] < rewards["two-armed-2-free-task"]
+
+
+def test_a_wholly_locked_base_is_infeasible():
+    for entry in entries():
+        if entry["base"] == "xy":
+            assert "out of reach with the base locked in x and y" in entry["infeasible"]
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [
+        (DynamicProgramming, {"graphs": 1, "nodes": 60}),
+        (Multistart, {"starts": 5}),
+        (BranchAndBound, {"graphs": 1, "nodes": 60}),
+    ],
+)
+def test_searches_find_what_is_shipped(method, parameters):
+    task = load_task("descending")
+    session = Session(task, 0, method.told, trusted=True)
+    result = method(method.Parameters(**parameters)).solve(session)
+    assert execute(task, result.solution).reward == -304
+    assert result.details["path_length"] == pytest.approx(3.005051233, abs=1e-8)
+    assert session.meter.solver_iterations > 50
+    if method is BranchAndBound:
+        assert result.details["proven_optimal"] is True
+        assert result.details["proven_bound"] == -304
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_out_of_reach_is_infeasible(method):
+    task = changed("ascending", goals=[[6, 90]], locked_base=["y"], initial_hands="R")
+    parameters = method.Parameters(**{**method.quick})
+    with pytest.raises(MethodError) as failure:
+        method(parameters).solve(Session(task, 0, method.told, trusted=True))
+    assert failure.value.outcome == "infeasible"
+
+
+def test_a_hand_that_is_there_already_saves_a_tick():
+    """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
+    task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")
+    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1))
+    session = Session(task, 0, method.told, trusted=True)
+    execution = execute(task, method.solve(session).solution)
+    assert execution.hands == "RL"
+    assert execution.ticks_by_goal()[1] == 0
+    assert execution.corrections == 0
+
+
+def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
+    task = load_task("ascending")
+    session = Session(task, 0, DynamicProgramming.told, trusted=True)
+    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1))
+    execution = execute(task, method.solve(session).solution)
+    runs = pd.DataFrame(
+        [
+            {
+                "run_id": "r1", "task": "ascending", "method": "optimum/dynamic-programming",
+                "status": "ok", "reason": "", "reward": execution.reward, "proven_bound": -280,
+                "hands": execution.hands,
+                "parameters": json.dumps({"other_arm": "free", "base": "task"}),
+            },
+        ]
+    )  # fmt: skip
+    rows = pd.DataFrame(movement_rows(task, execution.movements)).assign(run_id="r1")
+    rows.to_parquet(tmp_path / "solutions.parquet")
+    keys = ("coartic", "commit", "model_code", "python", "date")
+    manifest = {
+        "environment": dict.fromkeys(keys, "x"),
+        "specification": {
+            "suite": "optimum",
+            "tasks": {"ascending": task.model_dump(mode="json")},
+        },
+    }
+    (entry,) = collect(Results(Path(tmp_path), manifest, runs, pd.DataFrame()))["optima"]
+    assert (entry["reward"], entry["bound"], entry["run_ids"]) == (-292, -280, ["r1"])
+    again = json.loads(json.dumps(entry))["solution"]
+    assert execute(task, movements_from(task, pd.DataFrame(again))).reward == -292
