@@ -126,10 +126,20 @@ def _told(condition: ExplorationCondition) -> frozenset[Information]:
 
 def _method(condition: ExplorationCondition) -> type[DualProcess]:
     parameters: type[DualProcessParameters] = DualProcessParameters
+    citation = DualProcess.citation
     if condition.nullspace_gain:
         parameters = NullspaceParameters
+        citation += (
+            " Nullspace: A. Liegeois (1977). Automatic supervisory control of the configuration "
+            "and behavior of multibody mechanisms. IEEE Transactions on Systems, Man, and "
+            "Cybernetics."
+        )
     elif condition.bias:
         parameters = BiasedParameters
+        citation += (
+            " Bias, after J. C. Spall (2003). Introduction to Stochastic Search and "
+            "Optimization. Wiley."
+        )
     number, _, variant = condition.id[2:].partition("-")
     return type(
         f"DualProcess{condition.id.replace('-', '')}",
@@ -141,6 +151,7 @@ def _method(condition: ExplorationCondition) -> type[DualProcess]:
             "title": f"Dual-process learner, exploration condition {number}"
             + (f", {variant}" if variant else ""),
             "told": _told(condition),
+            "citation": citation,
             "secondary": (_SECONDARY,) if condition.nullspace_gain else (),
             "Parameters": parameters,
             "condition": condition,
