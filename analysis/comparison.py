@@ -239,8 +239,8 @@ def _notes(results: Results) -> list[str]:
         trials, lost = cell.runs.trials.sum(), cell.runs.failed_trials.sum()
         if trials and lost:
             notes.append(
-                f"{cell.task} x {cell.label}: {lost} of {trials} trials failed (the corrective "
-                "process did not converge); they taught nothing."
+                f"{cell.task} x {cell.label}: {lost} of {trials} trials failed (they did not hit "
+                "every goal); they taught nothing."
             )
     failed = results.runs[results.runs.status != "ok"]
     for key, runs in failed.groupby(["task", "method", "status", "reason"]).run.count().items():

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from benchmarks.methods import Entry, Registry, build, unknown, why_not
 from benchmarks.specification import UNLIMITED, Limits, RunSpec, run_seed
-from coartic import CONDITIONS, CoarticError, Task, builtin_tasks, load_task
+from coartic import CONDITIONS, VARIANTS, CoarticError, Task, builtin_tasks, load_task
 from coartic.learner import METHOD_PREFIX
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -127,7 +127,9 @@ def select_cells(
     for unknown names, for a task file whose name is taken, for parameters that a method
     does not take, and where nothing is left to run.
     """
-    methods = [f"{METHOD_PREFIX}{name}" if name in CONDITIONS else name for name in methods]
+    methods = [
+        f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name for name in methods
+    ]
     for name in methods:
         if name not in known:
             raise unknown("method", name, known)

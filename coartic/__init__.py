@@ -7,7 +7,7 @@ with it: robot, tasks, movement, corrective process, execution and scoring.
 
 from coartic.corrective import Correction, correct
 from coartic.errors import CoarticError, NotApplicableError, TaskError
-from coartic.exploration import CONDITIONS, ExplorationCondition
+from coartic.exploration import CONDITIONS, VARIANTS, ExplorationCondition
 from coartic.frames import learning_frame, runs_frame, solutions_frame
 from coartic.initial import corrective_trial, hand_sequences, initial_hands
 from coartic.learner import Counters, LearningRun, learn, learn_many
@@ -22,6 +22,7 @@ __version__ = "0.1.0"
 __all__ = [
     "CONDITIONS",
     "PAPER",
+    "VARIANTS",
     "Arm",
     "CoarticError",
     "Correction",

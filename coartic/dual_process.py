@@ -1,13 +1,25 @@
-"""The dual-process learner as a method, one per exploration condition."""
+"""The dual-process learner as a method, one per exploration condition and variant.
+
+Variants that are told more than the paper's learner are methods of their own, with the
+parameter that makes the difference; the others do not have it, so that what a method
+declares holds under all its parameters.
+"""
 
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from itertools import chain
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from coartic.exploration import CONDITIONS, ExplorationCondition
+from coartic.exploration import (
+    BIAS,
+    CONDITIONS,
+    NULLSPACE_GAIN,
+    VARIANTS,
+    ExplorationCondition,
+)
 from coartic.initial import InitialSearch, search_initial_hands
 from coartic.learner import METHOD_PREFIX, TRIALS, LearningRun, learn
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
@@ -22,6 +34,20 @@ class DualProcessParameters(Parameters):
     """ε"""
     noise_sd: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.05
     """SD of η, length unit (base) or rad (joints)."""
+
+
+class NullspaceParameters(DualProcessParameters):
+    """Of the variants whose corrective process has a secondary objective."""
+
+    nullspace_gain: Annotated[float, Field(gt=0, le=1)] = NULLSPACE_GAIN
+    """β"""
+
+
+class BiasedParameters(DualProcessParameters):
+    """Of the variants whose noise is biased towards what the corrective process suggests."""
+
+    bias: Annotated[float, Field(gt=0, allow_inf_nan=False)] = BIAS
+    """Mean of η along the suggested direction, in SDs of η."""
 
 
 class DualProcess(Method):
@@ -41,9 +67,7 @@ class DualProcess(Method):
     def solve(self, session: Session) -> Result:
         """Learn; the solution is the best trial's."""
         parameters: DualProcessParameters = self.parameters
-        condition = replace(
-            self.condition, epsilon=parameters.epsilon, noise_sd=parameters.noise_sd
-        )
+        condition = replace(self.condition, **parameters.model_dump(exclude={"trials"}))
         task = session.hand_over(*self.told)
         spend_search(session, search_initial_hands(task, condition.hands, model=session.model))
         trials = parameters.trials
@@ -85,27 +109,56 @@ def _details(run: LearningRun) -> dict[str, Any]:
     }
 
 
+_SECONDARY = "change the posture as little as possible (nullspace of a correction)"
+
+
 def _told(condition: ExplorationCondition) -> frozenset[Information]:
-    """**A** and the total reward; the closest hand also needs to know where things are."""
+    """**A** and the total reward; what else a condition or variant makes use of."""
     told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    if condition.hand_exploration == "closest":
+    if condition.hand_exploration == "closest":  # to know where things are
         told |= {Information.GOALS, Information.FORWARD_KINEMATICS}
+    if condition.bias:  # to know a single step of A, at a configuration of its own choice
+        told |= {Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN}
+    if condition.nullspace_gain:
+        told |= {Information.SECONDARY_OBJECTIVES}
     return frozenset(told)
 
 
-def _variant(condition: ExplorationCondition) -> type[DualProcess]:
+def _method(condition: ExplorationCondition) -> type[DualProcess]:
+    parameters: type[DualProcessParameters] = DualProcessParameters
+    citation = DualProcess.citation
+    if condition.nullspace_gain:
+        parameters = NullspaceParameters
+        citation += (
+            " Nullspace: A. Liegeois (1977). Automatic supervisory control of the configuration "
+            "and behavior of multibody mechanisms. IEEE Transactions on Systems, Man, and "
+            "Cybernetics."
+        )
+    elif condition.bias:
+        parameters = BiasedParameters
+        citation += (
+            " Bias, after J. C. Spall (2003). Introduction to Stochastic Search and "
+            "Optimization. Wiley."
+        )
+    number, _, variant = condition.id[2:].partition("-")
     return type(
-        f"DualProcess{condition.id}",
+        f"DualProcess{condition.id.replace('-', '')}",
         (DualProcess,),
         {
             "__doc__": DualProcess.__doc__,
             "__module__": __name__,
             "name": f"{METHOD_PREFIX}{condition.id}",
-            "title": f"Dual-process learner, exploration condition {condition.id[2:]}",
+            "title": f"Dual-process learner, exploration condition {number}"
+            + (f", {variant}" if variant else ""),
             "told": _told(condition),
+            "citation": citation,
+            "secondary": (_SECONDARY,) if condition.nullspace_gain else (),
+            "Parameters": parameters,
             "condition": condition,
         },
     )
 
 
-DUAL_PROCESS: tuple[type[DualProcess], ...] = tuple(_variant(c) for c in CONDITIONS.values())
+DUAL_PROCESS: tuple[type[DualProcess], ...] = tuple(
+    map(_method, chain(CONDITIONS.values(), VARIANTS.values()))
+)

@@ -1,13 +1,18 @@
-"""The paper's exploration conditions, as data.
+"""The paper's exploration conditions, and variants of the learner, as data.
 
 A condition says which hands the robot has, which joints are perturbed (AModChosen:
 base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
 The learner reads these fields; it has no code of its own for any condition.
+
+Variants go beyond the paper. Two integrate informed search as its Discussion proposes:
+a secondary objective in the nullspace of the corrective process, and noise whose mean
+lies in the direction that the corrective process suggests. One takes the corrective
+process away. What each does to learning is measured in docs/model.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from coartic.errors import CoarticError
@@ -30,6 +35,14 @@ class ExplorationCondition:
     hand_exploration: HandExploration  # "random" is DASel
     epsilon: float = 0.2  # ε
     noise_sd: float = 0.05  # SD of η, length unit (base) or rad (joints)
+    nullspace_gain: float = 0.0
+    """β of the corrective process, 0 to 1 (:func:`coartic.corrective.correct`)."""
+    bias: float = 0.0
+    """Mean of η along the step that **A** would make from q*, on the explored joints, in
+    SDs of η. Its mean across that direction stays zero."""
+    corrects: bool = True
+    """Whether **A** finishes what a stored target misses. If not, such a trial fails;
+    **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
 
     def __post_init__(self) -> None:
         if not self.hands or any(hand not in HANDS for hand in self.hands):
@@ -38,6 +51,10 @@ class ExplorationCondition:
             raise ValueError(f"epsilon {self.epsilon} is not a probability")
         if not 0.0 <= self.noise_sd < float("inf"):
             raise ValueError(f"noise_sd {self.noise_sd} is not a finite number >= 0")
+        if not 0.0 <= self.nullspace_gain <= 1.0:
+            raise ValueError(f"nullspace_gain {self.nullspace_gain} is not within 0 to 1")
+        if not 0.0 <= self.bias < float("inf"):
+            raise ValueError(f"bias {self.bias} is not a finite number >= 0")
         if self.hand_exploration not in ("none", "closest", "random"):
             raise ValueError(
                 f"hand_exploration {self.hand_exploration!r}: it is 'none', 'closest' or 'random'"
@@ -71,14 +88,30 @@ CONDITIONS = {
 }
 
 
+NULLSPACE_GAIN = 0.05  # β of the nullspace variants (sweep: docs/model.md)
+BIAS = 0.25  # of the biased variants, SDs of η (sweep: docs/model.md)
+
+
+def _variants(base: str) -> tuple[ExplorationCondition, ...]:
+    plain = CONDITIONS[base]
+    return (
+        replace(plain, id=f"{base}-nullspace", nullspace_gain=NULLSPACE_GAIN),
+        replace(plain, id=f"{base}-biased", bias=BIAS),
+        replace(plain, id=f"{base}-uncorrected", corrects=False),
+    )
+
+
+VARIANTS = {condition.id: condition for base in ("EC1", "EC4") for condition in _variants(base)}
+
+
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition by its id; raises CoarticError for an unknown one."""
+    """A condition or variant by its id; raises CoarticError for an unknown one."""
     if isinstance(condition, ExplorationCondition):
         return condition
     try:
-        return CONDITIONS[condition.removeprefix("dual-process/")]
+        return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:
-        known = ", ".join(CONDITIONS)
+        known = ", ".join(CONDITIONS | VARIANTS)
         raise CoarticError(
             f"unknown exploration condition {condition!r}; known: {known}"
         ) from None

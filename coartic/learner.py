@@ -9,8 +9,8 @@ One run is one call of a compiled kernel. It draws from the NumPy generator it i
 given (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform
 number against ε, where hands are explored; a second one that picks a hand, where the
 first fell below ε and the pick is random; one standard normal per explored joint, in
-the order of ``q``, where a target is stored. Runs share nothing, so any number of
-them may go on at once.
+the order of ``q``, where a target is stored; a bias draws nothing. Runs share nothing,
+so any number of them may go on at once.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.compiled import entry, inlined, inner, joint_chain
-from coartic.corrective import correct_kernel
+from coartic.corrective import correct_kernel, shift_kernel
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.exploration import ExplorationCondition, load_condition
 from coartic.initial import InitialSearch, search_initial_hands
@@ -60,6 +60,9 @@ class _Problem(NamedTuple):
     exploration: int
     epsilon: float
     noise_sd: float
+    nullspace_gain: float
+    bias: float
+    corrects: bool
     model: Any
 
 
@@ -91,6 +94,7 @@ class _Count(NamedTuple):
     iterations: int = 2
     corrections: int = 3
     failed: int = 4
+    biased: int = 5
 
 
 _C = _Count()
@@ -171,6 +175,25 @@ def _set_target(
 
 
 @inlined
+def _shift_target(
+    target: Any, stored: Any, goal: int, hand: int, problem: Any, counts: Any, scratch: Any
+) -> None:
+    """Move the mean of η into the direction in which **A** would step from q*(s, a)."""
+    shift_kernel(
+        target,
+        stored,
+        _arm(problem, hand),
+        problem.goals[goal, 0],
+        problem.goals[goal, 1],
+        problem.explored[hand],
+        problem.bias * problem.noise_sd,
+        scratch,
+    )
+    counts[_C.evaluations] += 1
+    counts[_C.biased] += 1
+
+
+@inlined
 def _move(
     q: Any,
     target: Any,
@@ -213,6 +236,7 @@ def _correct(
         problem.goals[goal, 1],
         problem.free_x,
         problem.free_y,
+        problem.nullspace_gain,
         problem.model,
         scratch,
     )
@@ -248,9 +272,12 @@ def _trial(
         else:
             hand = _greedy(values, problem.hands)
 
-        if values[hand] > -math.inf:
+        known = values[hand] > -math.inf
+        if known:
             stored = tables.target[goal, previous, hand]
             _set_target(target, q, stored, hand, explore, problem, rng)
+            if explore and problem.bias > 0.0:
+                _shift_target(target, stored, goal, hand, problem, counts, scratch)
             ticks, hit = _move(q, target, goal, hand, LEARNED, problem, log, counts, scratch)
             total += ticks
         else:
@@ -258,6 +285,9 @@ def _trial(
             if hit:
                 _record(log, goal, hand, CORRECTIVE, 0, q)
         if not hit:
+            if known and not problem.corrects:
+                counts[_C.failed] += 1
+                return False, total
             if not _correct(q, target, goal, hand, problem, counts, scratch):
                 counts[_C.failed] += 1
                 return False, total
@@ -344,12 +374,13 @@ class Counters:
     """Forward-kinematics evaluations the compiled kernels made. They skip steps that
     cannot end a movement; a robot would sense its hand on every one of the ticks."""
     jacobians: int
-    """Jacobian evaluations, one per corrective iteration."""
+    """Jacobian evaluations: one per corrective iteration and per biased movement."""
     corrective_iterations: int
     corrections: int
     """Corrective movements made."""
     failed_trials: int
-    """Trials in which the corrective process did not converge."""
+    """Trials that did not hit every goal: the corrective process did not converge, or
+    the variant has none for stored targets."""
 
 
 @dataclass(frozen=True)
@@ -516,7 +547,7 @@ def learn(
             trials=trials,
             movement_ticks=int(counts[_C.ticks]),
             forward_kinematics=int(counts[_C.evaluations]),
-            jacobians=iterations,
+            jacobians=iterations + int(counts[_C.biased]),
             corrective_iterations=iterations,
             corrections=int(counts[_C.corrections]),
             failed_trials=int(counts[_C.failed]),
@@ -592,6 +623,9 @@ def _problem(task: Task, condition: ExplorationCondition, model: MotionModel) ->
         exploration=_EXPLORATION[condition.hand_exploration],
         epsilon=float(condition.epsilon),
         noise_sd=float(condition.noise_sd),
+        nullspace_gain=float(condition.nullspace_gain),
+        bias=float(condition.bias),
+        corrects=bool(condition.corrects),
         model=model,
     )
 

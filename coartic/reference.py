@@ -35,6 +35,7 @@ class ReferenceRun(NamedTuple):
     movement_ticks: int
     corrections: int
     corrective_iterations: int
+    biased_movements: int
 
 
 def move(
@@ -71,17 +72,22 @@ def correct(
     goal: tuple[float, float],
     *,
     locked_base: tuple[str, ...] = (),
+    nullspace_gain: float = 0.0,
     model: MotionModel = PAPER,
 ) -> Correction:
     """:func:`coartic.corrective.correct`, with the Jacobian as a matrix."""
     free = np.ones(robot.dof)
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
+    start = np.array(q)
     q = np.array(q)
     for iteration in range(model.max_iterations):
         error = goal - robot.forward_kinematics(q, hand)
         if math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance:
             return Correction(q, True, iteration)
-        q = q + model.gain * free * (robot.jacobian(q, hand).T @ error)
+        step = model.gain * free * (robot.jacobian(q, hand).T @ error)
+        if nullspace_gain:
+            step += nullspace_gain * robot.nullspace_projector(q, hand, free) @ (start - q)
+        q = q + step
     error = goal - robot.forward_kinematics(q, hand)
     converged = math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance
     return Correction(q, converged, model.max_iterations)
@@ -102,7 +108,7 @@ def learn(
     targets: dict[tuple[State, Hand], Array] = {}
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
-    ticks = corrections = iterations = 0
+    ticks = corrections = iterations = biased = 0
     for trial in range(trials):
         q = np.array(task.q0)
         total = 0
@@ -114,17 +120,22 @@ def learn(
                 hand = first_hands[number]
             else:
                 hand = _choose(task, condition, q, goal, state, values, rng)
-            if (state, hand) in targets:
-                target = _explore(task, condition, q, hand, targets[state, hand], rng)
+            known = (state, hand) in targets
+            if known:
+                target = _explore(task, condition, q, hand, goal, targets[state, hand], rng)
+                biased += condition.bias > 0
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
             else:
                 hit = _distance(task.robot.forward_kinematics(q, hand), goal) <= task.radius
             if not hit:
+                if known and not condition.corrects:
+                    break
                 found = correct(
-                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model
-                )
+                    task.robot, q, hand, goal, locked_base=task.locked_base,
+                    nullspace_gain=condition.nullspace_gain, model=model,
+                )  # fmt: skip
                 iterations += found.iterations
                 if not found.converged:
                     break
@@ -144,7 +155,9 @@ def learn(
                 if total > values.get((state, hand), -math.inf):
                     values[state, hand] = total
                     targets[state, hand] = reached
-    return ReferenceRun(rewards, completed, values, targets, ticks, corrections, iterations)
+    return ReferenceRun(
+        rewards, completed, values, targets, ticks, corrections, iterations, biased
+    )
 
 
 def _choose(
@@ -171,6 +184,7 @@ def _explore(
     condition: ExplorationCondition,
     q: Array,
     hand: Hand,
+    goal: tuple[float, float],
     stored: Array,
     rng: np.random.Generator,
 ) -> Array:
@@ -181,6 +195,12 @@ def _explore(
     explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
     if not condition.modify_other:
         target[task.robot.joints(other)] = q[task.robot.joints(other)]
+    if condition.bias:
+        error = goal - task.robot.forward_kinematics(stored, hand)
+        step = explored * (task.robot.jacobian(stored, hand).T @ error)
+        length = math.sqrt(_sum_of_squares(step))
+        if length:
+            target += condition.bias * condition.noise_sd / length * step
     target[explored] += condition.noise_sd * rng.standard_normal(int(explored.sum()))
     return target
 

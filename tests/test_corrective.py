@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct, reference
+from coartic.corrective import shift_kernel
+from coartic.movement import scratch_for
 from coartic.robot import HANDS
 
 from .strategies import UNEVEN, configurations
@@ -82,3 +85,134 @@ def test_stationary_point_ends_the_descent():
 def test_too_large_a_gain_is_an_outcome():
     model = MotionModel(gain=1e6, max_iterations=500)
     assert not correct(ROBOT, np.full(10, 0.3), "right", (5.0, 1.0), model=model).converged
+
+
+def free_joints(robot, hand, locked):
+    free = np.zeros(robot.dof, bool)
+    free[:2] = ["x" not in locked, "y" not in locked]
+    free[robot.joints(hand)] = True
+    return free
+
+
+LOCKS = [(), ("x",), ("y",), ("x", "y")]
+
+
+@pytest.mark.parametrize("locked", LOCKS)
+@pytest.mark.parametrize("robot", [ROBOT, UNEVEN], ids=["paper", "uneven"])
+@pytest.mark.parametrize("hand", HANDS)
+def test_secondary_objective_stays_in_the_nullspace(robot, hand, locked):
+    """The second step differs by β N(q1) (q0 - q1), which leaves the hand where it is."""
+    rng = np.random.default_rng(3)
+    free = free_joints(robot, hand, locked)
+    for _ in range(20):
+        q0, goal, gain = rng.uniform(-2, 2, robot.dof), rng.uniform(-3, 3, 2), rng.uniform(0, 1)
+        q1, plain, with_objective = (
+            correct(
+                robot, q0, hand, goal, locked_base=locked, nullspace_gain=beta,
+                model=MotionModel(max_iterations=iterations),
+            ).q
+            for iterations, beta in [(1, gain), (2, 0.0), (2, gain)]
+        )  # fmt: skip
+        step = with_objective - plain
+        assert np.abs(robot.jacobian(q1, hand) @ step).max() < 1e-12
+        expected = gain * robot.nullspace_projector(q1, hand, free) @ (q0 - q1)
+        np.testing.assert_allclose(step, expected, atol=1e-10)
+        assert not step[~free].any()
+
+
+@pytest.mark.parametrize("locked", LOCKS)
+@pytest.mark.parametrize("gain", [0.02, 0.3])
+def test_secondary_objective_equals_the_matrix_form(gain, locked):
+    rng = np.random.default_rng(4)
+    model = MotionModel(max_iterations=300)
+    converged = 0
+    for robot, hand in [(ROBOT, "left"), (ROBOT, "right"), (UNEVEN, "right")]:
+        for _ in range(8):
+            arguments = robot, rng.uniform(-2, 2, robot.dof), hand, tuple(rng.uniform(-2, 2, 2))
+            options = {"locked_base": locked, "nullspace_gain": gain, "model": model}
+            fast, slow = correct(*arguments, **options), reference.correct(*arguments, **options)
+            assert (fast.converged, fast.iterations) == (slow.converged, slow.iterations)
+            converged += fast.converged
+            if fast.converged:
+                np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
+    assert converged > 12
+
+
+@pytest.mark.parametrize("locked", [(), ("y",)])
+def test_secondary_objective_finds_the_least_change_of_posture(locked):
+    """The nearest configuration that has the hand at the goal, by a solver."""
+    rng = np.random.default_rng(5)
+    free = free_joints(ROBOT, "right", locked)
+    model = MotionModel(correction_tolerance=1e-6)
+    gained = []
+    for _ in range(6):
+        q0 = rng.uniform(-1, 1, 10)
+        goal = ROBOT.forward_kinematics(q0, "right") + rng.uniform(-2, 2, 2)
+        options = {"locked_base": locked, "model": model}
+        plain = correct(ROBOT, q0, "right", tuple(goal), **options)
+        found = correct(ROBOT, q0, "right", tuple(goal), nullspace_gain=0.1, **options)
+        assert plain.converged
+        assert found.converged
+
+        def hand_misses(change, q0=q0, goal=goal):
+            q = np.array(q0)
+            q[free] += change
+            return ROBOT.forward_kinematics(q, "right") - goal
+
+        best = minimize(
+            lambda change: change @ change,
+            (found.q - q0)[free],
+            jac=lambda change: 2 * change,
+            constraints={"type": "eq", "fun": hand_misses},
+        )
+        assert best.success
+        length = np.linalg.norm(found.q - q0)
+        assert length == pytest.approx(best.fun**0.5, abs=1e-4)
+        gained.append(np.linalg.norm(plain.q - q0) - length)
+    assert min(gained) > -1e-4
+    assert max(gained) > 0.01
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-12, 1e-7, 1e-4])
+@pytest.mark.parametrize("gain", [0.1, 0.2])
+def test_secondary_objective_on_a_straight_arm(bend, gain):
+    """On a locked base a straight arm is singular: as safe as without the objective."""
+    q = np.zeros(10)
+    q[7] = bend
+    options = {"locked_base": ("x", "y"), "nullspace_gain": gain}
+    found = correct(ROBOT, q, "right", (2.0, 2.0), **options)
+    assert found.converged
+    assert np.linalg.norm(found.q - q) < 3
+    stretched = correct(ROBOT, q, "right", (5.0, 0.1), **options)
+    assert not stretched.converged
+    assert np.linalg.norm(stretched.q) < 1e-3
+    if not bend:
+        assert stretched.iterations == 1
+
+
+@pytest.mark.parametrize("gain", [-0.1, 1.1, float("nan")])
+def test_other_nullspace_gains_are_refused(gain):
+    with pytest.raises(ValueError, match="it must be 0 to 1"):
+        correct(ROBOT, np.zeros(10), "right", (3.0, 2.0), nullspace_gain=gain)
+
+
+@pytest.mark.parametrize("hand", HANDS)
+def test_shift_is_along_the_steepest_descent(hand):
+    """Its direction by finite differences of the squared distance; its length as asked."""
+    rng = np.random.default_rng(6)
+    for _ in range(10):
+        q, goal = rng.uniform(-2, 2, 10), rng.uniform(-3, 3, 2)
+        mask = rng.random(10) < 0.7
+        target = np.array(q)
+        shift_kernel(target, q, ROBOT.arm(hand), *goal, mask, 0.07, scratch_for(ROBOT))
+        nearby = q + 1e-6 * np.concatenate([np.eye(10), -np.eye(10)])
+        distances = ((ROBOT.forward_kinematics(nearby, hand) - goal) ** 2).sum(axis=1)
+        descent = (distances[10:] - distances[:10]) * mask
+        np.testing.assert_allclose(target - q, 0.07 * descent / np.linalg.norm(descent), atol=1e-8)
+
+
+def test_no_shift_where_the_corrective_process_would_not_move():
+    q, target = np.zeros(10), np.ones(10)
+    for goal, mask in [((4.5, 0.1), np.ones(10, bool)), ((2.0, 1.0), np.zeros(10, bool))]:
+        shift_kernel(target, q, ROBOT.arm("right"), *goal, mask, 0.07, scratch_for(ROBOT))
+    np.testing.assert_array_equal(target, np.ones(10))

@@ -13,7 +13,7 @@ from analysis.results import load_results
 from benchmarks import tables
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
-from benchmarks.methods import registry
+from benchmarks.methods import build, registry
 from benchmarks.specification import Limits, run_seed
 from benchmarks.store import Store, encode
 from benchmarks.suites import (
@@ -505,6 +505,29 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     assert [
         c.method for c in select_cells(paper, KNOWN, task_files=[one_armed], tasks=["arm"])
     ] == ["dual-process/EC1"]
+
+
+def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):
+    """Known by their short names, and told what they use."""
+    cells = paper_cells(methods=["EC1-biased"], tasks=["ascending"])
+    assert [cell.label for cell in cells] == ["dual-process/EC1-biased"]
+    grid = suite_of(
+        tmp_path,
+        'tasks = ["two-armed-2"]\nmethods = ["dual-process/EC4-nullspace"]\n'
+        "grid = { nullspace_gain = [0.05, 0.2] }",
+    )
+    assert [cell.variant for cell in grid] == ["", "nullspace_gain=0.2"]
+    for name, entry in KNOWN.items():
+        if name.startswith("dual-process/"):
+            method = entry.method
+            for key, value in method.Parameters(trials=1).model_dump().items():
+                assert key == "trials" or getattr(method.condition, key) == value
+            assert ("secondary objectives" in method.told) == bool(method.secondary)
+            assert bool(method.secondary) == name.endswith("-nullspace")
+            assert ("Jacobian" in method.told) == name.endswith("-biased")
+    for foreign in ("nullspace_gain", "bias"):  # told would no longer be right
+        with pytest.raises(CoarticError, match=f"{foreign}: extra inputs"):
+            build(KNOWN["dual-process/EC4"], {foreign: 0.1})
 
 
 def test_own_task_errors(tmp_path):

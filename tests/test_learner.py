@@ -2,12 +2,14 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from coartic import (
     CONDITIONS,
+    VARIANTS,
     CoarticError,
     ExplorationCondition,
     MotionModel,
@@ -41,7 +43,7 @@ def assert_equals_reference(task, condition, trials, seed=11):
     counters = fast.counters
     assert counters.movement_ticks == slow.movement_ticks
     assert counters.corrections == slow.corrections
-    assert counters.corrective_iterations == counters.jacobians
+    assert counters.corrective_iterations == counters.jacobians - slow.biased_movements
     assert counters.corrective_iterations <= slow.corrective_iterations
     if slow.completed.all():  # else the kernel leaves a stationary point sooner
         assert counters.corrective_iterations == slow.corrective_iterations
@@ -73,6 +75,12 @@ def test_equals_the_slow_learner_trial_by_trial(task, condition):
     assert_equals_reference(load_task(task), CONDITIONS[condition], trials=80)
 
 
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_variants_equal_the_slow_learner_trial_by_trial(variant):
+    task = "ascending" if variant.startswith("EC1") else "two-armed-1"
+    assert_equals_reference(load_task(task), VARIANTS[variant], trials=30)
+
+
 @pytest.mark.parametrize(
     ("chosen", "other", "hands"),
     list(itertools.product([True, False], [True, False], ["none", "closest", "random"])),
@@ -93,6 +101,10 @@ def test_conditions_are_data(chosen, other, hands):
     assert task.robot == UNEVEN
     condition = ExplorationCondition("own", ("left", "right"), chosen, other, hands, 0.4, 0.1)
     assert_equals_reference(task, condition, trials=60)
+    if hands == "closest":  # the variants' fields, all of them at once
+        informed = replace(condition, nullspace_gain=0.1, bias=0.7)
+        assert_equals_reference(task, informed, trials=20)
+        assert_equals_reference(task, replace(informed, corrects=False, noise_sd=0.02), trials=40)
 
 
 @pytest.mark.parametrize(
@@ -344,3 +356,63 @@ def test_errors():
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     with pytest.raises(ValueError, match="not a probability"):
         ExplorationCondition("x", ("left",), True, True, "none", epsilon=1.5)
+    for field, value, message in [
+        ("nullspace_gain", 1.5, "not within 0 to 1"),
+        ("nullspace_gain", float("nan"), "not within 0 to 1"),
+        ("bias", -1.0, "not a finite number"),
+        ("bias", float("inf"), "not a finite number"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            replace(CONDITIONS["EC1"], **{field: value})
+
+
+def test_variants_differ_from_the_papers_conditions_in_one_field():
+    assert list(CONDITIONS) == ["EC1", "EC2", "EC3", "EC4"]
+    off = ExplorationCondition("off", HANDS, True, True, "random")
+    for condition in CONDITIONS.values():
+        for field in ("nullspace_gain", "bias", "corrects"):
+            assert getattr(condition, field) == getattr(off, field)
+    for name, variant in VARIANTS.items():
+        plain = CONDITIONS[name[:3]]
+        fields = [f for f in vars(plain) if getattr(plain, f) != getattr(variant, f)]
+        assert len(fields) == 2
+        assert fields[0] == "id"
+        method = f"dual-process/{name}"
+        assert learn(load_task("two-armed-2"), method, seed=0, trials=1).method == method
+
+
+def test_least_change_of_posture_shortens_the_initial_solution():
+    """Never longer, and shorter where the base cannot give way (docs/model.md)."""
+    initial = {
+        name: [learn(load_task(name), c, seed=0, trials=1).reward for c in conditions]
+        for name, conditions in [
+            ("ascending", ("EC1", "EC1-nullspace")),
+            ("descending", ("EC1", "EC1-nullspace")),
+            ("two-armed-1", ("EC4", "EC4-nullspace")),
+            ("two-armed-2", ("EC4", "EC4-nullspace")),
+        ]
+    }
+    assert all(informed >= plain for plain, informed in initial.values())
+    assert initial["two-armed-1"] == [-671, -650]
+
+
+def test_bias_hits_more_often():
+    """Fewer goals are missed where the noise leans towards them."""
+    task = load_task("ascending")
+    plain, biased = (
+        sum(run.counters.corrections for run in learn_many(task, c, seeds=range(4), trials=3000))
+        for c in ("EC1", "EC1-biased")
+    )
+    assert biased < 0.97 * plain
+
+
+def test_without_corrective_process_a_missed_goal_ends_the_trial():
+    task = load_task("ascending")
+    run = learn(task, "EC1-uncorrected", seed=0, trials=2000)
+    assert run.counters.corrections == 3  # those of trial 0
+    assert run.initial_reward == -319
+    failed = ~run.completed
+    assert run.counters.failed_trials == failed.sum() > 1000
+    assert run.reward > run.initial_reward
+    assert {movement.kind for movement in run.solution} == {"learned"}
+    assert run.execute().corrections == 0
