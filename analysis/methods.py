@@ -178,8 +178,14 @@ def _cells(row: Mapping[Any, Any]) -> tuple[str, ...]:
         row["other_arm"],
         row["hands"] or NONE,
         *(_count(row[name]) for name in _SPENT),
-        NONE if math.isnan(row["solve_s"]) else f"{row['solve_s']:.2g}",
+        _seconds(row["solve_s"]),
     )
+
+
+def _seconds(value: float) -> str:
+    if math.isnan(value):
+        return NONE
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
 
 
 def _count(value: float) -> str:

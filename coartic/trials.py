@@ -98,7 +98,7 @@ def _make(
             if not hit:
                 found[:] = q
                 converged, iterations = correct_kernel(
-                    found, arm, goal_x, goal_y, free_x, free_y, model, scratch
+                    found, arm, goal_x, goal_y, free_x, free_y, 0.0, model, scratch
                 )
                 counts[_C.iterations] += iterations
                 counts[_C.evaluations] += iterations + 1
