@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from baselines.whole_ticks import mergers
 from coartic import MotionModel, Task
 from coartic.initial import hand_sequences
 from coartic.robot import HANDS, Array, Hand, directions
@@ -80,7 +81,7 @@ def certify(
     """
     heap: list[_Node] = []
     numbers = itertools.count()
-    longest = (ticks - 1) * model.step  # path of any solution that takes fewer
+    longest = max(0, ticks - 1) * model.step  # path of any solution that takes fewer
     solved = iterations = 0
     root_length = math.inf
 
@@ -117,17 +118,10 @@ def certify(
 
 def _roots(task: Task, still: bool) -> Iterator[_Relaxation]:
     """Every hand sequence with every set of goals that can be hit without a movement."""
-    goals = task.goal_array
     for letters in hand_sequences(task):
         hands = hands_of(letters)
-        able = [
-            g
-            for g in range(1, len(hands))
-            if hands[g] != hands[g - 1] or math.dist(goals[g], goals[g - 1]) <= 2 * task.radius
-        ]
-        for count in range(len(able) + 1):
-            for merged in itertools.combinations(able, count):
-                yield _Relaxation(task, hands, merged, still)
+        for merged in mergers(task, hands):
+            yield _Relaxation(task, hands, merged, still)
 
 
 class _Relaxation:

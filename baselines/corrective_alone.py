@@ -39,7 +39,8 @@ class GivenHands(Method):
         task = session.hand_over(Information.CORRECTIVE_PROCESS)
         search = search_initial_hands(task)
         spend_search(session, search)
-        execution = session.trial(_corrective(hands_of(search.hands)))
+        with session.solving():
+            execution = session.trial(_corrective(hands_of(search.hands)))
         if not execution.completed:
             raise MethodError("infeasible", execution.reason)
         return Result(execution.movements)
@@ -65,7 +66,8 @@ class EverySequence(Method):
         for hands in itertools.product(ordered, repeat=session.goals_count):
             if session.trials_left == 0:
                 break
-            execution = session.trial(_corrective(hands))
+            with session.solving():
+                execution = session.trial(_corrective(hands))
             if execution.reward is not None:
                 changes = changes_of_hand(execution.hands)
                 found.append((-execution.reward, changes, execution))

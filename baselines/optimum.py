@@ -135,10 +135,10 @@ class Optimum(Method):
         for instance, plan in sorted(best.values(), key=lambda entry: entry[1].cost):
             rounding = Rounding(problem, instance, session.model.step)
             # A merger saves one tick a goal and never shortens the path.
-            most = len(instance.hands) - 1
+            most = len(instance.hands)
             if found is not None and rounding.least(plan) - most >= found[0]:
                 continue
-            for merged, shortest in (((), plan), *rounding.mergers(plan)):
+            for merged, shortest in (((), plan), *rounding.merged_plans(plan, task)):
                 for whole in rounding.every(shortest, merged):
                     if found is not None and whole.ticks >= found[0]:
                         break

@@ -29,6 +29,7 @@ from baselines.whole_ticks import Rounding, movements
 from coartic import Movement, Task
 from coartic.initial import too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.movement import follow
 from coartic.robot import Array, Hand
 from coartic.task import hands_of, letters_of
 
@@ -237,31 +238,24 @@ def chains(
 def path_movements(
     session: Session, task: Task, instance: Instance, path: list[Array]
 ) -> list[Movement]:
-    """A path of one piece ``(k, dof)`` per goal, cut where the scorer sees each goal hit.
+    """A path of one piece ``(k, dof)`` per goal, which ends where the scorer sees the hit.
 
     A smooth path goes on towards a goal's inside after its rim is hit; the rest of the
-    piece then belongs to the next movement, so that the whole path is followed: but for
-    joints held on the way to the next goal, which stay where they are.
+    piece then begins the next movement, so that the whole path is followed: but for joints
+    held on the way to the next goal, which stay where they are.
     """
     made: list[Movement] = []
-    here, step = np.array(task.q0), session.model.step
-    rest = here[None, :0].reshape(0, task.robot.dof)
+    here, rest = np.array(task.q0), np.empty((0, task.robot.dof))
     for goal, (hand, piece) in enumerate(zip(instance.hands, path, strict=True)):
         ahead = np.where(instance.held[goal], here, np.vstack([rest, piece]))
-        corners = np.vstack([here, ahead])
-        ends = np.concatenate(
-            [[0.0], np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)))]
+        found = follow(
+            task.robot, here, ahead, hand, task.goals[goal], task.radius, model=session.model
         )
-        at = np.append(np.arange(0.0, ends[-1], step), ends[-1])
-        points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
-        misses = task.robot.forward_kinematics(points, hand) - task.goal_array[goal]
-        session.spend(forward_kinematics=len(points))
-        inside = np.flatnonzero(np.hypot(*misses.T) <= task.radius)
-        stop = int(inside[0]) if inside.size else len(at) - 1
-        passed = int(np.searchsorted(ends[1:], at[stop], side="right"))
-        waypoints = np.vstack([ahead[:passed], points[stop]])
-        made.append(Movement(goal + 1, hand, "path", waypoints[-1], waypoints=waypoints))
-        here, rest = points[stop], ahead[passed:]
+        session.spend(forward_kinematics=found.evaluations)
+        made.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
+        steps = np.diff(np.vstack([here, ahead]), axis=0)
+        ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
+        here, rest = found.q, ahead[ends > (found.ticks - 1) * session.model.step]
     return made
 
 

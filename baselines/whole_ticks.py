@@ -74,21 +74,14 @@ class Rounding:
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
 
-    def mergers(self, plan: Plan) -> Iterator[tuple[tuple[int, ...], Plan]]:
-        """Shortest plans in which some goals are merged with the ones before them.
+    def merged_plans(self, plan: Plan, task: Task) -> Iterator[tuple[tuple[int, ...], Plan]]:
+        """Shortest plans in which some goals are hit as their turn comes.
 
-        Possible where another hand takes over or the discs overlap; worth it where the
-        path grows by less than the ticks it saves.
+        Worth it where the path grows by less than the ticks it saves.
         """
-        instance, goals = self._instance, len(self._instance.hands)
-        able = [
-            g
-            for g in range(1, goals)
-            if instance.hands[g] != instance.hands[g - 1]
-            or math.dist(instance.goals[g], instance.goals[g - 1]) <= 2 * instance.radius
-        ]
-        for count in range(1, len(able) + 1):
-            for merged in itertools.combinations(able, count):
+        goals = len(self._instance.hands)
+        for merged in mergers(task, self._instance.hands):
+            if merged:
                 found = self._solve(plan.configurations, np.full(goals, np.nan), merged)
                 if found.converged:
                     yield merged, found
@@ -128,6 +121,24 @@ class Rounding:
         plan = self._problem.solve(instance, start, lengths=lengths, deep=deep)
         add(self.spent, plan.spent)
         return plan
+
+
+def mergers(task: Task, hands: tuple[Hand, ...]) -> Iterator[tuple[int, ...]]:
+    """Every set of goals (0-based) that can be hit without a movement, the empty set first.
+
+    A goal can where its hand may be there already: at the start, or because another hand
+    hits the goal before, or because the two discs overlap.
+    """
+    start = task.robot.forward_kinematics(task.q0, hands[0])
+    able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
+    able += [
+        g
+        for g in range(1, len(hands))
+        if hands[g] != hands[g - 1]
+        or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
+    ]
+    for count in range(len(able) + 1):
+        yield from itertools.combinations(able, count)
 
 
 def add(total: dict[str, int], spent: Mapping[str, int]) -> None:

@@ -145,10 +145,13 @@ def test_two_goals_hit_at_once_count_once():
     """Both hands stand at goals already: nothing has to move, so nothing is proven."""
     task = changed("two-armed-2", goals=[[3.5, 0.1], [4.5, 0.1]], initial_hands="LR", radius=0.1)
     roots = list(_roots(task, still=False))
-    assert {root.moves for root in roots} == {1, 2}
-    assert {r.hands for r in roots if r.moves == 1} == {"LR", "RL"}
+    assert {r.hands for r in roots if r.moves == 0} == {"LR"}
+    alone = [Movement(1, "left", "corrective"), Movement(2, "right", "corrective")]
+    assert execute(task, alone).ticks == 0
     found = certify(task, 1, still=False, model=PAPER, most_nodes=50)
-    assert found.ticks <= 1
+    assert found.ticks == 0
+    assert not found.proven
+    assert certify(task, 0, still=False, model=PAPER, most_nodes=50).proven
 
 
 def test_a_goal_out_of_reach_leaves_no_path():

@@ -1,9 +1,11 @@
 """The conformance kit: every built-in method passes, every broken one fails its law."""
 
+import re
 from pathlib import Path
 
 import pytest
 
+from analysis.optimum import entries
 from benchmarks.conformance import check_method, check_task_file
 from benchmarks.methods import registry
 from benchmarks.reproduce import perform_once
@@ -14,6 +16,12 @@ from .test_task import GOOD
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
 KNOWN = registry([BROKEN])
+BUILT_IN = registry()
+OPTIMUM = {
+    entry["task"]: entry["reward"]
+    for entry in entries()
+    if (entry["other_arm"], entry["base"]) == ("free", "task")
+}
 LAWS = [
     "declaration",
     "parameters",
@@ -26,12 +34,19 @@ LAWS = [
 ]
 
 
-@pytest.mark.parametrize("name", [*registry(), "test/good"])
+@pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])
 def test_methods_that_keep_every_law(name):
     laws = check_method(KNOWN[name])
     assert [law.name for law in laws] == LAWS
     assert [law for law in laws if not law.passed] == []
     assert all(law.finding for law in laws)
+    if name in BUILT_IN:
+        (failure,) = (law.finding for law in laws if law.name == "failure")
+        assert "gives infeasible: " in failure or "does not apply" in failure
+    # And nobody beats the optimum.
+    (rewards,) = (law.finding for law in laws if law.name == "solution")
+    for task, reward in re.findall(r"([a-z0-9-]+) (-\d+)", rewards):
+        assert int(reward) <= OPTIMUM[task]
 
 
 def test_what_a_session_shows_cannot_be_written():
