@@ -146,10 +146,16 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
             for hands, count in good.hands.value_counts().items()
         ),
         "corrections": int(good.solution_corrections.sum()) if len(good) else 0,
-        **{name: float(cell.runs[name].median()) for name in _SPENT},
-        "build_s": float(cell.runs.build_s.max()),
-        "solve_s": float(solve.median()) if len(solve) else math.nan,
+        **{name: _median(cell.runs[name]) for name in _SPENT},
+        "build_s": _median(cell.runs.build_s),
+        "solve_s": _median(solve),
     }
+
+
+def _median(values: pd.Series) -> float:
+    """NaN where there is no value, as for runs that crashed."""
+    known = values.dropna()
+    return float(known.median()) if len(known) else math.nan
 
 
 def _warm(runs: pd.DataFrame) -> pd.Series:
@@ -190,7 +196,7 @@ def _seconds(value: float) -> str:
 
 def _count(value: float) -> str:
     """A count with three figures: 950, 12.3 k, 4.98 M."""
-    if not value:
+    if not value or math.isnan(value):
         return NONE
     for size, unit in ((1e6, " M"), (1e3, " k")):
         if value >= size:

@@ -69,7 +69,7 @@ class TrajectoryOptimisation(Method):
     cost: ClassVar[Cost]
     stochastic = False
     Parameters = TrajectoryParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40}
+    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "hands": "given"}
 
     def why_not(self, task: Task) -> str | None:
         """A sequence that does not fit the task, or more than can be planned one by one."""

@@ -78,6 +78,14 @@ def test_a_reward_above_the_optimum_is_shouted(tmp_path):
     assert methods_frame(folder).beaten.sum() == 0
 
 
+def test_a_method_that_only_crashed_has_a_row(tmp_path):
+    nothing = dict.fromkeys(("trials", "build_s", "solve_s", "jacobians", "hands"))
+    rows = [row("m", None, status="crashed", **nothing)]
+    (table,) = methods_tables(results(rows, tmp_path))
+    assert table.rows[0][2:4] == ("– (0)", "–")
+    assert any("1 of 1 runs have no solution" in n for n in methods_notes(results(rows, tmp_path)))
+
+
 def test_times_are_of_warm_runs(tmp_path):
     rows = [row("m", -500, run=0, solve_s=9.0), row("m", -500, run=1, solve_s=0.2)]
     assert methods_frame(results(rows, tmp_path)).solve_s.item() == 0.2
