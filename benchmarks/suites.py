@@ -13,12 +13,31 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from benchmarks.methods import Entry, Registry, build, unknown, why_not
 from benchmarks.specification import UNLIMITED, Limits, RunSpec, run_seed
-from coartic import CONDITIONS, VARIANTS, CoarticError, Task, builtin_tasks, load_task
+from coartic import (
+    CONDITIONS,
+    VARIANTS,
+    CoarticError,
+    Task,
+    builtin_tasks,
+    load_task,
+    parse_task,
+)
 from coartic.learner import METHOD_PREFIX
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 ALL = "*"
 Scalar = bool | int | float | str
+
+
+class _Move(BaseModel):
+    """A family of tasks that differ in where one goal is."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    goal: Annotated[int, Field(ge=1, strict=True)]
+    """Which goal, from 1."""
+    by: Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
+    """Displacements in x and y, length unit; one task each."""
 
 
 class _Block(BaseModel):
@@ -28,6 +47,7 @@ class _Block(BaseModel):
 
     tasks: Annotated[tuple[str, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
+    move: _Move | None = None
     parameters: dict[str, Scalar] = {}
     grid: dict[str, Annotated[tuple[Scalar, ...], Field(min_length=1)]] = {}
 
@@ -222,8 +242,9 @@ def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
             raise unknown(f"method of suite {suite.name!r}", name, known)
     every = ALL in block.methods
     cells = []
-    for task_name in tasks:
-        task = load_task(task_name)
+    for task in itertools.chain.from_iterable(
+        _family(suite, load_task(name), block.move) for name in tasks
+    ):
         for name in known if every else block.methods:
             reason = why_not(known[name], task, block.parameters)
             if reason is not None:
@@ -237,6 +258,29 @@ def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
                 build(cell.entry, parameters)
                 cells.append(cell)
     return cells
+
+
+def _family(suite: Suite, task: Task, move: _Move | None) -> list[Task]:
+    """The task itself, or its variants with one goal moved."""
+    if move is None:
+        return [task]
+    if move.goal > len(task.goals):
+        raise CoarticError(
+            f"suite {suite.name!r}: task {task.name!r} has no goal {move.goal} to move"
+        )
+    variants = []
+    for dx, dy in move.by:
+        goals = [list(goal) for goal in task.goals]
+        goals[move.goal - 1][0] += dx
+        goals[move.goal - 1][1] += dy
+        content = {
+            **task.model_dump(mode="json"),
+            "name": f"{task.name}.goal{move.goal}_{dx:g}_{dy:g}",
+            "description": f"{task.name} with goal {move.goal} moved by ({dx:g}, {dy:g})",
+            "goals": goals,
+        }
+        variants.append(parse_task(content, f"suite {suite.name!r}"))
+    return variants
 
 
 def plan_specification(

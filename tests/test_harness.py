@@ -472,7 +472,7 @@ def test_selection_errors(arguments, words):
     assert words in str(caught.value)
 
 
-def test_unknown_suite():
+def test_unknsuite_of():
     with pytest.raises(CoarticError, match="unknown suite 'papr'; did you mean 'paper'"):
         load_suite("papr")
 
@@ -576,3 +576,30 @@ def test_manifest(results):
     assert "goals" in specification["methods"]["dual-process/EC2"]["told"]
     assert len(specification["run_ids"]) == 14
     assert np.isfinite(manifest["format"])
+
+
+def test_a_suite_can_move_one_goal(tmp_path):
+    cells = suite_of(
+        tmp_path,
+        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+        "move = { goal = 2, by = [[0, -0.5], [0.25, 0]] }",
+    )
+    base = load_task("ascending")
+    assert [cell.task.name for cell in cells] == [
+        "ascending.goal2_0_-0.5",
+        "ascending.goal2_0.25_0",
+    ]
+    for cell, moved in zip(cells, ((6.0, 1.5), (6.25, 2.0)), strict=True):
+        assert cell.task.goals == (base.goals[0], moved, base.goals[2])
+        assert np.array_equal(cell.task.q0, base.q0)
+    with pytest.raises(CoarticError, match="has no goal 4 to move"):
+        suite_of(
+            tmp_path,
+            'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\nmove = {goal=4, by=[[0,1]]}',
+        )
+    with pytest.raises(CoarticError, match="out of reach|too far"):
+        suite_of(
+            tmp_path,
+            'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
+            "move = { goal = 2, by = [[0, 9]] }",
+        )
