@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -9,8 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.optimum import BASE, Optimum, optima
 from analysis.optimum import METHODS as OPTIMUM
-from analysis.optimum import Optimum, optima
 from analysis.results import CellRuns, Results
 from analysis.table import NONE, Table
 from coartic.method import Information
@@ -26,6 +27,7 @@ TOLD = {
     Information.SECONDARY_OBJECTIVES: "S",
 }
 """A letter for each kind of information, in the order in which the tables show them."""
+_STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 _SPENT = (
     "trials",
     "movement_ticks",
@@ -36,7 +38,7 @@ _SPENT = (
 
 
 def methods_frame(results: Results) -> pd.DataFrame:
-    """One row per task and method, best mean reward first within a task.
+    """One row per task and method: within a task the optimum, then the best mean reward first.
 
     Rewards are of runs with a solution; what was spent is the median over all runs. The
     gaps are the optimum's reward less the mean: ``gap`` to what is best with all joints
@@ -48,11 +50,13 @@ def methods_frame(results: Results) -> pd.DataFrame:
     rows = [_row(cell, references) for cell in results.cells]
     frame = pd.DataFrame(rows)
     order = {name: place for place, name in enumerate(results.tasks)}
-    by_task = frame.task.map(order)
+    reference = ~frame.method.str.startswith(OPTIMUM)
     return (
-        frame.assign(by_task=by_task)
-        .sort_values(["by_task", "reward"], ascending=[True, False], kind="stable")
-        .drop(columns="by_task")
+        frame.assign(by_task=frame.task.map(order), reference=reference)
+        .sort_values(
+            ["by_task", "reference", "reward"], ascending=[True, True, False], kind="stable"
+        )
+        .drop(columns=["by_task", "reference"])
         .reset_index(drop=True)
     )
 
@@ -93,8 +97,10 @@ def methods_notes(results: Results) -> list[str]:
         f"Told: {letters}.",
         "Gap: ticks from the optimum of the task to the mean reward, and as a share of the "
         "optimum; in brackets the gap to the optimum with the other arm still, where a method's "
-        "solutions keep still the arm that is not chosen. The optimum is the best of three "
-        "searches; a bound is proven by branch and bound (docs/model.md).",
+        "solutions keep still the arm that is not chosen (EC1 uses the right hand alone; its gap "
+        "is to the optimum with both hands all the same). The optimum is the best of two "
+        "independent searches, and *proven* where branch and bound leaves nothing above it "
+        "(docs/model.md); its rows come first and are references, not competitors.",
         "Trials, control ticks of those trials, forward kinematics, Jacobians, solver iterations "
         "and solve time are medians over runs, of one run each; what a robot would do while it "
         "executes the solution is not part of them. Solve time leaves out what is built once.",
@@ -122,9 +128,11 @@ def methods_notes(results: Results) -> list[str]:
 def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str, Any]:
     good = cell.good
     rewards = good.reward.to_numpy(dtype=np.float64)
-    still = bool(len(good)) and bool((good.other_arm_travel == 0.0).all())
-    best = references.get((cell.task, "free"))
-    best_still = references.get((cell.task, "still")) if still else None
+    still = bool(len(good)) and bool((good.other_arm_travel <= _STILL).all())
+    # A base that is locked by a parameter is another problem, with another optimum.
+    locked = set(good.parameters.map(lambda text: json.loads(text).get("base", BASE))) - {BASE}
+    best = None if locked else references.get((cell.task, "free"))
+    best_still = references.get((cell.task, "still")) if still and not locked else None
     mean = float(rewards.mean()) if len(rewards) else math.nan
     told = set(cell.runs.told.iloc[0].split(", ")) if len(cell.runs) else set()
     solve = good.solve_s.where(good.solve_s > 0, good.wall_s)[_warm(good)]
@@ -137,9 +145,11 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
         "reward": mean,
         "reward_sd": float(np.std(rewards, ddof=1)) if len(rewards) > 1 else math.nan,
         "gap": best.reward - mean if best else math.nan,
-        "gap_share": (best.reward - mean) / abs(best.reward) if best else math.nan,
+        "gap_share": (best.reward - mean) / -best.reward if best and best.reward else math.nan,
         "gap_still": best_still.reward - mean if best_still else math.nan,
-        "beaten": int((rewards > best.reward).sum()) if best else 0,
+        "beaten": int(
+            sum((rewards > known.reward).sum() for known in (best, best_still) if known)
+        ),
         "other_arm": "still" if still else "moves" if len(good) else NONE,
         "hands": ", ".join(
             f"{hands} {count}" if len(good) > 1 else str(hands)
@@ -167,7 +177,9 @@ def _warm(runs: pd.DataFrame) -> pd.Series:
 def _cells(row: Mapping[Any, Any]) -> tuple[str, ...]:
     gap = NONE
     if not math.isnan(row["gap"]):
-        gap = f"{row['gap']:.1f}".removesuffix(".0") + f" ({row['gap_share']:.1%})"
+        gap = f"{row['gap']:.1f}".removesuffix(".0")
+        if not math.isnan(row["gap_share"]):
+            gap += f" ({row['gap_share']:.1%})"
         if not math.isnan(row["gap_still"]):
             gap += f" [{row['gap_still']:.1f}]".replace(".0]", "]")
     reward = f"{NONE} (0)"

@@ -23,7 +23,7 @@ from coartic import CoarticError, Task
 
 METHODS = "optimum/"  # methods that search for it
 DATA = Path(__file__).with_name("optimum.json")
-_BASE = "task"  # base locked as the task has it: the case that rewards compare with
+BASE = "task"  # base locked as the task has it: the case that rewards compare with
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ def optima(results: Results) -> dict[tuple[str, str], Optimum]:
     shipped = _shipped()
     own = results.runs[results.runs.method.str.startswith(METHODS) & (results.runs.status == "ok")]
     restriction = own.parameters.map(json.loads)
-    base = restriction.map(lambda parameters: parameters.get("base", _BASE))
+    base = restriction.map(lambda parameters: parameters.get("base", BASE))
     arm = restriction.map(lambda parameters: parameters.get("other_arm", "free"))
     for name, task in results.tasks.items():
         for other_arm in ("free", "still"):
-            runs = own[(own.task == name) & (base == _BASE) & (arm == other_arm)]
+            runs = own[(own.task == name) & (base == BASE) & (arm == other_arm)]
             candidates = [_from_runs(runs)] if len(runs) else []
-            known = shipped.get((essence(task), other_arm, _BASE))
+            known = shipped.get((essence(task), other_arm, BASE))
             if known is not None:
                 candidates.append(_from_entry(known))
             if candidates:

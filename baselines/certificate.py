@@ -54,7 +54,8 @@ class Certificate:
     open_nodes: int
     """Of them, those that were neither split nor bounded when the search ended."""
     root_length: float
-    """Bound on the path before any split, length unit and rad."""
+    """Bound on the path before any split, length unit and rad; 0 where the solver could not
+    say for one of the roots."""
     iterations: int
     """Iterations of the conic solver."""
 
@@ -83,7 +84,7 @@ def certify(
     numbers = itertools.count()
     longest = max(0, ticks - 1) * model.step  # path of any solution that takes fewer
     solved = iterations = 0
-    root_length = math.inf
+    trivial = ticks  # bound of hand sequences that were not looked at
 
     def bound(root: _Relaxation, box: Array, parent: float) -> None:
         nonlocal solved, iterations
@@ -96,22 +97,22 @@ def certify(
             heapq.heappush(heap, _Node(least, length, next(numbers), root, box, point))
 
     for root in _roots(task, still):
-        box = root.first_box(longest)
-        before = len(heap)
-        bound(root, box, 0.0)
-        if len(heap) > before:
-            root_length = min(root_length, max(node.length for node in heap if node.root is root))
+        if solved >= most_nodes:  # what is left unsolved has the trivial bound
+            trivial = min(trivial, root.moves)
+            continue
+        bound(root, root.first_box(longest), 0.0)
+    root_length = min((node.length for node in heap), default=longest)
     while heap and solved < most_nodes:
         node = heapq.heappop(heap)
         for box in node.root.split(node.box, node.point):
             bound(node.root, box, node.length)
-    least = heap[0].ticks if heap else ticks
+    least = min(trivial, heap[0].ticks if heap else ticks)
     return Certificate(
         ticks=least,
-        proven=not heap,
+        proven=least == ticks,
         nodes=solved,
         open_nodes=len(heap),
-        root_length=root_length if math.isfinite(root_length) else longest,
+        root_length=root_length,
         iterations=iterations,
     )
 

@@ -59,6 +59,10 @@ class StuckError(Exception):
     """The hand does not reach the goal."""
 
 
+class UnfinishedError(StuckError):
+    """It was still on its way when the control steps ran out."""
+
+
 @dataclass
 class Controller:
     """The control loop on one task; what it spends goes to the session."""
@@ -99,7 +103,12 @@ class Controller:
             if distance < nearest - 0.1 * length:
                 nearest, since = distance, 0
             since += 1
-            if since > _STALL_STEPS or len(waypoints) == self.max_steps:
+            if len(waypoints) == self.max_steps:
+                raise UnfinishedError(
+                    f"goal {goal + 1}: the {hand} hand is still {distance:.3g} from its centre "
+                    f"after all {self.max_steps} control steps (max_steps)"
+                )
+            if since > _STALL_STEPS:
                 raise StuckError(
                     f"goal {goal + 1}: the {hand} hand is still {distance:.3g} from its centre "
                     f"after {len(waypoints)} control steps and comes no nearer"

@@ -20,6 +20,7 @@ from coartic.task import Task
 
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
+_NEAR = 2.0  # length unit: from farther away the base carries the hand there first
 
 
 @dataclass
@@ -47,8 +48,9 @@ def sample_postures(
     """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
 
     Gaussian samples around the start, spread log-uniformly between narrow and wide, each
-    brought to a random point of the disc by Gauss-Newton steps of least norm; ``n`` may be
-    less than ``count`` where some do not get there. The other arm stays at its start.
+    brought to a random point of the disc, from far away by the base and then by Gauss-Newton
+    steps of least norm; ``n`` may be less than ``count`` where some do not get there. The
+    other arm stays at its start.
     """
     robot = task.robot
     moving = np.zeros(robot.dof, dtype=np.bool_)
@@ -62,6 +64,10 @@ def sample_postures(
         task.radius * rng.random((count, 1)) ** 0.25 / np.linalg.norm(offset, axis=1)[:, None]
     )
     aim = task.goal_array[goal] + 0.98 * offset
+    miss = aim - robot.forward_kinematics(q, hand)
+    far = np.maximum(1.0 - _NEAR / np.maximum(np.hypot(*miss.T), _NEAR), 0.0)
+    q[:, :BASE_DOF] += far[:, None] * miss * moving[:BASE_DOF]
+    spent.forward_kinematics += count
     for _ in range(_PROJECTIONS):
         miss = aim - robot.forward_kinematics(q, hand)
         jacobian = robot.jacobian(q, hand) * moving

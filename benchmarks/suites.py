@@ -179,6 +179,9 @@ def select_cells(
         if taken is not None:
             raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
         own[task.name] = Path(path)
+        for block in suite.cells:  # blocks for all tasks are for the user's as well
+            if ALL in block.tasks and block.move is None:
+                cells += _cells_of(suite, block, known, task, block.methods)
         add(task, methods or suite_methods)
 
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
@@ -240,23 +243,31 @@ def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
     for name in block.methods:
         if name not in known and name != ALL:
             raise unknown(f"method of suite {suite.name!r}", name, known)
-    every = ALL in block.methods
     cells = []
-    for task in itertools.chain.from_iterable(
-        _family(suite, load_task(name), block.move) for name in tasks
-    ):
-        for name in known if every else block.methods:
-            reason = why_not(known[name], task, block.parameters)
-            if reason is not None:
-                if every or ALL in block.tasks:
-                    continue  # "all that applies"
-                raise CoarticError(f"suite {suite.name!r}: {reason}")
-            for combination in itertools.product(*block.grid.values()):
-                point = dict(zip(block.grid, combination, strict=True))
-                parameters = {**block.parameters, **point}
-                cell = Cell(task, known[name], tuple(parameters.items()))
-                build(cell.entry, parameters)
-                cells.append(cell)
+    for name in tasks:
+        for task in _family(suite, load_task(name), block.move):
+            cells += _cells_of(suite, block, known, task, block.methods)
+    return cells
+
+
+def _cells_of(
+    suite: Suite, block: _Block, known: Registry, task: Task, methods: Iterable[str]
+) -> list[Cell]:
+    """The cells of a block on one task."""
+    every = ALL in methods
+    cells = []
+    for name in known if every else methods:
+        reason = why_not(known[name], task, block.parameters)
+        if reason is not None:
+            if every or ALL in block.tasks:
+                continue  # "all that applies"
+            raise CoarticError(f"suite {suite.name!r}: {reason}")
+        for combination in itertools.product(*block.grid.values()):
+            point = dict(zip(block.grid, combination, strict=True))
+            parameters = {**block.parameters, **point}
+            cell = Cell(task, known[name], tuple(parameters.items()))
+            build(cell.entry, parameters)
+            cells.append(cell)
     return cells
 
 

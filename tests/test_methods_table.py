@@ -53,6 +53,7 @@ def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):
     assert found.loc["still", "gap_share"] == pytest.approx(40 / 465)
     assert list(found[["runs", "solved"]].loc["still"]) == [3, 2]
     assert list(found.other_arm) == ["moves", "still"]  # best reward first
+    assert found.beaten.sum() == 0
     assert found.loc["still", "reward_sd"] == pytest.approx(np.std([-500, -510], ddof=1))
 
 
@@ -114,6 +115,30 @@ def test_a_task_of_the_users_own_has_the_optimum_of_its_own_runs(tmp_path):
 def test_a_task_that_only_shares_a_name_has_no_gap(tmp_path):
     task = changed("two-armed-1", radius=0.2)
     assert optima(results([row("m", -475)], tmp_path, task)) == {}
+
+
+def test_an_optimum_of_no_ticks_has_no_share(tmp_path):
+    """A task whose goals are hit as it starts."""
+    task = changed("two-armed-1", goals=[[0, 4.07]], initial_hands="R", name="there")
+    parameters = json.dumps({"other_arm": "free", "base": "task"})
+    rows = [row("optimum/multistart", 0, task="there", parameters=parameters)]
+    found = methods_frame(results(rows, tmp_path, task))
+    assert (found.gap.item(), np.isnan(found.gap_share.item())) == (0, True)
+    (table,) = methods_tables(results(rows, tmp_path, task))
+    assert table.rows[0][3].startswith("0")
+
+
+def test_a_base_locked_by_a_parameter_has_no_gap(tmp_path):
+    parameters = json.dumps({"other_arm": "free", "base": "y"})
+    found = methods_frame(
+        results([row("optimum/multistart", -500, parameters=parameters)], tmp_path)
+    )
+    assert found.gap.isna().all()
+
+
+def test_a_still_arm_above_its_optimum_is_shouted_too(tmp_path):
+    folder = results([row("still", -480)], tmp_path)  # above -490, below -465
+    assert methods_frame(folder).beaten.sum() == 1
 
 
 def test_every_kind_of_information_has_a_letter():
