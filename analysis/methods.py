@@ -71,11 +71,11 @@ def methods_tables(results: Results) -> list[Table]:
                 _title(str(name), references, results),
                 (
                     "method",
-                    "told",
                     "reward: mean ± SD (n)",
                     "gap",
-                    "other arm",
+                    "told",
                     "hands",
+                    "other arm",
                     "trials",
                     "ticks",
                     "kinematics",
@@ -95,6 +95,8 @@ def methods_notes(results: Results) -> list[str]:
     letters = ", ".join(f"{letter} {item.value}" for item, letter in TOLD.items())
     notes = [
         f"Told: {letters}.",
+        "Reward: of the runs that have a solution, n of them; other arm: whether the arm that is "
+        "not chosen keeps still in all of a method's solutions, as executed.",
         "Gap: ticks from the optimum of the task to the mean reward, and as a share of the "
         "optimum; in brackets the gap to the optimum with the other arm still, where a method's "
         "solutions keep still the arm that is not chosen (EC1 uses the right hand alone; its gap "
@@ -105,12 +107,6 @@ def methods_notes(results: Results) -> list[str]:
         "and solve time are medians over runs, of one run each; what a robot would do while it "
         "executes the solution is not part of them. Solve time leaves out what is built once.",
     ]
-    failed = frame[frame.runs > frame.solved]
-    for row in failed.to_dict("records"):
-        notes.append(
-            f"{row['task']} x {row['method']}: {row['runs'] - row['solved']} of {row['runs']} "
-            "runs have no solution; they are counted, not part of the mean."
-        )
     for row in frame[frame.beaten > 0].to_dict("records"):
         notes.append(
             f"**{row['beaten']} runs of {row['task']} x {row['method']} are better than the "
@@ -138,7 +134,8 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
     solve = good.solve_s.where(good.solve_s > 0, good.wall_s)[_warm(good)]
     return {
         "task": cell.task,
-        "method": cell.label,
+        "method": cell.method,
+        "variant": cell.variant,
         "told": "".join(letter for item, letter in TOLD.items() if item.value in told),
         "runs": len(cell.runs),
         "solved": len(good),
@@ -150,7 +147,7 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
         "beaten": int(
             sum((rewards > known.reward).sum() for known in (best, best_still) if known)
         ),
-        "other_arm": "still" if still else "moves" if len(good) else NONE,
+        "other_arm": "still" if still else "moves" if len(good) else "",
         "hands": ", ".join(
             f"{hands} {count}" if len(good) > 1 else str(hands)
             for hands, count in good.hands.value_counts().items()
@@ -189,12 +186,12 @@ def _cells(row: Mapping[Any, Any]) -> tuple[str, ...]:
             reward += f" ± {row['reward_sd']:.1f}"
         reward += f" ({row['solved']})"
     return (
-        row["method"],
-        row["told"] or NONE,
+        f"{row['method']} {row['variant']}".strip(),
         reward,
         gap,
-        row["other_arm"],
+        row["told"] or NONE,
         row["hands"] or NONE,
+        row["other_arm"] or NONE,
         *(_count(row[name]) for name in _SPENT),
         _seconds(row["solve_s"]),
     )
@@ -211,7 +208,7 @@ def _count(value: float) -> str:
     if not value or math.isnan(value):
         return NONE
     for size, unit in ((1e6, " M"), (1e3, " k")):
-        if value >= size:
+        if value >= 0.9995 * size:
             return f"{value / size:.3g}{unit}"
     return f"{value:.0f}"
 

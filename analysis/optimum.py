@@ -82,8 +82,8 @@ def entries() -> list[dict[str, Any]]:
     return rows
 
 
-def collect(results: Results) -> dict[str, Any]:
-    """The data of ``optimum.json`` from a results folder of suite ``optimum``.
+def collect(results: Results) -> list[dict[str, Any]]:
+    """Entries of ``optimum.json`` from a results folder of suite ``optimum``.
 
     Raises CoarticError where the folder has no optimum runs.
     """
@@ -94,6 +94,9 @@ def collect(results: Results) -> dict[str, Any]:
     runs["other_arm"] = parameters.map(lambda values: values["other_arm"])
     runs["base"] = parameters.map(lambda values: values["base"])
     movements = results.solutions()
+    environment = results.manifest["environment"]
+    keys = ("coartic", "commit", "model_code", "python", "date")
+    made_by = {key: environment[key] for key in keys}
     rows = []
     for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
         name, base, arm = map(str, key)
@@ -105,6 +108,7 @@ def collect(results: Results) -> dict[str, Any]:
             "base": base,
             "other_arm": arm,
             "run_ids": sorted(group.run_id),
+            "made_by": made_by,
         }
         if len(good):
             best = good.iloc[int(good.reward.astype(int).argmax())]
@@ -119,18 +123,7 @@ def collect(results: Results) -> dict[str, Any]:
         else:
             entry["infeasible"] = group.reason.iloc[0]
         rows.append(entry)
-    environment = results.manifest["environment"]
-    return {
-        "made_by": {
-            "suite": results.manifest["specification"]["suite"],
-            "coartic": environment["coartic"],
-            "commit": environment["commit"],
-            "model_code": environment["model_code"],
-            "python": environment["python"],
-            "date": environment["date"],
-        },
-        "optima": rows,
-    }
+    return rows
 
 
 def _movements(rows: pd.DataFrame) -> list[dict[str, Any]]:
@@ -174,15 +167,25 @@ def _shipped() -> dict[tuple[str, str, str], dict[str, Any]]:
 
 
 def main() -> None:
-    """``python -m analysis.optimum FOLDER``: write ``optimum.json``."""
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m analysis.optimum RESULTS_FOLDER (of suite optimum)")
+    """``python -m analysis.optimum FOLDER``: renew entries of ``optimum.json``."""
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        sys.exit(
+            "usage: python -m analysis.optimum RESULTS_FOLDER\n"
+            f"Renews in {DATA} what the folder's optimum runs cover; the rest stays."
+        )
     try:
-        content = collect(load_results(Path(sys.argv[1])))
+        new = collect(load_results(Path(sys.argv[1])))
     except CoarticError as error:
         sys.exit(str(error))
+
+    def key(entry: dict[str, Any]) -> tuple[str, str, str]:
+        return entry["task"], entry["base"], entry["other_arm"]
+
+    renewed = {key(entry) for entry in new}
+    kept = [entry for entry in entries() if key(entry) not in renewed]
+    content = {"optima": sorted([*kept, *new], key=key)}
     DATA.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    print(f"{len(content['optima'])} optima written to {DATA}")
+    print(f"{DATA}: {len(new)} optima renewed, {len(kept)} kept")
 
 
 if __name__ == "__main__":

@@ -90,6 +90,12 @@ class Controller:
 
         Raises StuckError where it does not get there, CascadeError where a solver fails.
         """
+        short = self.task.beyond_reach(hand, self.task.goals[goal])
+        if short > self.task.radius:
+            raise StuckError(
+                f"goal {goal + 1}: the {hand} hand ends {short:.3g} short of it with the base "
+                f"locked in {' and '.join(self.task.locked_base)}"
+            )
         length = self.session.model.step * self.period
         start = q
         waypoints: list[Array] = []

@@ -179,7 +179,12 @@ class _MethodChecks:
             if record["status"] != "ok":
                 raise _BrokenError(f"on {task.name}: {record['status']}: {record['reason']}")
             rewards.append(f"{task.name} {record['score']['reward']}")
-        return "executed and scored on " + ", ".join(rewards)
+        with_what = ", ".join(f"{key}={value}" for key, value in self.defaults.items())
+        return (
+            "executed and scored on "
+            + ", ".join(rewards)
+            + (f" (checked with {with_what})" if with_what else "")
+        )
 
     def determinism(self) -> str:
         for task, record in self.first_records:

@@ -177,7 +177,7 @@ def build(entry: Entry, parameters: Mapping[str, Any]) -> Method:
     except ValidationError as error:
         known = ", ".join(entry.method.Parameters.model_fields) or "none"
         problems = "; ".join(
-            f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].lower()} "
+            f"{'.'.join(map(str, detail['loc']))}: {decapitalised(detail['msg'])} "
             f"(found {detail['input']!r})"
             for detail in error.errors()
         )
@@ -285,6 +285,11 @@ def code_hash(source: str) -> str:
 @cache
 def _on_import(path: Path) -> bytes:
     return path.read_bytes()
+
+
+def decapitalised(text: str) -> str:
+    """A sentence as part of another."""
+    return text[:1].lower() + text[1:]
 
 
 def _brief(error: BaseException) -> str:

@@ -9,6 +9,7 @@ A problem that a solver does not solve is counted and its reason shown.
 from __future__ import annotations
 
 import os
+import sys
 import time
 from dataclasses import dataclass, field
 from typing import NamedTuple, get_args
@@ -164,6 +165,8 @@ def conditions() -> str:
 
 def main() -> None:
     """Record, measure, print."""
+    if len(sys.argv) > 1:
+        sys.exit("usage: python -m benchmarks.qp_solvers (it takes no arguments)")
     problems = recorded(PROBLEMS)
     figures = measure(problems)
     free = sum(_closed_form(problem) is not None for problem in problems)

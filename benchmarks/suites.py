@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from benchmarks.methods import Entry, Registry, build, unknown, why_not
+from benchmarks.methods import Entry, Registry, build, decapitalised, unknown, why_not
 from benchmarks.specification import UNLIMITED, Limits, RunSpec, run_seed
 from coartic import (
     CONDITIONS,
@@ -125,7 +125,7 @@ def _read(path: Path) -> Suite:
         raise CoarticError(f"{path}: is not valid TOML: {error}") from None
     except ValidationError as error:
         lines = [
-            f"{path}: {'.'.join(map(str, detail['loc']))}: {detail['msg'].lower()}"
+            f"{path}: {'.'.join(map(str, detail['loc']))}: {decapitalised(detail['msg'])}"
             for detail in error.errors()
         ]
         raise CoarticError("\n".join(lines)) from None
@@ -153,11 +153,21 @@ def select_cells(
     for name in methods:
         if name not in known:
             raise unknown("method", name, known)
+    files: dict[str, Path] = {}
+    own: dict[str, Task] = {}
+    for path in task_files:
+        task = load_task(Path(path))
+        taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
+        if taken == Path(path):
+            raise CoarticError(f"{path}: the same task file is given twice")
+        if taken is not None:
+            raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
+        files[task.name], own[task.name] = Path(path), task
     cells: list[Cell] = []
     for block in suite.cells:
-        cells += _block_cells(suite, block, known)
+        cells += _block_cells(suite, block, known, own)
     suite_methods = list(dict.fromkeys(cell.method for cell in cells))
-    suite_tasks = list({cell.task.name: cell.task for cell in cells}.values())
+    shipped = [cell.task for cell in cells if cell.task.name not in own]
     refused: list[str] = []
 
     def add(task: Task, names: Iterable[str]) -> None:
@@ -168,20 +178,9 @@ def select_cells(
             else:
                 refused.append(reason)
 
-    for task in suite_tasks:
+    for task in {task.name: task for task in shipped}.values():
         add(task, [name for name in methods if name not in suite_methods])
-    own: dict[str, Path] = {}
-    for path in task_files:
-        task = load_task(Path(path))
-        taken = "a shipped task" if task.name in builtin_tasks() else own.get(task.name)
-        if taken == Path(path):
-            raise CoarticError(f"{path}: the same task file is given twice")
-        if taken is not None:
-            raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
-        own[task.name] = Path(path)
-        for block in suite.cells:  # blocks for all tasks are for the user's as well
-            if ALL in block.tasks and block.move is None:
-                cells += _cells_of(suite, block, known, task, block.methods)
+    for task in own.values():
         add(task, methods or suite_methods)
 
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
@@ -238,25 +237,28 @@ def run_specs(
     return planned
 
 
-def _block_cells(suite: Suite, block: _Block, known: Registry) -> list[Cell]:
-    tasks = builtin_tasks() if ALL in block.tasks else block.tasks
+def _block_cells(
+    suite: Suite, block: _Block, known: Registry, own: Mapping[str, Task]
+) -> list[Cell]:
+    """The cells of a block; blocks for all tasks are for the user's as well."""
+    tasks = [*builtin_tasks(), *own] if ALL in block.tasks else block.tasks
     for name in block.methods:
         if name not in known and name != ALL:
             raise unknown(f"method of suite {suite.name!r}", name, known)
     cells = []
     for name in tasks:
-        for task in _family(suite, load_task(name), block.move):
-            cells += _cells_of(suite, block, known, task, block.methods)
+        if block.move is not None and ALL in block.tasks and name in own:
+            continue
+        for task in _family(suite, own.get(name) or load_task(name), block.move):
+            cells += _cells_of(suite, block, known, task)
     return cells
 
 
-def _cells_of(
-    suite: Suite, block: _Block, known: Registry, task: Task, methods: Iterable[str]
-) -> list[Cell]:
+def _cells_of(suite: Suite, block: _Block, known: Registry, task: Task) -> list[Cell]:
     """The cells of a block on one task."""
-    every = ALL in methods
+    every = ALL in block.methods
     cells = []
-    for name in known if every else methods:
+    for name in known if every else block.methods:
         reason = why_not(known[name], task, block.parameters)
         if reason is not None:
             if every or ALL in block.tasks:

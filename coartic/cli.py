@@ -209,8 +209,12 @@ def run(
         raise CoarticError(f"cannot write to {out}: {error.strerror or error}") from None
 
     console = _console()
-    for table in comparison.tables:
-        _print(console, table.title, table.columns, table.rows)
+    hidden = sum(
+        _print(console, table.title, table.columns, table.rows, wrap=False)
+        for table in comparison.tables
+    )
+    if hidden:
+        console.print("(The terminal is too narrow for all columns; comparison.md has them.)\n")
     for note in comparison.notes:
         console.print(f"- {plain(note)}", markup=False, highlight=False)
     print(
@@ -477,10 +481,24 @@ def _print(
     title: str,
     columns: tuple[str, ...],
     rows: list[tuple[str, ...]] | tuple[tuple[str, ...], ...],
-) -> None:
+    *,
+    wrap: bool = True,
+) -> int:
+    """Print a table; the number of columns left out.
+
+    Its first column is never broken. Without ``wrap`` none is: what does not fit in the
+    terminal's width is left out from the right.
+    """
+    shown = len(columns)
+    if not wrap:
+        widths = [max(map(len, column)) + 4 for column in zip(columns, *rows, strict=True)]
+        while shown > 2 and sum(widths[:shown]) > console.width:
+            shown -= 1
     table = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD, highlight=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
+    for index, column in enumerate(columns[:shown]):
+        fixed = index == 0 or not wrap
+        table.add_column(column, overflow="fold", no_wrap=fixed)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*row[:shown])
     console.print(table, markup=False)
+    return len(columns) - shown

@@ -185,7 +185,7 @@ class Task(_Frozen):
     def _check_reach(self) -> tuple[str, str] | None:
         named = None if self.initial_is_policy else hands_of(self.initial_hands)
         for index, goal in enumerate(self.goals):
-            excess = {hand: self._beyond_reach(hand, goal) for hand in self.hands}
+            excess = {hand: self.beyond_reach(hand, goal) for hand in self.hands}
             locked = " and ".join(self.locked_base)
             where = f"({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked in {locked}"
             if all(value > 0 for value in excess.values()):
@@ -197,7 +197,7 @@ class Task(_Frozen):
                 )
         return None
 
-    def _beyond_reach(self, hand: Hand, goal: Point) -> float:
+    def beyond_reach(self, hand: Hand, goal: Point) -> float:
         """How far the corrective process must end short of a goal, at least."""
         arm = self.robot.arm(hand)
         near, far = self.robot.reach(hand)

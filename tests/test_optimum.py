@@ -143,7 +143,7 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
             "tasks": {"ascending": task.model_dump(mode="json")},
         },
     }
-    (entry,) = collect(Results(Path(tmp_path), manifest, runs, pd.DataFrame()))["optima"]
+    (entry,) = collect(Results(Path(tmp_path), manifest, runs, pd.DataFrame()))
     assert (entry["reward"], entry["bound"], entry["run_ids"]) == (-292, -280, ["r1"])
     again = json.loads(json.dumps(entry))["solution"]
     assert execute(task, movements_from(task, pd.DataFrame(again))).reward == -292
