@@ -27,9 +27,9 @@ COSTS: tuple[Cost, ...] = ("path-length", "squared-changes", "acceleration", "je
 
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
-# goals at once. Reward of acceleration on two-armed-2: -322, -317, -315, -314 for 0.1, 0.05,
-# 0.02, 0.01; jerk does not change.
-_SHORTEST = 0.01
+# goals at once. Acceleration on two-armed-2 gets -322, -317, -315, -314 with 0.1, 0.05, 0.02,
+# 0.01; jerk gets -352 with any, and below 0.05 fails to converge for many hand sequences.
+_SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05}
 _DERIVATIVES: dict[Cost, int] = {
     "path-length": 0,
     "squared-changes": 0,
@@ -46,7 +46,7 @@ _OPTIONS: dict[str, Any] = {
         "tol": 1e-9,
         "constr_viol_tol": 1e-9,
         "bound_relax_factor": 0.0,
-        "max_iter": 400,
+        "max_iter": 1000,
         "mu_strategy": "monotone",
     },
 }
@@ -201,9 +201,10 @@ class TrajectoryProblem:
         shortest, longest = times, times
         if free_times and order:
             times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
-            times = np.maximum(times * (goals / times.sum()), 2 * _SHORTEST)
+            times = np.maximum(times * (goals / times.sum()), 0.1)
             times *= goals / times.sum()
-            shortest, longest = np.full(goals, _SHORTEST), np.full(goals, float(goals))
+            shortest = np.full(goals, _SHORTEST[self.cost])
+            longest = np.full(goals, float(goals))
         rim = instance.radius - _RIM
         chosen = np.zeros(goals)
         chosen[[] if deep is None else list(deep)] = 1.0
