@@ -6,7 +6,8 @@ ticks), applies the functions that the tables use, and prints how often each err
 error of tests at level 0.05, coverage of 95 % intervals, and how often means that differ by
 just the margin are called equivalent (nominal 2.5 %). Rates come with their 95 % interval
 (Wilson), and a mark where that interval excludes the nominal rate: ``+`` errs too often,
-``-`` errs too seldom. A few minutes on two cores; the same seed gives the same table.
+``-`` errs too seldom; of rates that hold, about one in 20 gets a mark by chance. A few
+minutes on two cores; the same seed gives the same table.
 """
 
 from __future__ import annotations

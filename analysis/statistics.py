@@ -128,9 +128,10 @@ def difference_of_means(
     resamples: int = RESAMPLES,
 ) -> Inference:
     """Mean of ``first`` less mean of ``second``, independent samples; see :func:`mean`."""
+    samples = samples_of(first, second)
     return bootstrap_estimate(
-        "difference of means",
-        samples_of(first, second),
+        "difference of means" if len(samples) > 1 else "difference to a known value",
+        samples,
         _difference,
         confidence=confidence,
         resamples=resamples,
@@ -341,7 +342,8 @@ def bootstrap_test(
     a variance for each sample. Against a plain number it is their one-sample test (section
     16.4). The paper cites the book without naming the statistic. ``"greater"``: one-tailed,
     the mean of ``first`` is higher. Unlike in the book, the p-value is
-    (1 + resamples at least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997).
+    (1 + resamples at least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997): with
+    the default, 0.0001 is the smallest there is.
 
     NaN with fewer than two values in a sample, or no spread in any.
     """

@@ -2,12 +2,11 @@
 
 import itertools
 import math
-import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -22,10 +21,9 @@ rewards = st.lists(st.integers(-20, 20).map(float), min_size=3, max_size=8)
 
 def welch(a, b):
     """Welch's t, 0 where the means are equal."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        t = stats.ttest_ind(a, b, equal_var=False).statistic
-    return 0.0 if np.mean(a) == np.mean(b) else t
+    d = np.mean(a) - np.mean(b)
+    error = math.sqrt(np.var(a, ddof=1) / len(a) + np.var(b, ddof=1) / len(b))
+    return 0.0 if abs(d) < 1e-12 else d / error if error else math.copysign(math.inf, d)
 
 
 def test_bootstrap_test_on_the_mouse_data():
@@ -76,6 +74,7 @@ def test_bootstrap_test_against_all_resamples(a, b, alternative):
 
 
 @pytest.mark.parametrize("alternative", ["greater", "less"])
+@settings(max_examples=30)
 @given(a=rewards.filter(lambda x: len(x) < 6), b=rewards.filter(lambda x: len(x) < 6))
 def test_permutation_test_is_exact_for_small_samples(a, b, alternative):
     pool = np.array(a + b)
@@ -83,10 +82,7 @@ def test_permutation_test_is_exact_for_small_samples(a, b, alternative):
     null = []
     for chosen in itertools.combinations(range(len(pool)), len(a)):
         mask = np.isin(np.arange(len(pool)), chosen)
-        x, y = pool[mask], pool[~mask]
-        d = x.mean() - y.mean()
-        error = math.sqrt(x.var(ddof=1) / len(x) + y.var(ddof=1) / len(y))
-        null.append(sign * (0 if abs(d) < 1e-12 else d / error if error else d * math.inf))
+        null.append(sign * welch(pool[mask], pool[~mask]))
     expected = np.mean(np.array(null) >= null[0] - 1e-9 * abs(null[0] if null[0] < 1e99 else 0))
     found = statistics.permutation_test(a, b, alternative, seed=0)
     assert found.p == pytest.approx(expected)
@@ -212,6 +208,7 @@ def test_pairs_of_different_length_are_refused():
         statistics.difference_of_means([1.0], math.nan, seed=0)
 
 
+@settings(max_examples=30)
 @given(rewards, rewards)
 def test_probability_of_improvement_is_mann_whitneys(a, b):
     found = statistics.probability_of_improvement(a, b, seed=0, resamples=99)
