@@ -113,6 +113,8 @@ def checks() -> list[Check]:
     for each in (normal, skewed, two, three):
         found += [_equivalent(each, normal, side) for side in (1, -1)]
         found += [_equivalent_to_summary(each, normal, side) for side in (1, -1)]
+    for each in (normal, skewed, two, three):
+        found += [_covers_studentised(each, None), _covers_studentised(each, normal)]
     return found
 
 
@@ -181,6 +183,21 @@ def _covers_difference(first: Population, second: Population) -> Check:
 
     data = f"{first.name} - {second.name}"
     return Check("BCa interval of a difference of means", data, LEVEL, errs)
+
+
+def _covers_studentised(first: Population, second: Population | None) -> Check:
+    """The interval of the equivalence test, of a mean or a difference; its margin is idle."""
+
+    def errs(rng: np.random.Generator, seed: int) -> bool:
+        a = _centred(first, rng)
+        b = 0.0 if second is None else _centred(second, rng)
+        found = bootstrap_equivalence(a, b, 1.0, seed=seed, resamples=RESAMPLES)
+        return _misses(found, 0.0)
+
+    if second is None:
+        return Check("studentised bootstrap interval of a mean", first.name, LEVEL, errs)
+    data = f"{first.name} - {second.name}"
+    return Check("studentised bootstrap interval of a difference", data, LEVEL, errs)
 
 
 def _covers_middle(population: Population) -> Check:
