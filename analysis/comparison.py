@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
+from analysis.equivalence import MARGIN, difference
 from analysis.methods import methods_notes, methods_tables
 from analysis.published import (
     RUNS,
@@ -24,34 +24,10 @@ from analysis.published import (
     published_initial,
 )
 from analysis.results import CellRuns, Results
+from analysis.statistics import CONFIDENCE
 from analysis.table import NONE, Table
 
-MARGIN = 0.01
-"""Differences up to this share of the published reward count as equivalent."""
-CONFIDENCE = 0.95
 Rewards = Sequence[float] | NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Difference:
-    """Our mean reward less the published one."""
-
-    value: float
-    low: float
-    high: float
-    margin: float
-
-    @property
-    def verdict(self) -> str:
-        """Equivalent where the interval lies within the margin, different where it
-        lies outside, undecided where it does neither."""
-        if math.isnan(self.low):
-            return "undecided"
-        if -self.margin <= self.low and self.high <= self.margin:
-            return "equivalent"
-        if self.low > self.margin or self.high < -self.margin:
-            return "different"
-        return "undecided"
 
 
 @dataclass(frozen=True)
@@ -76,30 +52,6 @@ class Comparison:
 def plain(note: str) -> str:
     """A note without Markdown, for a terminal."""
     return re.sub(r"(?<!\\)[*`]", "", note).replace("\\*", "*")
-
-
-def difference(ours: Rewards, published: Summary) -> Difference:
-    """Difference of means with its interval (Welch, from the printed mean, SD and n).
-
-    Where no SD is printed the published mean is taken as exact. The interval is NaN
-    with fewer than two runs of our own.
-    """
-    values = np.asarray(ours, dtype=np.float64)
-    value = float(values.mean()) - published.mean
-    margin = MARGIN * abs(published.mean)
-    if len(values) < 2:
-        return Difference(value, math.nan, math.nan, margin)
-    variances = [float(values.var(ddof=1)) / len(values)]
-    freedoms = [len(values) - 1]
-    if published.sd is not None and published.runs > 1:
-        variances.append(published.sd**2 / published.runs)
-        freedoms.append(published.runs - 1)
-    total = sum(variances)
-    if total == 0.0:
-        return Difference(value, value, value, margin)
-    freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
-    half = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * math.sqrt(total)
-    return Difference(value, value - half, value + half, margin)
 
 
 def compare(results: Results) -> Comparison:
@@ -317,8 +269,8 @@ def _difference_text(rewards: Rewards, published: Summary | None) -> str:
         return NONE
     found = difference(rewards, published)
     if math.isnan(found.low):
-        return f"{found.value:+.1f}"
-    return f"{found.value:+.1f} [{found.low:+.1f}, {found.high:+.1f}]"
+        return f"{found.estimate:+.1f}"
+    return f"{found.estimate:+.1f} [{found.low:+.1f}, {found.high:+.1f}]"
 
 
 def _verdict(task: str, rewards: Rewards, published: Summary | None) -> str:

@@ -3,9 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
-from analysis.comparison import Comparison, Table, compare, difference, plain
+from analysis.comparison import Comparison, Table, compare, plain
 from analysis.published import (
     Summary,
     pooled,
@@ -45,41 +44,6 @@ def test_pooling_groups_gives_mean_and_sd_of_all():
     assert summary.sd == pytest.approx(together.std(ddof=1))
     assert summary.runs == 20
     assert summary.derived
-
-
-def test_interval_is_welchs():
-    rng = np.random.default_rng(13)
-    ours, theirs = rng.normal(-505, 5, 20), rng.normal(-502, 3, 15)
-    found = difference(ours, Summary(theirs.mean(), theirs.std(ddof=1), 15))
-    expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
-    assert found.value == pytest.approx(ours.mean() - theirs.mean())
-
-
-def test_interval_against_an_exact_value_is_students():
-    ours = np.random.default_rng(14).normal(-484, 4, 12)
-    found = difference(ours, Summary(-484, None, 20))
-    expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((expected.low + 484, expected.high + 484))
-
-
-@pytest.mark.parametrize(
-    ("shift", "spread", "verdict"),
-    [(0.0, 1.0, "equivalent"), (-30.0, 1.0, "different"), (0.0, 80.0, "undecided")],
-)
-def test_verdicts(shift, spread, verdict):
-    ours = -500 + shift + spread * np.linspace(-1, 1, 20)
-    assert difference(ours, Summary(-500, 1.0, 20)).verdict == verdict
-
-
-def test_margin():
-    assert difference([-500.0] * 2, Summary(-500, 1.0, 20)).margin == 5.0
-
-
-def test_edge_cases_of_the_difference():
-    assert difference([-500.0], Summary(-500, 1.0, 20)).verdict == "undecided"
-    same = difference([-500.0, -500.0], Summary(-500, None, 20))
-    assert (same.low, same.high, same.verdict) == (0.0, 0.0, "equivalent")
 
 
 def fake_results(tmp_path, runs):

@@ -1,0 +1,232 @@
+"""One method over several tasks: normalised scores, interquartile mean, profiles.
+
+Every task counts the same, however many runs it has, and runs are resampled within their
+task (stratified bootstrap). The intervals are about other runs on the same tasks, not about
+other tasks.
+
+Sources: R. Agarwal et al. (2021), Deep Reinforcement Learning at the Edge of the Statistical
+Precipice, NeurIPS 34 (interquartile mean, score profiles, probability of improvement);
+E. D. Dolan & J. J. Moré (2002), Mathematical Programming 91 (performance profiles).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from analysis.optimum import optima
+from analysis.results import Results
+from analysis.statistics import (
+    CONFIDENCE,
+    RESAMPLES,
+    Array,
+    Inference,
+    bootstrap_estimate,
+    higher,
+    middle_mean,
+    sample,
+)
+from coartic.initial import initial_hands
+
+PROFILE_RESAMPLES = 1_999
+
+
+def scores_frame(results: Results) -> pd.DataFrame:
+    """One row a run of every task whose optimum and initial solution are known.
+
+    Columns ``task``, ``method`` (with its variant), ``run``, ``seed``, ``reward``;
+    ``score`` (:func:`normalised`) and ``gap`` (:func:`gap_share`), both against the optimum
+    with all joints free and the corrective process alone with the task's initial hands. A
+    run without a solution has NaN for all three.
+    """
+    best, parts = optima(results), []
+    alone = results.sequences.set_index(["task", "hands"]).reward
+    for cell in results.cells:
+        task = results.tasks[cell.task]
+        start = alone.get((cell.task, initial_hands(task)))
+        if (cell.task, "free") not in best or start is None or pd.isna(start):
+            continue
+        rewards = cell.runs.reward.where(cell.runs.status == "ok")
+        values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
+        top = best[cell.task, "free"].reward
+        parts.append(
+            pd.DataFrame(
+                {
+                    "task": cell.task,
+                    "method": cell.label,
+                    "run": cell.runs.run.to_numpy(),
+                    "seed": cell.runs.seed.to_numpy(),
+                    "reward": values,
+                    "score": normalised(values, float(start), top),
+                    "gap": gap_share(values, top),
+                }
+            )
+        )
+    columns = ["task", "method", "run", "seed", "reward", "score", "gap"]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
+
+
+def by_task(scores: pd.DataFrame, method: str, column: str = "score") -> dict[str, Array]:
+    """One method's column of :func:`scores_frame`, by task, NaN included."""
+    rows = scores[scores.method == method]
+    return {
+        str(task): group[column].to_numpy(dtype=np.float64)
+        for task, group in rows.groupby("task", sort=False)
+    }
+
+
+def normalised(rewards: ArrayLike, initial: float, optimum: float) -> Array:
+    """(reward − initial) / (optimum − initial): 0 the initial solution, 1 the optimum.
+
+    Negative below the initial solution. Raises ValueError where the optimum is not above it.
+    """
+    if not optimum > initial:
+        raise ValueError(f"optimum {optimum} is not above the initial reward {initial}")
+    return (np.asarray(rewards, dtype=np.float64) - initial) / (optimum - initial)
+
+
+def gap_share(rewards: ArrayLike, optimum: float) -> Array:
+    """(optimum − reward) / |optimum|: 0 at the optimum; 0.01 is 1 % more ticks than it."""
+    return (optimum - np.asarray(rewards, dtype=np.float64)) / abs(optimum)
+
+
+def interquartile_mean(
+    scores: Mapping[str, ArrayLike],
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean of the middle half of all tasks' runs (Agarwal et al. 2021), with BCa interval.
+
+    Tasks with fewer runs count as much as the others; for equal numbers it is the common
+    definition. Raises ValueError for scores that are not finite: runs without a solution
+    have no score, and a profile shows them. A task with fewer than three runs leaves no
+    interval (NaN).
+    """
+    samples = tuple(sample(values) for values in scores.values())
+    weights = np.concatenate([np.full(len(values), 1 / len(values)) for values in samples])
+
+    def statistic(*strata: Array, axis: int = -1) -> Array:
+        # scipy's jackknife leaves one run out of a stratum: its weights are then made anew.
+        lengths = [values.shape[-1] for values in strata]
+        fits = lengths == [len(values) for values in samples]
+        shares = weights if fits else np.concatenate([np.full(n, 1 / n) for n in lengths])
+        shape = np.broadcast_shapes(*(values.shape[:-1] for values in strata))
+        together = [np.broadcast_to(v, (*shape, v.shape[-1])) for v in strata]
+        return middle_mean(np.concatenate(together, axis=-1), axis, shares)
+
+    return bootstrap_estimate(
+        f"interquartile mean over {len(samples)} tasks, stratified",
+        samples,
+        statistic,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+
+
+def probability_of_improvement(
+    first: Mapping[str, ArrayLike],
+    second: Mapping[str, ArrayLike],
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean over tasks of P(first higher than second), ties half (Agarwal et al. 2021).
+
+    Stratified BCa interval; none where each task's samples are wholly apart, as no resample
+    differs. Raises ValueError where the tasks are not the same.
+    """
+    if first.keys() != second.keys():
+        raise ValueError(f"tasks differ: {sorted(first)} and {sorted(second)}")
+    pairs = [sample(side[task]) for task in first for side in (first, second)]
+
+    def statistic(*samples: Array, axis: int = -1) -> Array:
+        shares = [higher(a, b) for a, b in zip(samples[::2], samples[1::2], strict=True)]
+        return np.asarray(sum(shares) / len(shares))
+
+    return bootstrap_estimate(
+        f"probability of improvement over {len(first)} tasks, stratified",
+        tuple(pairs),
+        statistic,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Share of runs that reach each threshold, from 0 to 1, with pointwise intervals."""
+
+    thresholds: Array
+    share: Array
+    low: Array
+    high: Array
+    confidence: float
+    n: tuple[int, ...]
+    """Runs of each task."""
+    method: str
+    seed: int
+
+
+def profile(
+    values: Mapping[str, ArrayLike],
+    thresholds: ArrayLike,
+    reached: Literal["above", "at most"],
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = PROFILE_RESAMPLES,
+) -> Profile:
+    """Share of runs, each task counting the same, that reach each threshold.
+
+    ``"above"`` with normalised scores is the score profile of Agarwal et al. (2021).
+    ``"at most"`` with gaps to the optimum is the performance profile of Dolan & Moré (2002)
+    with the optimum in the place of the best solver, so that it does not change with the
+    methods it is drawn beside. NaN, a run without a solution, reaches no threshold.
+
+    Percentile intervals of the stratified bootstrap, for each threshold alone; where all
+    runs of a task reach it or none does, that task adds no width.
+    """
+    levels = sample(thresholds)
+    reaches = [_reached(runs, levels, reached) for runs in values.values()]
+    if not reaches:
+        raise ValueError("a profile needs at least one task")
+    share = np.mean([runs.mean(axis=0) for runs in reaches], axis=0)
+    rng = np.random.default_rng(seed)
+    drawn = np.zeros((resamples, len(levels)))
+    for runs in reaches:
+        # How often each run is drawn, times what it reaches.
+        counts = rng.multinomial(len(runs), np.full(len(runs), 1 / len(runs)), size=resamples)
+        drawn += counts @ runs / len(runs)
+    tail = (1 - confidence) / 2
+    low, high = np.quantile(drawn / len(reaches), [tail, 1 - tail], axis=0)
+    return Profile(
+        levels,
+        share,
+        low,
+        high,
+        confidence,
+        tuple(len(runs) for runs in reaches),
+        f"share of runs {reached} the threshold over {len(reaches)} tasks; stratified "
+        f"percentile bootstrap, {resamples} resamples, pointwise",
+        seed,
+    )
+
+
+def _reached(values: ArrayLike, thresholds: Array, reached: Literal["above", "at most"]) -> Array:
+    """1 where a run (row) reaches a threshold (column), else 0."""
+    runs = np.asarray(values, dtype=np.float64)
+    if runs.ndim != 1 or runs.size == 0:
+        raise ValueError("a profile needs a vector of at least one run for every task")
+    found = runs[:, None] > thresholds if reached == "above" else runs[:, None] <= thresholds
+    return found.astype(np.float64)

@@ -1,0 +1,142 @@
+"""Whether two means agree within a margin: by inclusion of their interval.
+
+A 95 % interval within ±margin is two one-sided tests at level 2.5 % (TOST; D. J.
+Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15). Against the paper,
+of which only mean, SD and number of runs are printed, the interval is Welch's; where the
+runs of both sides are at hand, it is the studentised bootstrap's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import special
+
+from analysis.published import Summary
+from analysis.statistics import (
+    CONFIDENCE,
+    FEWEST,
+    RESAMPLES,
+    Inference,
+    sample,
+    samples_of,
+    standard_error,
+    studentised_null,
+)
+
+MARGIN = 0.01
+"""Differences up to this share of the published reward count as equivalent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equivalence(Inference):
+    """A difference of means with its interval, beside a margin.
+
+    ``p`` is of the hypothesis that the means differ by the margin or more: the larger p of
+    the two one-sided tests.
+    """
+
+    margin: float
+
+    @property
+    def verdict(self) -> Literal["equivalent", "different", "undecided"]:
+        """Equivalent where the interval lies within the margin, different where it
+        lies outside, undecided where it does neither."""
+        if -self.margin <= self.low and self.high <= self.margin:
+            return "equivalent"
+        if self.low > self.margin or self.high < -self.margin:
+            return "different"
+        return "undecided"
+
+
+def difference(ours: ArrayLike, published: Summary, *, margin: float | None = None) -> Equivalence:
+    """Our mean less the published one, with Welch's interval from its mean, SD and n.
+
+    Where no SD is printed the published mean is taken as exact, and the interval is
+    Student's. The margin is :data:`MARGIN` of the published mean unless given. With fewer
+    than two runs of our own there is no interval; without spread on either side it is a
+    point.
+    """
+    values = sample(ours)
+    value = float(values.mean()) - published.mean
+    margin = MARGIN * abs(published.mean) if margin is None else _positive(margin)
+    spread = published.sd is not None and published.runs > 1
+    found = Equivalence(
+        estimate=value,
+        n=(len(values), published.runs) if spread else (len(values),),
+        method="difference to the published mean, "
+        + ("Welch's interval" if spread else "Student's interval, published mean as exact"),
+        confidence=CONFIDENCE,
+        margin=margin,
+    )
+    if len(values) < 2:
+        return replace(found, note="no interval: fewer than 2 values")
+    variances = [float(values.var(ddof=1)) / len(values)]
+    freedoms = [len(values) - 1]
+    if published.sd is not None and spread:
+        variances.append(published.sd**2 / published.runs)
+        freedoms.append(published.runs - 1)
+    total = sum(variances)
+    if total == 0.0:
+        return replace(found, low=value, high=value, note="the interval is a point: no spread")
+    freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
+    error = math.sqrt(total)
+    half = float(special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
+    p = float(special.stdtr(freedom, (abs(value) - margin) / error))
+    return replace(found, low=value - half, high=value + half, p=p)
+
+
+def bootstrap_equivalence(
+    first: ArrayLike,
+    second: ArrayLike | float,
+    margin: float,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Equivalence:
+    """Mean of ``first`` less mean of ``second`` with its studentised bootstrap interval.
+
+    Independent samples, or one against a number taken as known. The bootstrap-t interval of
+    Efron & Tibshirani (1993, section 12.5), whose ends are order statistics, so that it lies
+    within the margin just where ``p`` is below (1 − ``confidence``)/2. Fewer than three
+    values in a sample: no interval. No spread in any: a point.
+    """
+    samples, margin = samples_of(first, second), _positive(margin)
+    means = [float(values.mean()) for values in samples]
+    value = means[0] - sum(means[1:])
+    found = Equivalence(
+        estimate=value,
+        n=tuple(len(values) for values in samples),
+        method=f"difference of means, studentised bootstrap, {resamples} resamples",
+        confidence=confidence,
+        margin=margin,
+    )
+    if min(found.n) < FEWEST:
+        return replace(found, note=f"no interval: a sample has fewer than {FEWEST} values")
+    error = standard_error(samples)
+    if error == 0.0:
+        return replace(found, low=value, high=value, note="the interval is a point: no spread")
+    null = np.sort(studentised_null(samples, resamples, np.random.default_rng(seed)))
+    outside = int((resamples + 1) * (1 - confidence) / 2 + 1e-9)
+    if outside < 1:
+        raise ValueError(f"{resamples} resamples are too few for an interval of {confidence}")
+    above = 1 + int((null >= (value + margin) / error).sum())
+    below = 1 + int((null <= (value - margin) / error).sum())
+    return replace(
+        found,
+        low=value - float(null[-outside]) * error,
+        high=value - float(null[outside - 1]) * error,
+        p=max(above, below) / (resamples + 1),
+        seed=seed,
+    )
+
+
+def _positive(margin: float) -> float:
+    if not margin > 0:
+        raise ValueError(f"margin {margin}: it is a positive difference")
+    return margin

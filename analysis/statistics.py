@@ -1,0 +1,554 @@
+"""Estimates with intervals, tests of differences, effect sizes, and Holm's correction.
+
+Samples are rewards (or any score) of independent runs. Where a function compares a sample
+with a plain number, the number is taken as known without error: the reward of a
+deterministic method, say. Every function that resamples takes a seed and gives the same
+result for the same seed; the seed belongs to the resampling, not to the runs.
+
+How well the nominal rates hold for data like ours is measured by ``analysis.error_rates``.
+
+Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapters 14
+to 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application,
+chapter 4 (p-values that count the observed sample); N. Cliff (1993), Psychological Bulletin
+114; R. Agarwal et al. (2021), NeurIPS 34 (interquartile mean, probability of improvement);
+R. G. Newcombe (2006), Statistics in Medicine 25; S. Holm (1979), Scandinavian Journal of
+Statistics 6; E. Chung & J. P. Romano (2013), Annals of Statistics 41.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, special, stats
+
+Array = NDArray[np.float64]
+Alternative = Literal["greater", "less", "two-sided"]
+
+CONFIDENCE = 0.95
+RESAMPLES = 9_999
+"""With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
+FEWEST = 3
+"""Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
+
+
+@dataclass(frozen=True)
+class Inference:
+    """A number, how sure it is, and how it was obtained. NaN means that there is none."""
+
+    estimate: float
+    n: tuple[int, ...]
+    """Values in each sample; a number taken as known is no sample."""
+    method: str
+    """The interval or test, in words."""
+    low: float = math.nan
+    high: float = math.nan
+    confidence: float = math.nan
+    """Nominal coverage of ``low`` to ``high``."""
+    p: float = math.nan
+    seed: int | None = None
+    """Seed of the resampling; None where nothing was drawn."""
+    note: str = ""
+    """Why there is no interval or p-value, or why it is a special one."""
+
+
+def sample(values: ArrayLike) -> Array:
+    """Values as a vector. Raises ValueError where it is empty or holds NaN or infinity.
+
+    Runs without a solution have no reward: the caller decides what becomes of them.
+    """
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.ndim != 1 or vector.size == 0:
+        raise ValueError(
+            f"a sample is a vector of at least one value, not of shape {vector.shape}"
+        )
+    if not np.isfinite(vector).all():
+        raise ValueError("a sample has values that are not finite")
+    return vector
+
+
+def paired_by_seed(
+    first: pd.DataFrame, second: pd.DataFrame, column: str = "reward"
+) -> tuple[Array, Array]:
+    """A column of the runs of two cells, for the seeds where both have a value.
+
+    Both frames are rows of ``runs.parquet`` of one task. Raises ValueError where a seed
+    occurs twice in one of them.
+    """
+    both = first[["seed", column]].merge(
+        second[["seed", column]], on="seed", validate="one_to_one", suffixes=("_first", "_second")
+    )
+    both = both.dropna()
+    return (
+        both[f"{column}_first"].to_numpy(dtype=np.float64),
+        both[f"{column}_second"].to_numpy(dtype=np.float64),
+    )
+
+
+def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
+    """Two samples, or where ``second`` is a number one sample of differences to it."""
+    if np.ndim(second) == 0:
+        return (sample(sample(first) - float(np.asarray(second))),)
+    return sample(first), sample(second)
+
+
+# Estimates with intervals
+
+
+def mean(
+    values: ArrayLike,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean with its BCa interval (Efron & Tibshirani 1993, section 14.3).
+
+    Fewer than three values: no interval (NaN). All values equal: the interval is that
+    point, which says that the sample has no spread, not that the population has none; the
+    note says which. Below some ten values the interval is too short.
+    """
+    return bootstrap_estimate(
+        "mean", (sample(values),), _mean, confidence=confidence, resamples=resamples, seed=seed
+    )
+
+
+def difference_of_means(
+    first: ArrayLike,
+    second: ArrayLike | float,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean of ``first`` less mean of ``second``, independent samples; see :func:`mean`."""
+    samples = samples_of(first, second)
+    return bootstrap_estimate(
+        "difference of means" if len(samples) > 1 else "difference to a known value",
+        samples,
+        _difference,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+
+
+def paired_difference(
+    first: ArrayLike,
+    second: ArrayLike,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean of ``first − second``, pair by pair; see :func:`mean`.
+
+    Raises ValueError for samples of different length.
+    """
+    return bootstrap_estimate(
+        "mean of paired differences",
+        (_differences(first, second),),
+        _mean,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+
+
+def interquartile_mean(
+    values: ArrayLike,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean of the middle half of the values (Agarwal et al. 2021); see :func:`mean`."""
+    return bootstrap_estimate(
+        "interquartile mean",
+        (sample(values),),
+        middle_mean,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+
+
+def probability_of_improvement(
+    first: ArrayLike,
+    second: ArrayLike | float,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """P(a run of ``first`` is higher than one of ``second``), a tie counting half.
+
+    From 0 to 1; 0.5 where neither is higher (Agarwal et al. 2021; the Mann-Whitney
+    statistic over its maximum). BCa interval. Where every run of one sample is higher than
+    every run of the other, no resample differs and the bootstrap is silent: the interval
+    then is Newcombe's (2006, method 5), with the estimate as one of its ends.
+    """
+    found = bootstrap_estimate(
+        "probability of improvement",
+        samples_of(first, second),
+        _improvement,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+    if found.estimate not in (0.0, 1.0):
+        return found
+    far = _separated(found.n, found.estimate, confidence)
+    return replace(
+        found,
+        method="probability of improvement, score interval (Newcombe 2006, method 5)",
+        low=min(far, found.estimate),
+        high=max(far, found.estimate),
+        seed=None,
+        note="the samples do not overlap",
+    )
+
+
+def cliffs_delta(
+    first: ArrayLike,
+    second: ArrayLike | float,
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """P(first higher) − P(second higher), from −1 to 1 (Cliff 1993).
+
+    Twice the probability of improvement, less one; so is its interval.
+    """
+    found = probability_of_improvement(
+        first, second, seed=seed, confidence=confidence, resamples=resamples
+    )
+    return replace(
+        found,
+        estimate=2 * found.estimate - 1,
+        low=2 * found.low - 1,
+        high=2 * found.high - 1,
+        method=found.method.replace("probability of improvement", "Cliff's delta"),
+    )
+
+
+def bootstrap_estimate(
+    name: str,
+    samples: tuple[Array, ...],
+    statistic: Callable[..., Any],
+    *,
+    confidence: float,
+    resamples: int,
+    seed: int,
+) -> Inference:
+    """A statistic of one or more independent samples with its BCa interval.
+
+    ``statistic(*samples, axis)`` is vectorised over leading axes. Each sample is resampled
+    within itself, so samples that are strata stay so. :func:`mean` says what happens to
+    samples that are too small or all equal. Where samples have a spread but resamples never
+    differ there is no interval; where they differ but BCa is not defined, the percentile
+    interval stands in, and the note says so.
+    """
+    estimate = float(statistic(*samples, axis=-1))
+    found = Inference(
+        estimate,
+        tuple(len(values) for values in samples),
+        f"{name}, BCa bootstrap, {resamples} resamples",
+        confidence=confidence,
+    )
+    if min(found.n) < FEWEST:
+        return replace(found, note=f"no interval: a sample has fewer than {FEWEST} values")
+    if all(np.ptp(values) == 0 for values in samples):
+        return replace(
+            found, low=estimate, high=estimate, note="the interval is a point: no spread"
+        )
+    with warnings.catch_warnings():
+        # scipy warns where BCa is undefined; that case is dealt with below.
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        warnings.simplefilter("ignore", RuntimeWarning)
+        result = stats.bootstrap(
+            samples,
+            statistic,
+            n_resamples=resamples,
+            batch=1_000,
+            vectorized=True,
+            confidence_level=confidence,
+            method="BCa",
+            rng=np.random.default_rng(seed),
+        )
+    if np.ptp(result.bootstrap_distribution) == 0:
+        return replace(found, note="no interval: no resample differs from the sample")
+    low, high = map(float, result.confidence_interval)
+    found = replace(found, low=low, high=high, seed=seed)
+    if math.isfinite(low) and math.isfinite(high):
+        return found
+    tail = (1 - confidence) / 2
+    low, high = np.quantile(result.bootstrap_distribution, [tail, 1 - tail])
+    return replace(
+        found,
+        method=f"{name}, percentile bootstrap, {resamples} resamples",
+        low=float(low),
+        high=float(high),
+        note="BCa is not defined for this sample",
+    )
+
+
+def middle_mean(values: Array, axis: int = -1, weights: Array | None = None) -> Array:
+    """Interquartile mean over the last axis: the mean of the quantile function on [¼, ¾].
+
+    The values at the quartiles count by the part that lies within, so it equals scipy's
+    ``trim_mean(values, 0.25)`` where n is a multiple of 4. ``weights`` (default: equal)
+    belong to the values.
+    """
+    if axis not in (-1, values.ndim - 1):
+        raise ValueError("the interquartile mean is taken over the last axis")
+    order = np.argsort(values, axis=-1, kind="stable")
+    ordered = np.take_along_axis(values, order, axis=-1)
+    shares = np.full(values.shape[-1], 1.0) if weights is None else weights
+    ends = np.cumsum((shares / shares.sum())[order], axis=-1)
+    starts = np.concatenate([np.zeros_like(ends[..., :1]), ends[..., :-1]], axis=-1)
+    inside = np.clip(ends, 0.25, 0.75) - np.clip(starts, 0.25, 0.75)
+    return np.asarray((inside * ordered).sum(axis=-1) / inside.sum(axis=-1))
+
+
+def higher(first: Array, second: Array) -> Array:
+    """Share of pairs over the last axes in which ``first`` is higher, ties counting half."""
+    pairs = first[..., :, None] - second[..., None, :]
+    return np.asarray((pairs > 0).mean((-2, -1)) + 0.5 * (pairs == 0).mean((-2, -1)))
+
+
+# Tests
+
+
+def bootstrap_test(
+    first: ArrayLike,
+    second: ArrayLike | float,
+    alternative: Alternative = "greater",
+    *,
+    seed: int,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Test of equal means by the bootstrap: the paper's own kind of test.
+
+    Efron & Tibshirani (1993), Algorithm 16.2: both samples are shifted to their common mean
+    and resampled, and the statistic is the difference of means over its standard error, with
+    a variance for each sample. Against a plain number it is their one-sample test (section
+    16.4). The paper cites the book without naming the statistic. ``"greater"``: one-tailed,
+    the mean of ``first`` is higher. Unlike in the book, the p-value is
+    (1 + resamples at least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997): with
+    the default, 0.0001 is the smallest there is.
+
+    NaN with fewer than two values in a sample, or no spread in any.
+    """
+    samples = samples_of(first, second)
+    estimate = float(_difference(*samples))
+    found = Inference(
+        estimate,
+        tuple(len(values) for values in samples),
+        f"{_TAILS[alternative]} {'two' if len(samples) > 1 else 'one'}-sample bootstrap test "
+        f"of the mean, studentised, {resamples} resamples",
+    )
+    if (note := _untestable(samples)) is not None:
+        return replace(found, note=note)
+    error = standard_error(samples)
+    observed = np.asarray(estimate / error)
+    null = studentised_null(samples, resamples, np.random.default_rng(seed))
+    return replace(found, p=_p_value(null, observed, alternative), seed=seed)
+
+
+def permutation_test(
+    first: ArrayLike,
+    second: ArrayLike,
+    alternative: Alternative = "greater",
+    *,
+    seed: int,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Permutation test of two independent samples, by the studentised difference of means.
+
+    Exact in level where both samples come from one distribution. The studentised statistic
+    keeps the level in large samples where only the means are equal (Chung & Romano 2013).
+    All assignments are enumerated where there are no more than ``resamples`` (8 and 8 runs
+    give 12 870, 7 and 7 give 3 432), otherwise as many are drawn and p counts the observed
+    one too. NaN with fewer than two values in a sample.
+    """
+    a, b = sample(first), sample(second)
+    exact = math.comb(len(a) + len(b), len(a)) <= resamples
+    found = Inference(
+        float(a.mean() - b.mean()),
+        (len(a), len(b)),
+        f"{_TAILS[alternative]} {_drawn(exact, resamples)} permutation test, studentised",
+    )
+    if min(found.n) < 2:
+        return replace(found, note="no test: a sample has fewer than 2 values")
+    p = stats.permutation_test(
+        (a, b),
+        _bounded_t,
+        n_resamples=resamples,
+        batch=1_000,
+        vectorized=True,
+        alternative=alternative,
+        rng=np.random.default_rng(seed),
+    ).pvalue
+    return replace(found, p=float(p), seed=None if exact else seed)
+
+
+def sign_flip_test(
+    first: ArrayLike,
+    second: ArrayLike | float,
+    alternative: Alternative = "greater",
+    *,
+    seed: int,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Permutation test of pairs: each difference ``first − second`` may change its sign.
+
+    Exact in level where the differences are symmetric about 0, as they are if within each
+    pair the two are exchangeable. All 2^n signs are enumerated where there are no more than
+    ``resamples`` (13 pairs by default), otherwise as many are drawn. NaN with fewer than two
+    pairs. Raises ValueError for samples of different length.
+    """
+    differences = _differences(first, second) if np.ndim(second) else samples_of(first, second)[0]
+    exact = 2 ** len(differences) <= resamples
+    found = Inference(
+        float(differences.mean()),
+        (len(differences),),
+        f"{_TAILS[alternative]} {_drawn(exact, resamples)} sign-flip test of paired differences",
+    )
+    if len(differences) < 2:
+        return replace(found, note="no test: fewer than 2 pairs")
+    p = stats.permutation_test(
+        (differences,),
+        _mean,
+        permutation_type="samples",
+        n_resamples=resamples,
+        batch=1_000,
+        vectorized=True,
+        alternative=alternative,
+        rng=np.random.default_rng(seed),
+    ).pvalue
+    return replace(found, p=float(p), seed=None if exact else seed)
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Adjusted p-values of a family of tests (Holm 1979), in the order given.
+
+    Those at or below α are rejected with a family-wise error rate of at most α, whatever
+    the dependence. NaN, a test that could not be made, stays NaN and does not count.
+    """
+    p = np.asarray(p_values, dtype=np.float64)
+    if ((p < 0) | (p > 1)).any():
+        raise ValueError("a p-value lies between 0 and 1")
+    known = np.flatnonzero(~np.isnan(p))
+    order = known[np.argsort(p[known], kind="stable")]
+    adjusted = np.full(p.shape, math.nan)
+    steps = p[order] * np.arange(len(order), 0, -1)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(steps))
+    return [float(value) for value in adjusted]
+
+
+def standard_error(samples: tuple[Array, ...]) -> float:
+    """Of the mean of one sample, or of the difference of two; a variance for each."""
+    return math.sqrt(sum(float(values.var(ddof=1)) / len(values) for values in samples))
+
+
+def studentised_null(
+    samples: tuple[Array, ...], resamples: int, rng: np.random.Generator
+) -> Array:
+    """Studentised mean (or difference of two) of resamples where the true one is 0.
+
+    Shape ``(resamples,)``; ±infinity where a resample differs but has no spread.
+    """
+    centre = float(np.concatenate(samples).mean())
+    difference, variance = np.zeros(resamples), np.zeros(resamples)
+    for values, sign in zip(samples, (1, -1), strict=False):
+        shifted = values - values.mean() + (centre if len(samples) > 1 else 0.0)
+        drawn = shifted[rng.integers(len(values), size=(resamples, len(values)))]
+        difference += sign * drawn.mean(axis=1)
+        variance += drawn.var(axis=1, ddof=1) / len(values)
+    return _ratio(difference, variance)
+
+
+def _ratio(difference: Array, variance: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(difference == 0, 0.0, difference / np.sqrt(variance))
+
+
+def _bounded_t(first: Array, second: Array, axis: int = -1) -> Array:
+    """Welch's t through the arc tangent: the same order, and no infinity to trip scipy."""
+    variance = first.var(axis, ddof=1) / first.shape[axis]
+    variance = variance + second.var(axis, ddof=1) / second.shape[axis]
+    return np.asarray(np.arctan(_ratio(first.mean(axis) - second.mean(axis), variance)))
+
+
+def _p_value(null: Array, observed: Array, alternative: Alternative) -> float:
+    if alternative == "two-sided":
+        null, observed = np.abs(null), np.abs(observed)
+    tied = np.isclose(null, observed, rtol=1e-9, atol=0.0)
+    extreme = tied | (null <= observed if alternative == "less" else null >= observed)
+    return float(1 + extreme.sum()) / (1 + len(null))
+
+
+def _untestable(samples: tuple[Array, ...]) -> str | None:
+    if min(len(values) for values in samples) < 2:
+        return "no test: a sample has fewer than 2 values"
+    if all(np.ptp(values) == 0 for values in samples):
+        return "no test: no spread to resample"
+    return None
+
+
+def _separated(n: tuple[int, ...], estimate: float, confidence: float) -> float:
+    """Far end of Newcombe's interval (method 5) where the estimate is 0 or 1.
+
+    A number taken as known counts as a sample so large that it adds no variance: what
+    remains is Wilson's interval of a proportion.
+    """
+    z2 = float(special.ndtri(0.5 + confidence / 2)) ** 2
+    many = len(n) > 1
+
+    def excess(theta: float) -> float:
+        """Distance to the estimate 1, squared, less z² variances, over 1 − θ."""
+        if not many:
+            return (1 - theta) - z2 * theta / n[0]
+        spread = (sum(n) / 2 - 1) * ((1 - theta) / (2 - theta) + theta / (1 + theta))
+        return (1 - theta) - z2 * theta * (1 + spread) / (n[0] * n[1])
+
+    far = float(optimize.brentq(excess, 0.0, 1.0))
+    return far if estimate == 1.0 else 1 - far
+
+
+def _differences(first: ArrayLike, second: ArrayLike) -> Array:
+    a, b = sample(first), sample(second)
+    if a.shape != b.shape:
+        raise ValueError(f"pairs need samples of one length, not {len(a)} and {len(b)}")
+    return a - b
+
+
+def _mean(values: Array, axis: int = -1) -> Array:
+    return np.asarray(values.mean(axis))
+
+
+def _difference(*groups: Array, axis: int = -1) -> Array:
+    return _mean(groups[0], axis) - (_mean(groups[1], axis) if len(groups) > 1 else 0.0)
+
+
+def _improvement(*groups: Array, axis: int = -1) -> Array:
+    return higher(groups[0], groups[1] if len(groups) > 1 else np.zeros(1))
+
+
+def _drawn(exact: bool, resamples: int) -> str:
+    return "exact" if exact else f"Monte Carlo ({resamples} resamples)"
+
+
+_TAILS = {
+    "greater": "one-tailed (greater)",
+    "less": "one-tailed (less)",
+    "two-sided": "two-tailed",
+}

@@ -1,0 +1,301 @@
+"""Estimates, tests and effect sizes against closed forms, enumeration and brute force."""
+
+import itertools
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from analysis import statistics
+
+# Survival times of mice in days: Efron & Tibshirani (1993), table 2.1.
+TREATMENT = [94, 197, 16, 38, 99, 141, 23]
+CONTROL = [52, 104, 146, 10, 51, 30, 40, 27, 46]
+
+rewards = st.lists(st.integers(-20, 20).map(float), min_size=3, max_size=8)
+
+
+def welch(a, b):
+    """Welch's t, 0 where the means are equal."""
+    d = np.mean(a) - np.mean(b)
+    error = math.sqrt(np.var(a, ddof=1) / len(a) + np.var(b, ddof=1) / len(b))
+    return 0.0 if abs(d) < 1e-12 else d / error if error else math.copysign(math.inf, d)
+
+
+def test_bootstrap_test_on_the_mouse_data():
+    """Welch's t is 1.06: p is 0.15 by Student's t, and by the book's algorithm near it."""
+    found = statistics.bootstrap_test(TREATMENT, CONTROL, seed=1)
+    assert found.estimate == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
+    rng = np.random.default_rng(2)
+    a = np.array(TREATMENT) - np.mean(TREATMENT)
+    b = np.array(CONTROL) - np.mean(CONTROL)
+    t = welch(TREATMENT, CONTROL)
+    extreme = np.mean([welch(rng.choice(a, 7), rng.choice(b, 9)) >= t for _ in range(1_000)])
+    assert found.p == pytest.approx(extreme, abs=4 * math.sqrt(0.15 * 0.85 / 1_000))
+    assert 0.13 < found.p < 0.18
+    less = statistics.bootstrap_test(TREATMENT, CONTROL, "less", seed=1)
+    assert less.p + found.p == pytest.approx(1, abs=0.01)
+    assert "two-sample" in found.method
+    assert found.seed == 1
+
+
+@pytest.mark.parametrize(
+    ("a", "b"), [([1, 2, 6], [0, 1, 3]), ([1, 2, 6, 6], [3.5]), ([-3, -2], [-2, -5, -9])]
+)
+@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
+def test_bootstrap_test_against_all_resamples(a, b, alternative):
+    """One value on the second side is a known number: the book's one-sample test."""
+    other = b[0] if len(b) == 1 else b
+    one = np.array(a) - np.mean(a)
+    two = np.array(b) - np.mean(b)
+
+    def t(x, y):
+        d = np.mean(x) - np.mean(y)
+        error = math.sqrt(np.var(x, ddof=1) / len(x) + (np.var(y, ddof=1) / len(y) if len(y) > 1
+                                                        else 0))  # fmt: skip
+        return 0.0 if abs(d) < 1e-12 else math.copysign(1e9, d) if error < 1e-9 else d / error
+
+    null = [
+        t(x, y)
+        for x in itertools.product(one, repeat=len(a))
+        for y in itertools.product(two, repeat=len(b))
+    ]
+    observed = t(a, b)
+    if alternative == "two-sided":
+        null, observed = np.abs(null), abs(observed)
+    sign = -1 if alternative == "less" else 1
+    expected = np.mean(sign * np.array(null) >= sign * observed - 1e-9)
+    found = statistics.bootstrap_test(a, other, alternative, seed=3)
+    assert found.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
+
+
+@pytest.mark.parametrize("alternative", ["greater", "less"])
+@settings(max_examples=30)
+@given(a=rewards.filter(lambda x: len(x) < 6), b=rewards.filter(lambda x: len(x) < 6))
+def test_permutation_test_is_exact_for_small_samples(a, b, alternative):
+    pool = np.array(a + b)
+    sign = 1 if alternative == "greater" else -1
+    null = []
+    for chosen in itertools.combinations(range(len(pool)), len(a)):
+        mask = np.isin(np.arange(len(pool)), chosen)
+        null.append(sign * welch(pool[mask], pool[~mask]))
+    expected = np.mean(np.array(null) >= null[0] - 1e-9 * abs(null[0] if null[0] < 1e99 else 0))
+    found = statistics.permutation_test(a, b, alternative, seed=0)
+    assert found.p == pytest.approx(expected)
+    assert found.seed is None
+    assert "exact" in found.method
+
+
+def test_permutation_of_separated_constant_samples():
+    assert statistics.permutation_test([2.0] * 3, [1.0] * 3, seed=0).p == pytest.approx(1 / 20)
+    drawn = statistics.permutation_test([2.0] * 20, [1.0] * 20, seed=0)
+    assert drawn.p == pytest.approx(1e-4)
+    assert "Monte Carlo" in drawn.method
+
+
+@given(st.lists(st.integers(-9, 9).map(float), min_size=2, max_size=9))
+def test_sign_flips_are_exact_for_few_pairs(differences):
+    signs = np.array(list(itertools.product([1, -1], repeat=len(differences))))
+    expected = np.mean(signs @ np.array(differences) >= sum(differences))
+    base = np.arange(len(differences), dtype=float)
+    found = statistics.sign_flip_test(base + differences, base, seed=0)
+    assert found.p == pytest.approx(expected)
+    against = statistics.sign_flip_test(np.array(differences) - 300, -300.0, seed=0)
+    assert against.p == found.p
+
+
+def test_sign_flips_of_many_pairs_are_drawn():
+    differences = np.random.default_rng(5).normal(0.4, 1, 40)
+    found = statistics.sign_flip_test(differences, 0.0, seed=6)
+    expected = stats.ttest_1samp(differences, 0, alternative="greater").pvalue
+    assert found.p == pytest.approx(expected, abs=0.01)
+    assert found.seed == 6
+
+
+def test_bca_interval_against_all_resamples():
+    """The formula of Efron & Tibshirani (1993, equation 14.10) on all 6^6 resamples."""
+    values = np.array([0.0, 1.0, 2.5, 4.2, 9.1, 17.3])
+    every = np.array(list(itertools.product(values, repeat=6))).mean(axis=1)
+    z0 = stats.norm.ppf((every < values.mean()).mean() + (every == values.mean()).mean() / 2)
+    left_out = np.array([np.delete(values, i).mean() for i in range(6)])
+    spread = left_out.mean() - left_out
+    a = (spread**3).sum() / (6 * (spread**2).sum() ** 1.5)
+    z = z0 + stats.norm.ppf([0.025, 0.975])
+    low, high = np.quantile(every, stats.norm.cdf(z0 + z / (1 - a * z)))
+    found = statistics.mean(values, seed=7, resamples=20_000)
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.25)
+
+
+def test_intervals_of_many_normal_values_are_the_usual_ones():
+    rng = np.random.default_rng(8)
+    a, b = rng.normal(0, 1, 400), rng.normal(0.5, 2, 300)
+    found = statistics.difference_of_means(a, b, seed=9)
+    expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.03)
+    narrow = statistics.mean(a, seed=9, confidence=0.5)
+    half = 0.6745 * a.std() / 20
+    assert (narrow.low, narrow.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
+
+
+def test_pairs_and_known_numbers_are_one_sample():
+    rng = np.random.default_rng(10)
+    a, b = rng.normal(0, 1, (2, 12))
+    pairs = statistics.paired_difference(a, b, seed=1)
+    alone = statistics.mean(a - b, seed=1)
+    assert (pairs.estimate, pairs.low, pairs.high) == (alone.estimate, alone.low, alone.high)
+    known = statistics.difference_of_means(a, -7, seed=1)
+    alone = statistics.mean(a + 7, seed=1)
+    assert (known.low, known.high, known.n) == (alone.low, alone.high, (12,))
+
+
+@pytest.mark.parametrize(
+    "estimate",
+    [
+        statistics.mean,
+        statistics.interquartile_mean,
+        lambda values, seed: statistics.difference_of_means(values, values[::-1], seed=seed),
+        lambda values, seed: statistics.paired_difference(
+            values, np.zeros_like(values), seed=seed
+        ),
+    ],
+)
+def test_degenerate_samples(estimate):
+    for values in ([4.0], [4.0, 5.0]):
+        found = estimate(np.array(values), seed=0)
+        assert math.isnan(found.low)
+        assert math.isnan(found.high)
+        assert "fewer than 3" in found.note
+    found = estimate(np.full(5, 4.0), seed=0)
+    assert found.low == found.high == found.estimate
+    assert found.note == "the interval is a point: no spread"
+    assert found.seed is None
+
+
+def test_where_bca_is_not_defined_the_percentiles_stand_in():
+    """All in the middle half is equal, so the jackknife sees no change."""
+    values = [0.0, 1, 1, 1, 1, 1, 1, 9]
+    found = statistics.interquartile_mean(values, seed=0)
+    assert found.note == "BCa is not defined for this sample"
+    assert found.method.startswith("interquartile mean, percentile")
+    assert found.low <= found.estimate == 1.0 <= found.high
+    assert found.low < found.high
+
+
+def test_tests_that_cannot_be_made():
+    assert math.isnan(statistics.bootstrap_test([1.0], [2.0, 3.0], seed=0).p)
+    assert math.isnan(statistics.bootstrap_test([1.0, 1.0], 2.0, seed=0).p)
+    assert math.isnan(statistics.permutation_test([1.0], [2.0, 3.0], seed=0).p)
+    assert math.isnan(statistics.sign_flip_test([1.0], 2.0, seed=0).p)
+    one_constant = statistics.bootstrap_test([5.0, 6, 7], [1.0] * 3, seed=0)
+    assert 0 < one_constant.p < 0.2
+
+
+@pytest.mark.parametrize("values", [[], [[1.0]], [1.0, math.nan], [math.inf]])
+def test_samples_are_vectors_of_finite_numbers(values):
+    with pytest.raises(ValueError, match="a sample"):
+        statistics.mean(values, seed=0)
+
+
+def test_pairs_of_different_length_are_refused():
+    for function in (statistics.paired_difference, statistics.sign_flip_test):
+        with pytest.raises(ValueError, match="one length"):
+            function([1.0, 2.0], [1.0, 2.0, 3.0], seed=0)
+    with pytest.raises(ValueError, match="finite"):
+        statistics.difference_of_means([1.0], math.nan, seed=0)
+
+
+@settings(max_examples=30)
+@given(rewards, rewards)
+def test_probability_of_improvement_is_mann_whitneys(a, b):
+    found = statistics.probability_of_improvement(a, b, seed=0, resamples=99)
+    assert found.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / (len(a) * len(b)))
+    delta = statistics.cliffs_delta(a, b, seed=0, resamples=99)
+    pairs = [np.sign(x - y) for x in a for y in b]
+    assert delta.estimate == pytest.approx(np.mean(pairs))
+    assert -1 <= delta.low <= delta.high <= 1 or math.isnan(delta.low)
+    assert delta.low == pytest.approx(2 * found.low - 1, nan_ok=True)
+    assert "Cliff" in delta.method
+
+
+def test_interval_of_samples_that_do_not_overlap():
+    """Newcombe's method 5 by Hanley & McNeil's variance, with one n for both samples."""
+    n, z = 20, stats.norm.ppf(0.975)
+    found = statistics.probability_of_improvement(np.arange(n) + 100, np.arange(n), seed=0)
+    assert found.estimate == found.high == 1.0
+    low = found.low
+    q1, q2 = low / (2 - low), 2 * low**2 / (1 + low)
+    variance = (low * (1 - low) + (n - 1) * (q1 - low**2 + q2 - low**2)) / n**2
+    assert (1 - low) / math.sqrt(variance) == pytest.approx(z)
+    mirrored = statistics.cliffs_delta(np.arange(n), np.arange(n) + 100, seed=0)
+    assert mirrored.low == mirrored.estimate == -1
+    assert mirrored.high == pytest.approx(1 - 2 * low)
+    known = statistics.probability_of_improvement(np.arange(n), -1, seed=0)
+    wilson = stats.binomtest(n, n).proportion_ci(method="wilson")
+    assert (known.low, known.high) == pytest.approx((wilson.low, wilson.high))
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=6))
+def test_holm_is_closed_testing_by_bonferroni(p_values):
+    """Adjusted p: the largest Bonferroni p of all subfamilies that hold the hypothesis."""
+    m = range(len(p_values))
+    families = [f for k in m for f in itertools.combinations(m, k + 1)]
+    expected = [
+        max(min(1, len(f) * min(p_values[j] for j in f)) for f in families if i in f) for i in m
+    ]
+    assert statistics.holm(p_values) == pytest.approx(expected)
+
+
+def test_holm_leaves_out_what_was_not_tested():
+    assert statistics.holm([0.04, math.nan, 0.01, 0.03, math.nan]) == pytest.approx(
+        [0.06, math.nan, 0.03, 0.06, math.nan], nan_ok=True
+    )
+    assert statistics.holm([]) == []
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        statistics.holm([0.5, 1.5])
+
+
+@given(st.lists(st.floats(-100, 100), min_size=1, max_size=15))
+def test_middle_mean_is_the_trimmed_mean_of_any_multiple_of_4(values):
+    found = statistics.middle_mean(np.array(values))
+    assert found == pytest.approx(stats.trim_mean(np.repeat(values, 4), 0.25), abs=1e-9)
+
+
+def test_middle_mean_with_weights_counts_values_so_often():
+    values, weights = np.array([3.0, 1.0, 8.0, 5.0]), np.array([1.0, 3.0, 2.0, 2.0])
+    repeated = np.repeat(values, weights.astype(int))
+    found = statistics.middle_mean(values, weights=weights)
+    assert found == pytest.approx(stats.trim_mean(repeated, 0.25))
+    with pytest.raises(ValueError, match="last axis"):
+        statistics.middle_mean(np.zeros((2, 3)), axis=0)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        statistics.difference_of_means,
+        statistics.probability_of_improvement,
+        statistics.bootstrap_test,
+        statistics.permutation_test,
+        statistics.sign_flip_test,
+    ],
+)
+def test_results_belong_to_their_seed(function):
+    a, b = np.random.default_rng(11).normal(0, 1, (2, 20)).round(1)
+    one, again, other = (function(a, b, seed=seed, resamples=999) for seed in (1, 1, 2))
+    assert one == again or math.isnan(one.p)
+    assert (one.low, one.high, one.p) != (other.low, other.high, other.p)
+    assert repr(one) == repr(again)
+
+
+def test_pairing_by_seed():
+    first = pd.DataFrame({"seed": [3, 1, 2], "reward": pd.array([-3, -1, None], "Int64")})
+    second = pd.DataFrame({"seed": [1, 2, 3, 4], "reward": pd.array([-10, -20, -30, 0], "Int64")})
+    a, b = statistics.paired_by_seed(first, second)
+    assert a.tolist() == [-3, -1]
+    assert b.tolist() == [-30, -10]
+    with pytest.raises(ValueError, match="one-to-one"):
+        statistics.paired_by_seed(pd.concat([first, first]), second)
