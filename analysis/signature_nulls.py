@@ -85,8 +85,7 @@ def nulls() -> list[Null]:
             found.append(Null(f"{part} part, {kind}", partial(_context, scatter, 20, 20, basis)))
         found.append(Null(f"lead time, {kind}", partial(_lead, scatter)))
         for runs in (10, 20):
-            if scatter is not skewed:  # there the variances per dimension differ in earnest
-                found.append(Null(f"ΔV z, {kind}, {runs} runs", partial(_synergy, scatter, runs)))
+            found.append(Null(f"ΔV z, {kind}, {runs} runs", partial(_synergy, scatter, runs)))
         found.append(Null(f"locus slope, {kind}", partial(_locus, scatter)))
     return found
 

@@ -51,7 +51,11 @@ def change_from_initial(execution: Execution, initial: Execution) -> NDArray[np.
 
 
 def sacrifices(execution: Execution, initial: Execution) -> bool:
-    """Whether the first subtask takes longer than initially while the whole takes less."""
+    """Whether the first subtask takes longer than initially while the whole takes less.
+
+    By any number of ticks: a plan's movement can lose one to rounding alone, so read it beside
+    :func:`change_from_initial`.
+    """
     change = change_from_initial(execution, initial)
     return bool(change[0] > 0 > change.sum())
 
