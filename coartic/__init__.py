@@ -16,6 +16,7 @@ from coartic.movement import MoveResult, move
 from coartic.robot import Arm, Hand, Robot
 from coartic.solution import Execution, Movement, execute
 from coartic.task import Provenance, Start, Task, builtin_tasks, load_task, parse_task
+from coartic.trajectory import Trajectory, trajectory
 
 __version__ = "0.1.0"
 
@@ -40,6 +41,7 @@ __all__ = [
     "Start",
     "Task",
     "TaskError",
+    "Trajectory",
     "builtin_tasks",
     "correct",
     "corrective_trial",
@@ -54,4 +56,5 @@ __all__ = [
     "parse_task",
     "runs_frame",
     "solutions_frame",
+    "trajectory",
 ]

@@ -28,7 +28,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 # Modules that no result passes through: they say or show it, or repeat it slowly.
-_PRESENTATION = {"__init__.py", "__main__.py", "cli.py", "frames.py", "reference.py"}
+_PRESENTATION = {
+    "__init__.py",
+    "__main__.py",
+    "cli.py",
+    "frames.py",
+    "reference.py",
+    "trajectory.py",
+}
 
 
 @cache

@@ -230,17 +230,27 @@ def follow(
     for :func:`move`. Raises ValueError for a wrong shape.
     """
     goal_centre(goal), _radius(radius), checked_model(model)
-    corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
-    lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    last = math.ceil(ends[-1] / model.step)
-    at = np.append(np.arange(last) * model.step, ends[-1])
-    points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
-    points[-1] = corners[-1]
+    points = path_points(robot, q, waypoints, model)
+    last = len(points) - 1
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
     inside = np.flatnonzero(np.hypot(*misses.T) <= radius)
     k = int(inside[0]) if inside.size else last
     return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
+
+
+def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
+    """The points of a path, ``(n + 1, dof)``: its steps of length m and its end.
+
+    Point k lies at arc length ``k m`` of the polyline from ``q`` through ``waypoints``
+    (k, dof). Raises ValueError for a wrong shape.
+    """
+    corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
+    lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    at = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
+    points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
+    points[-1] = corners[-1]
+    return points
 
 
 def configuration(robot: Robot, q: Any) -> Array:

@@ -1,0 +1,144 @@
+"""Context dependence: the same subgoal, reached on the way to different successors.
+
+Anticipatory coarticulation is a difference between contexts that share all that comes
+before (Shah, Barto & Fagg 2013, tasks ascending and descending, which share goal 1).
+Configurations mix length unit (base) and rad (joints), as the model's own joint-space
+distance does. All tests permute whole runs between contexts, so they ask nothing of the
+distribution; they take runs as exchangeable if the context did nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from coartic import Task
+from coartic.robot import Array
+
+RESAMPLES = 9999
+_SAME = 1e-12  # spread below which configurations are the same but for rounding
+
+
+def shared_goals(first: Task, second: Task) -> int:
+    """How many goals two tasks share before their first difference.
+
+    0 where anything but the goals differs, and where no goal differs.
+    """
+    kept = ("start", "radius", "hands", "locked_base", "robot")
+    if any(getattr(first, key) != getattr(second, key) for key in kept):
+        return 0
+    if first.goals == second.goals:
+        return 0
+    same = [a == b for a, b in zip(first.goals, second.goals, strict=False)]
+    return same.index(False) if False in same else len(same)
+
+
+def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
+    """Pairs of tasks that differ only after their first goals, and how many they share."""
+    pairs = [(a, b, shared_goals(tasks[a], tasks[b])) for a, b in combinations(tasks, 2)]
+    return [pair for pair in pairs if pair[2]]
+
+
+def distance(first: Array, second: Array) -> float:
+    """Distance between the mean configurations of two contexts, ≥ 0.
+
+    ``first`` and ``second`` have shape ``(runs, dof)``. Mixed units (see the module).
+    """
+    return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
+
+
+def context_dependence(first: Array, second: Array) -> float:
+    """:func:`distance` in pooled within-context standard deviations, 0 to ∞.
+
+    The deviation is the root of the total variance (its trace) about each context's own
+    mean, with n₁ + n₂ - 2 degrees of freedom: a multivariate form of Cohen's d (Cohen
+    1988). Where the context does nothing, its expected square is about 1/n₁ + 1/n₂, not 0.
+    NaN where no context has two runs or runs do not differ: there is nothing to divide by.
+    """
+    freedom = len(first) + len(second) - 2
+    if freedom < 1:
+        return math.nan
+    squares = sum(((group - group.mean(axis=0)) ** 2).sum() for group in (first, second))
+    spread = float(np.sqrt(squares / freedom))
+    return distance(first, second) / spread if spread > _SAME else math.nan
+
+
+def permutation_p(
+    first: Array,
+    second: Array,
+    rng: np.random.Generator,
+    *,
+    basis: Array | None = None,
+    resamples: int = RESAMPLES,
+) -> float:
+    """Probability of so large a distance between means if the context did nothing.
+
+    One-sided permutation test over runs (``scipy.stats.permutation_test``), exact where
+    all permutations are fewer than ``resamples``. The statistic is :func:`distance`, which
+    orders permutations as :func:`context_dependence` does; with an orthonormal ``basis``
+    (dof, k) it is the distance within its span. 0 < p ≤ 1; 1 where no run differs from
+    another. NaN where a context has one run only.
+    """
+    if min(len(first), len(second)) < 2:
+        return math.nan
+    pool = np.concatenate([first, second])
+    pool = pool - pool.mean(axis=0)
+    if basis is not None:
+        pool = pool @ basis
+    if np.ptp(pool, axis=0).max(initial=0.0) < _SAME:
+        return 1.0
+
+    def statistic(a: NDArray[np.int64], b: NDArray[np.int64], axis: int) -> Array:
+        between = pool[a].mean(axis=-2) - pool[b].mean(axis=-2)
+        length: Array = np.sqrt((between**2).sum(axis=-1))
+        return length
+
+    runs = np.arange(len(pool))
+    test = stats.permutation_test(
+        (runs[: len(first)], runs[len(first) :]),
+        statistic,
+        permutation_type="independent",
+        vectorized=True,
+        n_resamples=resamples,
+        batch=1000,
+        alternative="greater",
+        rng=rng,
+    )
+    return float(test.pvalue)
+
+
+def lead_time(
+    first: Array,
+    second: Array,
+    rng: np.random.Generator,
+    *,
+    alpha: float = 0.05,
+    resamples: int = 999,
+) -> int | None:
+    """How long before a hit two contexts become distinguishable, and stay so, in ticks.
+
+    ``first`` and ``second`` have shape ``(runs, k, dof)``: the last k control ticks of
+    each run up to the hit, which is entry -1. Going back from the hit, contexts count as
+    distinguishable at a tick while :func:`permutation_p` is at most ``alpha`` there. The
+    first tick that fails ends the count: tests in a fixed order (Maurer, Hothorn & Lehmacher
+    1995), so that the error rate of the whole is ``alpha`` without correction. 0 means at the
+    hit only; None, not even there, or a context with one run. At most k - 1, the whole movement.
+
+    After Engel, Flanders & Soechting (1997), who looked for the moment at which hand
+    postures before the same piano key diverge by the notes to come. Caveat: from a common
+    start, straight movements diverge in proportion from their first tick on, so that here
+    a lead shorter than the movement speaks of noise or of different speeds, not of a late
+    decision.
+    """
+    lead = None
+    for back in range(first.shape[1]):
+        tick = first.shape[1] - 1 - back
+        if not permutation_p(first[:, tick], second[:, tick], rng, resamples=resamples) <= alpha:
+            break
+        lead = back
+    return lead

@@ -1,0 +1,384 @@
+"""All signatures of a results folder, one row each."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis.results import Results
+from analysis.signatures.cell import Cell, cells_of, last_ticks, postures
+from analysis.signatures.context import (
+    context_dependence,
+    context_pairs,
+    distance,
+    lead_time,
+    permutation_p,
+)
+from analysis.signatures.locus import LEAST, Family, families, locus_slopes
+from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
+from analysis.signatures.other_arm import preshaping, travel
+from analysis.signatures.paths import reversals_of, smoothness, turning_angles
+from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
+from analysis.signatures.subtasks import change_from_initial, excess, sacrifices
+from coartic import Task
+from coartic.robot import HANDS, Array, Hand
+
+CONFIDENCE = 0.95
+SEED = 0
+"""Of the permutation tests."""
+MIXED = "length unit, rad"
+TICKS = "ticks"
+
+NO_RUN = "no run has a solution"
+ONE_HAND = "the task has one hand"
+NO_INITIAL = "the corrective process alone does not complete the task"
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One signature of one cell."""
+
+    signature: str
+    where: str = ""
+    value: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    p: float = math.nan
+    n: int = 0
+    unit: str = ""
+    why_not: str = ""
+
+
+def signatures_frame(results: Results, *, seed: int = SEED) -> pd.DataFrame:
+    """Every signature of every cell.
+
+    Columns: ``task``, ``method``, ``variant``, ``signature``, ``where`` (goal, other context,
+    joint), ``value``, ``low`` and ``high`` (95 % interval), ``p`` (uncorrected), ``n`` (runs
+    that went into it), ``unit``, ``why_not`` (why there is no value, or no test; empty where
+    all is there). Signatures over runs are means with Student's interval, shares of runs have
+    Wilson's. What each one means stands with its function. Differences between contexts
+    stand with the first task of the pair and name the other. ``seed`` is of the permutation
+    tests, which draw apart for each row and do not depend on the other rows.
+    """
+    cells = cells_of(results)
+    groups = families(results.tasks)
+    by_key = {(cell.method, cell.variant, cell.task.name): cell for cell in cells}
+    pairs = [
+        (first, second, shared)
+        for first, second, shared in context_pairs(results.tasks)
+        if not any({first, second} <= set(family.tasks) for family in groups)
+    ]
+    rows: list[dict[str, Any]] = []
+
+    def add(cell: Cell, found: Iterator[Signature]) -> None:
+        key = {"task": cell.task.name, "method": cell.method, "variant": cell.variant}
+        rows.extend({**key, **asdict(signature)} for signature in found)
+
+    for cell in cells:
+        add(cell, _of_cell(cell, best_sequences(results.sequences, cell.task.name)))
+        alone = True
+        for first, second, shared in pairs:
+            both = [by_key.get((cell.method, cell.variant, name)) for name in (first, second)]
+            if cell.task.name in (first, second) and both[0] is not None and both[1] is not None:
+                alone = False
+                if cell is both[0]:
+                    add(cell, _of_pair(cell, both[1], shared, seed))
+        if alone:
+            add(cell, _no_context())
+        for family in groups:
+            members = [by_key.get((cell.method, cell.variant, name)) for name in family.tasks]
+            if next((member for member in members if member is not None), None) is cell:
+                add(cell, _of_family(family, members))
+        if not any(cell.task.name in family.tasks for family in groups):
+            why = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
+            add(cell, iter([Signature("locus slope", why_not=why)]))
+    return pd.DataFrame(rows)
+
+
+def _of_cell(cell: Cell, best: list[str]) -> Iterator[Signature]:
+    yield from _sacrifice(cell)
+    yield from _recruitment(cell, best)
+    yield from _other_arm(cell)
+    yield from _form(cell)
+    yield from _synergies(cell)
+
+
+def _sacrifice(cell: Cell) -> Iterator[Signature]:
+    goals = _goals(cell.task)
+    names = ("first subtask against initial", "total against initial", "first subtask sacrificed")
+    if cell.initial is None or not cell.runs:
+        why = NO_INITIAL if cell.runs else NO_RUN
+        yield from (Signature(name, why_not=why) for name in names)
+    else:
+        initial = cell.initial
+        change = np.array([change_from_initial(run.execution, initial) for run in cell.runs])
+        yield _mean(names[0], "goal 1", change[:, 0], TICKS)
+        yield _mean(names[1], "", change.sum(axis=1), TICKS)
+        yield _share(names[2], "", [sacrifices(run.execution, initial) for run in cell.runs])
+    yield from _by_goal(
+        "subtask against isolated reach",
+        goals,
+        [excess(run) for run in cell.runs],
+        TICKS,
+        "the corrective process reaches the goal from the posture before with no hand",
+    )
+
+
+def _recruitment(cell: Cell, best: list[str]) -> Iterator[Signature]:
+    names = ("hand entropy", "hand as in isolation", "hands as the best corrective ones")
+    if len(cell.task.hands) < 2 or not cell.runs:
+        why = ONE_HAND if cell.runs else NO_RUN
+        yield from (Signature(name, why_not=why) for name in names)
+        return
+    counts = pd.Series(cell.sequences).value_counts()
+    yield Signature(
+        names[0],
+        ", ".join(f"{hands} {count}" for hands, count in counts.items()),
+        entropy(cell.sequences),
+        n=len(cell.runs),
+        unit="bit",
+        why_not="" if len(cell.runs) > 1 else "one run: no distribution",
+    )
+    agreement = np.array([isolated_agreement(run) for run in cell.runs])
+    for goal, agrees in zip(_goals(cell.task), agreement.T, strict=True):
+        yield _share(names[1], goal, agrees.tolist())
+    if best:
+        yield _share(names[2], ", ".join(best), [hands in best for hands in cell.sequences])
+    else:
+        yield Signature(names[2], why_not="the folder's table of sequences has no reward")
+
+
+def _other_arm(cell: Cell) -> Iterator[Signature]:
+    names = ("preshaping of the other arm", "travel of the other arm")
+    if len(cell.task.hands) < 2 or not cell.runs:
+        why = ONE_HAND if cell.runs else NO_RUN
+        yield from (Signature(name, why_not=why) for name in names)
+        return
+    if cell.initial is None:
+        yield Signature(names[0], why_not=NO_INITIAL)
+    else:
+        initial = cell.initial
+        yield from _by_goal(
+            names[0],
+            _goals(cell.task)[:-1],
+            [preshaping(run, initial)[:-1] for run in cell.runs],
+            "1",
+            "the other hand hits no later goal",
+        )
+    yield from _by_goal(names[1], _goals(cell.task), [travel(run) for run in cell.runs], "rad", "")
+
+
+def _form(cell: Cell) -> Iterator[Signature]:
+    reversals = [reversals_of(run) for run in cell.runs]
+    for k, name in enumerate("xy"):
+        where = f"base {name}"
+        if name in cell.task.locked_base:
+            yield Signature("base reversals", where, why_not="the coordinate is locked")
+        else:
+            yield _mean("base reversals", where, [run[k] for run in reversals], "1")
+    turns = [
+        turning_angles(np.vstack([run.task.q0, run.execution.configurations])) for run in cell.runs
+    ]
+    if len(cell.task.goals) > 1:
+        yield from _by_goal(
+            "turning angle", _goals(cell.task)[:-1], turns, "rad", "a subtask without displacement"
+        )
+    else:
+        yield Signature("turning angle", why_not="the task has one goal")
+    smooth = [smoothness(run) for run in cell.runs]
+    short = "every subtask is too short, or its path is without jerk"
+    for k, name in enumerate(("hand path SPARC", "hand path log dimensionless jerk")):
+        yield _mean(name, "chosen hand", [run[k] for run in smooth], "1", short)
+
+
+def _synergies(cell: Cell) -> Iterator[Signature]:
+    runs, task = cell.typical, cell.task
+    names = ("V_ucm", "V_ort", "ΔV", "ΔV z")
+    if len(runs) < 2:
+        why = "one run: no variance across runs" if runs else NO_RUN
+        yield from (Signature(name, n=len(runs), why_not=why) for name in names)
+        return
+    for number, goal in enumerate(_goals(task), 1):
+        hand = runs[0].hands[number - 1]
+        joints = movable(task, hand)
+        q = postures(runs, number)
+        found = synergy(q[:, joints], task.robot.jacobian(q.mean(axis=0), hand)[:, joints])
+        where = f"{goal}, {hand} hand, {runs[0].execution.hands}"
+        why = "runs do not differ" if math.isnan(found.z) else ""
+        untested = why or ("fewer than three runs" if len(runs) < 3 else "")
+        squared = f"squared ({MIXED})"
+        n = len(runs)
+        yield Signature(names[0], where, found.within, n=n, unit=squared, why_not=why)
+        yield Signature(names[1], where, found.orthogonal, n=n, unit=squared, why_not=why)
+        yield Signature(names[2], where, found.delta, n=n, unit="1", why_not=why)
+        yield Signature(
+            names[3],
+            f"{where}, neutral at {found.neutral:.3f}" if not why else where,
+            found.z,
+            found.low,
+            found.high,
+            found.p,
+            n,
+            "1",
+            untested,
+        )
+
+
+CONTEXT = (
+    "context distance",
+    "context dependence",
+    "motor-equivalent part",
+    "non-motor-equivalent part",
+    "lead time",
+)
+
+
+def _no_context() -> Iterator[Signature]:
+    why = "the method did no other task that shares the start and the first goals"
+    yield from (Signature(name, why_not=why) for name in CONTEXT)
+
+
+def _of_pair(first: Cell, second: Cell, shared: int, seed: int) -> Iterator[Signature]:
+    """Contexts by shared goal and hand, where both contexts have runs with that hand."""
+    for number in range(1, shared + 1):
+        found = False
+        for hand in HANDS:
+            runs = first.with_hand(hand, number), second.with_hand(hand, number)
+            if all(runs):
+                found = True
+                where = f"goal {number}, {hand} hand, against {second.task.name}"
+                yield from _of_contexts(first.task, hand, number, runs, where, seed)
+        if not found:
+            why = "no hand hit the goal in both contexts"
+            where = f"goal {number}, against {second.task.name}"
+            yield from (Signature(name, where, why_not=why) for name in CONTEXT)
+
+
+def _of_contexts(
+    task: Task, hand: Hand, goal: int, runs: Sequence[tuple[Any, ...]], where: str, seed: int
+) -> Iterator[Signature]:
+    n = sum(map(len, runs))
+    q = [postures(group, goal) for group in runs]
+    pooled = np.concatenate(q)
+    few = min(map(len, q)) < 2
+    why = "one run a context: no spread within contexts, no test" if few else ""
+    spread = context_dependence(q[0], q[1])
+    if not few and math.isnan(spread):
+        why = "runs do not differ within contexts"
+
+    def p(name: str, basis: Array | None = None) -> float:
+        return math.nan if few else permutation_p(q[0], q[1], _rng(seed, name, where), basis=basis)
+
+    yield Signature(CONTEXT[0], where, distance(q[0], q[1]), n=n, unit=MIXED)
+    yield Signature(CONTEXT[1], where, spread, p=p(CONTEXT[1]), n=n, unit="pooled SD", why_not=why)
+    joints = movable(task, hand)
+    jacobian = task.robot.jacobian(pooled.mean(axis=0), hand)[:, joints]
+    difference = q[0].mean(axis=0) - q[1].mean(axis=0)
+    parts = motor_equivalence(difference[joints], jacobian)
+    for name, value, basis in zip(CONTEXT[2:4], parts, subspaces(jacobian), strict=True):
+        whole = np.zeros((task.robot.dof, basis.shape[1]))
+        whole[joints] = basis
+        yield Signature(
+            name, where, value, p=p(name, whole), n=n, unit=f"{MIXED}, per root of dimension",
+            why_not="one run a context: no test" if few else "",
+        )  # fmt: skip
+    if few:
+        yield Signature(CONTEXT[4], where, n=n, unit=TICKS, why_not=why)
+        return
+    count = min(int(run.hits[goal - 1]) for group in runs for run in group) + 1
+    if count == 1:
+        yield Signature(CONTEXT[4], where, n=n, unit=TICKS, why_not="a run hits it at the start")
+        return
+    paths = [last_ticks(group, goal, count) for group in runs]
+    lead = lead_time(paths[0], paths[1], _rng(seed, CONTEXT[4], where))
+    yield Signature(
+        CONTEXT[4],
+        f"{where}, of at most {count - 1}",
+        math.nan if lead is None else lead,
+        n=n,
+        unit=TICKS,
+        why_not="not distinguishable at the hit" if lead is None else "",
+    )
+
+
+def _of_family(family: Family, members: Sequence[Cell | None]) -> Iterator[Signature]:
+    """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
+    name = "locus slope"
+    known = [
+        (cell, place)
+        for cell, place in zip(members, family.positions.tolist(), strict=True)
+        if cell is not None
+    ]
+    goals = len(known[0][0].task.goals)
+    for goal, kind in (
+        (family.moving - 1, "anticipatory"),
+        (family.moving + 1, "carry-over"),
+    ):
+        if not 1 <= goal <= goals:
+            continue
+        text = f"goal {goal}, {kind} of goal {family.moving}"
+        for hand in HANDS:
+            runs = [(r, place) for cell, place in known for r in cell.with_hand(hand, goal)]
+            places = [place for _, place in runs]
+            if not runs:
+                continue
+            where = f"{text}, {hand} hand"
+            if len(set(places)) < LEAST:
+                why = f"runs with that hand in fewer than {LEAST} tasks of the family"
+                yield Signature(name, where, n=len(runs), why_not=why)
+                continue
+            q = postures(tuple(run for run, _ in runs), goal)
+            joints = known[0][0].task.robot.joint_names
+            for joint, slope in zip(joints, locus_slopes(q, places), strict=True):
+                unit = "1" if joint.startswith("base") else "rad per length unit"
+                yield Signature(name, f"{where}, {joint}", *slope, n=len(runs), unit=unit)
+
+
+def _goals(task: Task) -> list[str]:
+    return [f"goal {number}" for number in range(1, len(task.goals) + 1)]
+
+
+def _by_goal(
+    name: str, goals: list[str], values: Sequence[Array], unit: str, missing: str
+) -> Iterator[Signature]:
+    for k, goal in enumerate(goals):
+        yield _mean(name, goal, [run[k] for run in values], unit, missing)
+
+
+def _mean(
+    name: str, where: str, values: Sequence[float] | Array, unit: str, missing: str = ""
+) -> Signature:
+    """Mean over the runs that have a value, with Student's interval."""
+    given = np.asarray(values, dtype=np.float64)
+    known = given[np.isfinite(given)]
+    n = len(known)
+    if not n:
+        return Signature(name, where, unit=unit, why_not=missing if len(given) else NO_RUN)
+    mean = float(known.mean())
+    if n == 1:
+        return Signature(name, where, mean, n=1, unit=unit, why_not="one run: no interval")
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1) * stats.sem(known))
+    return Signature(name, where, mean, mean - half, mean + half, n=n, unit=unit)
+
+
+def _share(name: str, where: str, agrees: Sequence[bool]) -> Signature:
+    """Share of runs, with Wilson's interval."""
+    n = len(agrees)
+    test = stats.binomtest(sum(agrees), n)
+    if n == 1:
+        return Signature(name, where, float(agrees[0]), n=1, unit="1",
+                         why_not="one run: no interval")  # fmt: skip
+    low, high = test.proportion_ci(CONFIDENCE, method="wilson")
+    return Signature(name, where, sum(agrees) / n, float(low), float(high), n=n, unit="1")
+
+
+def _rng(seed: int, name: str, where: str) -> np.random.Generator:
+    """A generator of its own for each row."""
+    return np.random.default_rng([seed, zlib.crc32(f"{name} {where}".encode())])

@@ -1,0 +1,131 @@
+"""What differs and varies in joint space, by whether the hand feels it.
+
+The Jacobian of the hand divides joint space into its nullspace, in which displacements
+leave the hand where it is to first order (the uncontrolled manifold, linearised), and the
+orthogonal complement, in which they move it. Length unit and rad count alike.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg, stats
+
+from coartic import Hand, Task
+from coartic.robot import Array
+
+CONFIDENCE = 0.95
+
+
+def movable(task: Task, hand: Hand) -> Array:
+    """Indices of the joints that can move a hand: unlocked base coordinates, its arm."""
+    base = [k for k, name in enumerate("xy") if name not in task.locked_base]
+    return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
+
+
+def subspaces(jacobian: Array) -> tuple[Array, Array]:
+    """Orthonormal bases of nullspace and of its complement, ``(k, d)`` each.
+
+    ``jacobian`` has shape ``(2, k)``: the columns of the joints that can move.
+    """
+    return linalg.null_space(jacobian), linalg.orth(jacobian.T)
+
+
+class Equivalence(NamedTuple):
+    """The two parts of a joint-space difference, each per root of its dimension."""
+
+    equivalent: float
+    """Motor-equivalent: does not move the hand. ≥ 0; length unit and rad mixed."""
+    other: float
+    """Non-motor-equivalent: moves it."""
+
+
+def motor_equivalence(difference: Array, jacobian: Array) -> Equivalence:
+    """A difference between configurations, divided by what it does to the hand.
+
+    ``difference`` has shape ``(k,)``. Each part is its length over the root of the
+    dimension of its space, so that a difference in a random direction has equal parts. A
+    difference between contexts is motor-equivalent where the first exceeds the second: the
+    same subgoal reached by another posture. Caveat: hits of one disc bound the second part, and
+    nothing bounds the first. NaN for a space of dimension 0. Source: Mattos,
+    Latash and colleagues, Experimental Brain Research (doi:10.1007/s00221-015-4327-4,
+    10.1007/s00221-018-5215-5).
+    """
+    parts = []
+    for basis in subspaces(jacobian):
+        size = basis.shape[1]
+        parts.append(float(np.linalg.norm(basis.T @ difference)) / math.sqrt(size or math.nan))
+    return Equivalence(*parts)
+
+
+class Synergy(NamedTuple):
+    """Variance across runs within and orthogonal to the uncontrolled manifold."""
+
+    within: float
+    """V_ucm: variance in the nullspace per dimension, ≥ 0, squared units."""
+    orthogonal: float
+    """V_ort: variance in its complement per dimension."""
+    delta: float
+    """ΔV = (V_ucm - V_ort) / V_tot, from -n/d_ort to n/d_ucm."""
+    z: float
+    """Fisher-like transform of ΔV, -∞ to ∞."""
+    low: float
+    """Interval of z at 95 %; NaN below three runs."""
+    high: float
+    neutral: float
+    """z where both variances are equal, ½ ln(d_ucm/d_ort)."""
+    p: float
+    """Two-sided, of z equal to ``neutral``."""
+
+
+def synergy(configurations: Array, jacobian: Array) -> Synergy:
+    """Uncontrolled-manifold variance ratio at one moment, over runs.
+
+    ``configurations`` has shape ``(runs, k)``, ``jacobian`` ``(2, k)``, taken at their
+    mean; V_tot is the variance per dimension of all n = d_ucm + d_ort. ΔV > 0 (z above
+    ``neutral``): runs vary more in directions that do not move the hand (Scholz & Schöner
+    1999). ΔV is bounded and skewed, so z = ½ ln[(n/d_ort + ΔV) / (n/d_ucm - ΔV)] is used for
+    inference (Verrel 2010); it equals ½ ln(V_ucm/V_ort) + ½ ln(d_ucm/d_ort). Its interval and
+    test are the jackknife's, with Student's t and runs - 1 degrees of freedom (Miller 1974):
+    they allow correlated joints and unequal variances within either space; with markedly
+    skewed scatter about 7 % of nulls are rejected at 5 % (analysis/signature_nulls.py).
+
+    All NaN below two runs, for a space of dimension 0 and where runs do not differ. Caveat: a
+    hit confines the hand to the goal's disc, so some ΔV > 0 comes from the task's geometry
+    alone; compare methods, and less so with zero.
+    """
+    null, complement = subspaces(jacobian)
+    free, bound = null.shape[1], complement.shape[1]
+    nothing = Synergy(*[math.nan] * 8)
+    n = len(configurations)
+    if n < 2 or not free or not bound:
+        return nothing
+    parts = [configurations @ basis for basis in (null, complement)]
+    sums = [float(((part - part.mean(axis=0)) ** 2).sum()) for part in parts]
+    if min(sums) <= 1e-24:
+        return nothing
+    within, orthogonal = sums[0] / (n - 1) / free, sums[1] / (n - 1) / bound
+    delta = (within - orthogonal) * (free + bound) / (free * within + bound * orthogonal)
+    z = 0.5 * math.log(sums[0] / sums[1])
+    neutral = 0.5 * math.log(free / bound)
+    if n < 3:
+        return Synergy(within, orthogonal, delta, z, math.nan, math.nan, neutral, math.nan)
+    left = [_leave_one_out(part, total) for part, total in zip(parts, sums, strict=True)]
+    if min(map(np.min, left)) <= 1e-24:
+        return Synergy(within, orthogonal, delta, z, math.nan, math.nan, neutral, math.nan)
+    pseudo = n * z - (n - 1) * 0.5 * np.log(left[0] / left[1])
+    # About the full sample's z, not the pseudo-values' mean, so that the interval holds it.
+    error = float(pseudo.std(ddof=1)) / math.sqrt(n)
+    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * error
+    p = 2.0 * float(stats.t.sf(abs(z - neutral) / error, n - 1))
+    return Synergy(within, orthogonal, delta, z, z - reach, z + reach, neutral, p)
+
+
+def _leave_one_out(part: Array, total: float) -> Array:
+    """Sum of squares about the mean without each of the runs in turn."""
+    n = len(part)
+    own = ((part - part.mean(axis=0)) ** 2).sum(axis=1)
+    rest: Array = total - own * n / (n - 1)
+    return rest

@@ -1,0 +1,97 @@
+"""A solution tick by tick: what :func:`coartic.solution.execute` scores, spelled out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.errors import SolutionError
+from coartic.model import PAPER, MotionModel
+from coartic.movement import path_points
+from coartic.robot import Array, Hand
+from coartic.solution import Execution, Movement, execute
+from coartic.task import Task, hands_of
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Every control tick of an execution that hit all goals."""
+
+    task: Task
+    execution: Execution
+    configurations: Array
+    """Configuration at each control tick, shape ``(ticks, dof)``; the first row is the
+    start. A movement of k steps gives k + 1 rows, the last one the tick that detects its
+    end, so the row after it (the next movement's first) repeats it."""
+    hits: NDArray[np.int64]
+    """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
+    of its own has the row in which the robot stood; 0 before the first tick."""
+
+    @property
+    def hands(self) -> tuple[Hand, ...]:
+        """Hand chosen for each goal."""
+        return hands_of(self.execution.hands)
+
+    @property
+    def ticks(self) -> int:
+        """Number of control ticks, the total reward with its sign turned."""
+        return len(self.configurations)
+
+    def hand_path(self, hand: Hand) -> Array:
+        """Path of either hand, shape ``(ticks, 2)``, length unit."""
+        return self.task.robot.forward_kinematics(self.configurations, hand)
+
+    def subtask(self, goal: int) -> Array:
+        """Rows from the hit of the goal before (or the start) to that of ``goal``, both
+        included, shape ``(k, dof)``; ``goal`` counts from 1."""
+        first = self.hits[goal - 2] if goal > 1 else 0
+        return self.configurations[first : self.hits[goal - 1] + 1]
+
+
+def trajectory(
+    task: Task, movements: Iterable[Movement], model: MotionModel = PAPER
+) -> Trajectory:
+    """Execute a solution and keep every control tick.
+
+    Agrees with :func:`~coartic.solution.execute` bit for bit in the number of ticks and
+    the configuration at each hit. Raises SolutionError where the solution breaks the
+    task's rules or does not hit every goal.
+    """
+    execution = execute(task, movements, model=model)
+    if not execution.completed:
+        raise SolutionError(f"task {task.name!r}: {execution.reason}")
+    rows = [np.empty((0, task.robot.dof))]
+    q = np.array(task.q0)
+    elapsed = np.zeros(len(task.goals), dtype=np.int64)
+    for movement in execution.movements:
+        assert movement.ticks is not None
+        assert movement.target is not None
+        if movement.kind == "path":
+            assert movement.waypoints is not None
+            points = path_points(task.robot, q, movement.waypoints, model)[: movement.ticks]
+        else:
+            points = _line(q, movement.target, movement.ticks, model.step)
+        if len(points):
+            q = points[-1]
+            rows.append(points)
+        elapsed[movement.goal - 1 :] += movement.ticks
+    return Trajectory(task, execution, np.concatenate(rows), np.maximum(elapsed - 1, 0))
+
+
+def _line(q: Array, target: Array, ticks: int, step: float) -> Array:
+    """The first points of a movement, summed and rounded as its kernel does."""
+    difference = target - q
+    square = 0.0
+    for value in difference.tolist():
+        square += value * value
+    distance = math.sqrt(square)
+    last = math.ceil(distance / step)
+    k = np.arange(ticks)[:, None]
+    if not last:
+        return np.repeat(target[None, :], ticks, axis=0)
+    points: Array = np.where(k < last, q + k * step / distance * difference, target)
+    return points

@@ -1,0 +1,553 @@
+"""Signatures on constructed cases whose right answer is known."""
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import integrate
+
+from analysis import signature_nulls
+from analysis.results import Results
+from analysis.signatures import signatures_frame
+from analysis.signatures.cell import Cell
+from analysis.signatures.context import (
+    context_dependence,
+    context_pairs,
+    distance,
+    lead_time,
+    permutation_p,
+)
+from analysis.signatures.locus import families, locus_slopes
+from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
+from analysis.signatures.other_arm import preshaping, travel
+from analysis.signatures.paths import (
+    base_reversals,
+    dimensionless_jerk,
+    reversals_of,
+    smoothness,
+    spectral_arc_length,
+    turning_angles,
+)
+from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
+from analysis.signatures.subtasks import (
+    change_from_initial,
+    excess,
+    isolated_reaches,
+    sacrifices,
+)
+from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
+from coartic.frames import movement_rows
+from coartic.solution import other_arm_travel
+
+from .strategies import changed, tiny_task
+
+
+def rng(seed=1):
+    return np.random.default_rng(seed)
+
+
+def posture(x=0.0, y=0.0, **joints):
+    """Arms straight along +x, base at (x, y); ``right_2=0.3`` and the like bend them."""
+    q = np.array([x, y, *[0.0] * 8])
+    for name, angle in joints.items():
+        hand, number = name.split("_")
+        q[(2 if hand == "left" else 6) + int(number) - 1] = angle
+    return q
+
+
+def planned(*targets, hands):
+    return [
+        Movement(number, {"L": "left", "R": "right"}[letter], "planned", target)
+        for number, (target, letter) in enumerate(zip(targets, hands, strict=True), 1)
+    ]
+
+
+# Context dependence
+
+
+def test_context_dependence_by_hand():
+    first = np.array([[0.0, 0.0], [2.0, 0.0]])  # mean (1, 0), squares 2
+    second = np.array([[4.0, 3.0], [4.0, 5.0]])  # mean (4, 4), squares 2
+    assert distance(first, second) == 5.0
+    assert context_dependence(first, second) == pytest.approx(5.0 / math.sqrt(4 / 2))
+    assert math.isnan(context_dependence(first[:1], second[:1]))
+    assert math.isnan(context_dependence(first[[0, 0]], second[[1, 1]]))
+
+
+def test_permutation_p_is_exact_for_few_runs():
+    """Of the 20 ways to divide six runs, two put the extremes apart."""
+    first, second = np.array([[0.0], [0.1], [0.2]]), np.array([[5.0], [5.1], [5.2]])
+    assert permutation_p(first, second, rng()) == pytest.approx(2 / 20)
+    assert math.isnan(permutation_p(first[:1], second, rng()))
+    assert permutation_p(first[[0, 0]], first[[0, 0]], rng()) == 1.0
+
+
+def test_permutation_p_finds_a_planted_context_and_no_other():
+    first = rng(2).standard_normal((20, 6))
+    second = rng(3).standard_normal((20, 6))
+    assert permutation_p(first, second, rng()) > 0.05
+    shift = np.array([0, 0, 2.0, 0, 0, 0])
+    assert permutation_p(first, second + shift, rng()) < 0.001
+    inside, outside = np.eye(6)[:, [2]], np.eye(6)[:, [0, 1, 3, 4, 5]]
+    assert permutation_p(first, second + shift, rng(), basis=inside) < 0.001
+    assert permutation_p(first, second + shift, rng(), basis=outside) > 0.05
+
+
+def test_pairs_of_contexts():
+    tasks = {name: load_task(name) for name in ("ascending", "descending", "two-armed-1")}
+    assert context_pairs(tasks) == [("ascending", "descending", 1)]
+    moved = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
+    other = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.5]], initial_hands="RRR")
+    assert context_pairs({"a": moved, "b": other, "c": moved}) == [("a", "b", 2), ("b", "c", 2)]
+    wider = other.model_copy(update={"radius": 0.2})
+    assert context_pairs({"a": moved, "b": wider}) == []
+
+
+def test_lead_time_of_a_planted_divergence():
+    """Contexts part five ticks before the hit, far beyond the scatter."""
+    first = 0.01 * rng(4).standard_normal((12, 20, 3))
+    second = 0.01 * rng(5).standard_normal((12, 20, 3))
+    second[:, -6:, 1] += 1.0
+    assert lead_time(first, second, rng(), alpha=0.002) == 5
+    second[:, -1] = first[:, -1]  # together again at the hit: no lead counts
+    assert lead_time(first, second, rng()) is None
+    assert lead_time(first, first, rng()) is None
+
+
+# What the hand feels
+
+
+def test_movable_joints():
+    assert list(movable(load_task("two-armed-1"), "left")) == [0, 2, 3, 4, 5]  # y is locked
+    assert list(movable(load_task("ascending"), "right")) == [0, 1, 6, 7, 8, 9]
+
+
+JACOBIAN = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]])
+
+
+def test_motor_equivalence_by_hand():
+    """Nullspace: the last two joints; each part over the root of two dimensions."""
+    parts = motor_equivalence(np.array([1.0, 1.0, 3.0, 4.0]), JACOBIAN)
+    assert parts == pytest.approx((5 / math.sqrt(2), 1.0))
+    singular = motor_equivalence(np.array([1.0, 1.0, 3.0, 4.0]), JACOBIAN * [[1], [0]])
+    assert singular == pytest.approx((math.sqrt(26 / 3), 1.0))
+    assert math.isnan(motor_equivalence(np.ones(2), np.eye(2)).equivalent)
+
+
+def test_self_motion_of_the_robot_is_motor_equivalent():
+    """A small displacement that leaves the hand in place, and one that only moves it."""
+    task = load_task("ascending")
+    q = posture(1.0, right_1=0.4, right_2=-0.5, right_3=0.6)
+    joints = movable(task, "right")
+    jacobian = task.robot.jacobian(q, "right")[:, joints]
+    null, complement = subspaces(jacobian)
+    still, moving = np.array(q), np.array(q)
+    still[joints] += 1e-4 * null[:, 0]
+    moving[joints] += 1e-4 * complement[:, 0]
+    at = task.robot.forward_kinematics(np.array([q, still, moving]), "right")
+    assert np.linalg.norm(at[1] - at[0]) < 1e-7
+    assert np.linalg.norm(at[2] - at[0]) > 5e-5
+    found = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
+    assert found[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
+    assert found[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
+
+
+def test_synergy_by_hand():
+    """Two runs a coordinate: variances are known exactly."""
+    rows = np.diag([1.0, 1.0, 3.0, 3.0])
+    q = np.concatenate([rows, -rows])
+    found = synergy(q, JACOBIAN)
+    within, orthogonal = 2 * (9 + 9) / 7 / 2, 2 * (1 + 1) / 7 / 2
+    total = (within + orthogonal) / 2
+    assert found.within == pytest.approx(within)
+    assert found.orthogonal == pytest.approx(orthogonal)
+    assert found.delta == pytest.approx((within - orthogonal) / total)
+    n, d = 4, 2  # the printed transform
+    assert found.z == pytest.approx(0.5 * math.log((n / d + found.delta) / (n / d - found.delta)))
+    assert found.neutral == 0.0
+    assert found.low < found.z < found.high
+
+
+@given(st.integers(3, 8), st.integers(3, 30), st.integers(0, 10**6))
+def test_delta_stays_in_its_range_and_z_is_its_transform(joints, runs, seed):
+    draw = rng(seed)
+    jacobian, q = draw.standard_normal((2, joints)), draw.standard_normal((runs, joints))
+    found = synergy(q, jacobian)
+    assert -joints / 2 <= found.delta <= joints / (joints - 2)
+    ratio = (joints / 2 + found.delta) / (joints / (joints - 2) - found.delta)
+    assert found.z == pytest.approx(0.5 * math.log(ratio), rel=1e-6, abs=1e-9)
+    turned = synergy(q @ np.linalg.qr(draw.standard_normal((joints, joints)))[0], jacobian)
+    assert turned.within * (joints - 2) + turned.orthogonal * 2 == pytest.approx(
+        found.within * (joints - 2) + found.orthogonal * 2  # the total does not turn
+    )
+
+
+def test_jackknife_is_the_loop_over_runs():
+    q = rng(6).standard_normal((9, 4)) * [1, 1, 2, 3]
+    found = synergy(q, JACOBIAN)
+    without = [synergy(np.delete(q, k, axis=0), JACOBIAN).z for k in range(9)]
+    pseudo = 9 * found.z - 8 * np.array(without)
+    half = 2.3060041 * pseudo.std(ddof=1) / 3  # Student's t, 8 degrees of freedom
+    assert (found.low, found.high) == pytest.approx((found.z - half, found.z + half))
+
+
+def test_synergy_finds_what_is_planted():
+    null, complement = subspaces(signature_nulls._JACOBIAN)
+    runs = signature_nulls.normal(rng(7), 20)
+    quiet = synergy(runs, signature_nulls._JACOBIAN)
+    assert quiet.p > 0.05
+    assert quiet.low < quiet.neutral < quiet.high
+    squeezed = runs @ (null @ null.T + 0.2 * complement @ complement.T)
+    assert synergy(squeezed, signature_nulls._JACOBIAN).p < 1e-6
+    assert synergy(squeezed, signature_nulls._JACOBIAN).delta > 1.2
+    assert math.isnan(synergy(runs[:1], signature_nulls._JACOBIAN).delta)
+    assert math.isnan(synergy(runs[[0, 0, 0]], signature_nulls._JACOBIAN).delta)
+
+
+# Subtasks and hands
+
+
+def test_isolated_reaches_are_the_corrective_process():
+    task = load_task("two-armed-1")
+    alone = isolated_reaches(task, task.q0, 1)
+    for hand, letter in (("left", "L"), ("right", "R")):
+        assert alone[hand] == corrective_trial(task, letter + "RRR").ticks_by_goal()[0]
+    assert isolated_reaches(tiny_task(), posture(0.5, 0.9), 1)["right"] == 0
+    unreachable = changed("ascending", locked_base=["x", "y"])
+    assert isolated_reaches(unreachable, unreachable.q0, 3) == {}
+
+
+def test_the_corrective_process_has_no_excess_and_sacrifices_nothing():
+    task = load_task("ascending")
+    initial = corrective_trial(task, "RRR")
+    path = trajectory(task, initial.movements)
+    np.testing.assert_array_equal(excess(path), [0, 0, 0])
+    np.testing.assert_array_equal(change_from_initial(initial, initial), [0, 0, 0])
+    assert not sacrifices(initial, initial)
+
+
+def test_a_planted_sacrifice():
+    """Bending on the way to goal 1 costs there and leaves less to do for goal 2."""
+    task = tiny_task(goals=[[5.5, 0.1], [5.5, 1.1]], initial_hands="RR")
+    straight = execute(task, planned(posture(1.0), posture(1.0, 1.0), hands="RR"))
+    high = posture(1.05, 0.5, right_1=-0.125)
+    early = execute(task, planned(high, posture(1.0, 1.0), hands="RR"))
+    change = change_from_initial(early, straight)
+    assert change[0] > 0 > change[1]
+    assert sacrifices(early, straight) == (change.sum() < 0)
+    assert not sacrifices(straight, early)
+
+
+def test_the_learner_sacrifices_the_first_subtask():
+    """Shah, Barto & Fagg (2013), EC1."""
+    run = learn(load_task("ascending"), "EC1", seed=0, trials=4000)
+    learned, initial = execute(run.task, run.solution), corrective_trial(run.task, "RRR")
+    assert sacrifices(learned, initial)
+    assert excess(trajectory(run.task, run.solution))[0] > 0
+
+
+def test_entropy_of_hands():
+    assert entropy(["LR"] * 5) == 0.0
+    assert entropy(["LR", "RL"] * 4) == 1.0
+    assert entropy(["LL", "LR", "RL", "RR"]) == 2.0
+
+
+def test_choice_in_isolation():
+    """Each hand beside its goal: the near one is the isolated choice."""
+    start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
+    task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
+    assert isolated_agreement(trajectory(task, corrective_trial(task, "RL").movements)) == [
+        True,
+        True,
+    ]
+    assert isolated_agreement(trajectory(task, corrective_trial(task, "LR").movements))[0] is False
+
+
+def test_best_corrective_sequences():
+    table = pd.DataFrame(
+        {"task": ["t"] * 4 + ["u"], "hands": ["RR", "RL", "LR", "LL", "RR"],
+         "reward": pd.array([-9, -7, -7, None, -1], dtype="Int64")}
+    )  # fmt: skip
+    assert best_sequences(table, "t") == ["RL", "LR"]
+    assert best_sequences(table, "v") == []
+
+
+# The other arm
+
+
+def test_preshaping_and_travel():
+    """While the right hand works, the left one comes half the way to its goal."""
+    task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
+    initial = execute(task, planned(posture(1.0), posture(4.0), hands="RL"))
+    bent = posture(1.0, left_4=0.5)
+    path = trajectory(task, planned(bent, posture(4.0), hands="RL"))
+    left = [
+        task.robot.forward_kinematics(execution.configurations[0], "left") - [7.5, 0.1]
+        for execution in (path.execution, initial)
+    ]
+    found = preshaping(path, initial)
+    assert found[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
+    assert found[0] < 0  # bent away
+    assert math.isnan(found[1])
+    same = trajectory(task, planned(posture(1.0), posture(4.0), hands="RL"))
+    assert preshaping(same, initial)[0] == 0.0
+    assert travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
+    assert travel(path)[1] == 0.0  # the right arm, when the left hand works
+
+
+def test_travel_is_the_column_of_the_runs():
+    run = learn(load_task("two-armed-1"), "EC4", seed=3, trials=500)
+    path = trajectory(run.task, run.solution)
+    assert travel(path).sum() == pytest.approx(other_arm_travel(run.task, path.execution))
+    assert travel(path).sum() > 0
+
+
+# Form
+
+
+@pytest.mark.parametrize(
+    ("positions", "count"),
+    [
+        ([0, 1, 2, 3], 0),
+        ([0, 1, 0, 1], 2),
+        ([0, -1, -2, 0], 1),
+        ([0, 1, 0.995, 2], 0),  # jitter below the tolerance
+        ([0, 1, 1, 1, 0.5], 1),
+        ([0, 0.5, 1, 0.995, 0.99, 0.98, 0.97], 1),  # slowly, but back
+        ([2, 2, 2], 0),
+        ([0.0], 0),
+    ],
+)
+def test_base_reversals(positions, count):
+    x = np.array(positions, dtype=float)
+    assert base_reversals(x) == count
+    assert base_reversals(-x) == count
+
+
+def test_reversals_of_a_solution():
+    task = tiny_task(goals=[[5.5, 0.1], [4.7, 0.1]])
+    path = trajectory(task, planned(posture(1.0), posture(0.2), hands="RR"))
+    assert reversals_of(path) == (1, 0)
+
+
+def test_turning_angles():
+    corners = np.array([[0, 0], [1, 0], [2, 0], [2, 3], [2, 1], [2, 1], [5, 5.0]])
+    angles = turning_angles(corners)
+    np.testing.assert_allclose(angles[:3], [0, math.pi / 2, math.pi], atol=1e-12)
+    assert np.isnan(angles[3:]).all()
+
+
+def minimum_jerk(rows):
+    time = np.linspace(0, 1, rows)
+    return np.stack([10 * time**3 - 15 * time**4 + 6 * time**5, np.zeros(rows)], axis=1)
+
+
+def test_dimensionless_jerk_of_the_minimum_jerk_reach():
+    """720 over the squared peak speed of 15/8, at any size and duration."""
+    exact = 720 / (15 / 8) ** 2
+    assert dimensionless_jerk(minimum_jerk(2001)) == pytest.approx(exact, rel=2e-2)
+    assert dimensionless_jerk(7 * minimum_jerk(4001)) == pytest.approx(exact, rel=1e-2)
+    straight = np.stack([np.linspace(0, 5, 300), np.linspace(1, 2, 300)], axis=1)
+    assert dimensionless_jerk(straight) == 0.0
+    assert dimensionless_jerk(np.repeat(straight, 2, axis=0)) > exact
+    assert math.isnan(dimensionless_jerk(straight[:3]))
+    assert math.isnan(dimensionless_jerk(np.ones((50, 2))))
+
+
+def test_spectral_arc_length_of_a_gaussian_speed():
+    """Its spectrum is a Gaussian as well, whose arc length is an integral."""
+    sd, rate = 0.1, 100.0
+    time = np.arange(-200, 200) / rate
+    density = np.e ** (-(time**2) / (2 * sd**2))
+    path = np.stack([np.zeros(401), np.concatenate([[0], np.cumsum(density) / rate])], axis=1)
+    top = math.sqrt(-2 * math.log(0.05)) / (2 * math.pi * sd)  # amplitude falls to 5 % here
+
+    def slope(share):
+        u = 2 * math.pi * sd * top
+        return -(u**2) * share * math.e ** (-((u * share) ** 2) / 2)
+
+    exact = -integrate.quad(lambda share: math.hypot(1, slope(share)), 0, 1)[0]
+    assert spectral_arc_length(path) == pytest.approx(exact, rel=5e-3)
+    assert spectral_arc_length(9 * path) == pytest.approx(exact, rel=5e-3)
+    halting = np.concatenate([path, path[-1] + path])  # two bursts are less smooth
+    assert spectral_arc_length(halting) < exact - 1
+    assert math.isnan(spectral_arc_length(np.ones((50, 2))))
+
+
+def test_smoothness_leaves_out_what_does_not_move():
+    task = tiny_task(goals=[[5.5, 0.1], [5.5, 0.1]])
+    path = trajectory(task, planned(posture(1.0), posture(1.0), hands="RR"))
+    own = path.hand_path("right")[:91]
+    assert smoothness(path) == (pytest.approx(spectral_arc_length(own)), math.inf)
+
+
+# Locus
+
+
+def family_of(positions, goal=2, coordinate=1):
+    tasks = {}
+    for k, position in enumerate(positions):
+        goals = [[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]]
+        goals[goal - 1][coordinate] = position
+        tasks[f"v{k}"] = tiny_task(name=f"v{k}", goals=goals, initial_hands="RRR")
+    return tasks
+
+
+def test_families():
+    tasks = family_of([1.5, 2.0, 2.5, 3.5])
+    (family,) = families({**tasks, "ascending": load_task("ascending")})
+    assert family.moving == 2
+    assert family.tasks == ("v0", "v1", "v2", "v3")
+    np.testing.assert_allclose(family.positions, np.array([1.5, 2.0, 2.5, 3.5]) - 2.375)
+    assert families(family_of([1.5, 2.0])) == []
+    (across,) = families(family_of([4.0, 3.0, 5.0], goal=3, coordinate=0))
+    assert across.moving == 3
+    np.testing.assert_allclose(across.positions, [0, -1, 1], atol=1e-12)
+
+
+def test_two_families_share_their_common_task():
+    tasks = family_of([1.5, 2.0, 2.5]) | {
+        f"w{k}": task for k, task in enumerate(family_of([3.5, 4.0], goal=3).values())
+    }
+    assert {(f.moving, f.tasks) for f in families(tasks)} == {
+        (2, ("v0", "v1", "v2")),
+        (3, ("v1", "w0", "w1")),
+    }
+
+
+def test_locus_slopes():
+    places = np.repeat([-1.0, 0.0, 1.0, 2.0], 5)
+    noise = 0.1 * rng(8).standard_normal((20, 3))
+    q = noise + np.outer(places, [0.7, 0.0, -0.2])
+    q[:, 1] = 0.4
+    slopes = locus_slopes(q, places)
+    for slope, truth in zip(slopes, (0.7, 0.0, -0.2), strict=True):
+        assert slope.low <= truth <= slope.high
+    assert slopes[0].p < 1e-6
+    assert slopes[1] == (0.0, 0.0, 0.0, 1.0)
+    quiet = locus_slopes(noise, places)
+    assert all(slope.p > 0.05 for slope in quiet)
+    with pytest.raises(ValueError, match="a goal that moves"):
+        locus_slopes(q, np.ones(20))
+
+
+# The driver
+
+
+def results(folder, solved, runs=None):
+    """A results folder of ``(task, method, [movements of each run])``."""
+    rows, movements = [], []
+    tasks = {task.name: task for task, _, _ in solved}
+    for task, method, solutions in solved:
+        for run, solution in enumerate(solutions):
+            run_id = f"{task.name}-{method}-{run}"
+            execution = execute(task, solution)
+            rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
+                         "status": "ok", "run": run})  # fmt: skip
+            movements += [
+                {"run_id": run_id, **r} for r in movement_rows(task, execution.movements)
+            ]
+        if not solutions:
+            rows.append({"run_id": f"{task.name}-{method}", "task": task.name, "method": method,
+                         "variant": "", "status": "infeasible", "run": 0})  # fmt: skip
+    pd.DataFrame(movements).to_parquet(folder / "solutions.parquet")
+    pd.DataFrame({"run_id": []}).to_parquet(folder / "paths.parquet")
+    frame = pd.DataFrame(rows)
+    cells = frame[["task", "method", "variant"]].drop_duplicates().to_dict("records")
+    content = {"tasks": {n: json.loads(t.model_dump_json()) for n, t in tasks.items()}}
+    sequences = pd.DataFrame({"task": ["none"], "hands": ["R"], "reward": [-1]})
+    return Results(folder, {"specification": {**content, "cells": cells}}, frame, sequences)
+
+
+def test_frame_of_two_contexts(tmp_path):
+    """The learner depends on context, the corrective process does not."""
+    tasks = [load_task("ascending"), load_task("descending")]
+    solved = []
+    for task in tasks:
+        runs = [learn(task, "EC1", seed=seed, trials=1500) for seed in range(5)]
+        solved += [
+            (task, "learner", [run.solution for run in runs]),
+            (task, "corrective", [corrective_trial(task, "RRR").movements]),
+            (task, "failed", []),
+        ]
+    folder = results(tmp_path, solved)
+    frame = signatures_frame(folder)
+    assert frame.equals(signatures_frame(folder))  # nothing random but by the seed
+
+    def one(method, signature):
+        rows = frame[(frame.task == "ascending") & (frame.method == method)]
+        return rows[rows.signature == signature].iloc[0]
+
+    assert one("learner", "context dependence").p < 0.02  # 2 of 252 at best
+    assert one("learner", "motor-equivalent part").value > 5 * (
+        one("learner", "non-motor-equivalent part").value
+    )
+    assert one("corrective", "context distance").value == 0
+    assert one("corrective", "context dependence").why_not.startswith("one run a context")
+    assert one("learner", "first subtask sacrificed").value == 1
+    assert one("learner", "total against initial").high < 0
+    assert one("learner", "hand entropy").why_not == "the task has one hand"
+    assert one("failed", "total against initial").why_not == "no run has a solution"
+    assert one("learner", "locus slope").why_not.startswith("fewer than 3 tasks")
+    # A row has a value, or says why it has none.
+    assert (frame.value.notna() | (frame.why_not != "")).all()
+    intervals = frame[frame.low.notna()]
+    assert (intervals.low <= intervals.value + 1e-9).all()
+    assert (intervals.value <= intervals.high + 1e-9).all()
+    assert set(frame.method) == {"learner", "corrective", "failed"}
+
+
+def test_frame_of_a_family(tmp_path):
+    """The base is lower at goals 1 and 3 by a tenth of goal 2's height: slopes are known."""
+    solved = []
+    for task in family_of([1.5, 2.0, 2.5]).values():
+        height = task.goals[1][1]
+        lower = 0.02 * (height - 2.0)
+        targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
+        solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
+    frame = signatures_frame(results(tmp_path, solved))
+    slopes = frame[frame.signature == "locus slope"].set_index("where")
+    reached = {
+        goal: [
+            execute(task, solution[0]).configurations[goal - 1, 1] for task, _, solution in solved
+        ]
+        for goal in (1, 3)
+    }
+    for goal, kind in ((1, "anticipatory"), (3, "carry-over")):
+        row = slopes.loc[f"goal {goal}, {kind} of goal 2, right hand, base_y"]
+        assert row.value == pytest.approx(reached[goal][2] - reached[goal][0])  # over length 1
+        assert row.n == 6
+    assert slopes.loc["goal 1, anticipatory of goal 2, right hand, base_y"].value > 0.001
+    contexts = frame[frame.signature == "context distance"]
+    assert (contexts.why_not != "").all()  # a family is compared by its slopes
+
+
+def test_cells_put_like_sequences_together():
+    task = load_task("two-armed-2")
+    runs = tuple(
+        trajectory(task, corrective_trial(task, hands).movements)
+        for hands in ("RRRR", "RLRR", "RLRR")
+    )
+    cell = Cell(task, "m", "", runs)
+    assert cell.sequences == ["RRRR", "RLRR", "RLRR"]
+    assert [run.execution.hands for run in cell.typical] == ["RLRR", "RLRR"]
+    assert len(cell.with_hand("left", 2)) == 2
+    assert cell.initial.hands == "RRRR"
+
+
+def test_nulls_are_nulls():
+    """Every simulated null has mean zero or equal variances, and rejects sometimes only."""
+    names = [null.name for null in signature_nulls.nulls()]
+    assert len(set(names)) == len(names)
+    null, complement = signature_nulls._NULLSPACE, signature_nulls._RANGE
+    scatter = signature_nulls.correlated(rng(9), 40_000)
+    per_dimension = [(scatter @ basis).var() for basis in (null, complement)]
+    assert per_dimension[0] == pytest.approx(per_dimension[1], rel=0.03)
+    for test in signature_nulls.nulls():
+        if "20 and 20 runs" in test.name or "ΔV" in test.name:
+            share, _, _ = signature_nulls.rate(test, 60)
+            assert share < 0.2
