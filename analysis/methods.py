@@ -121,6 +121,16 @@ def methods_notes(results: Results) -> list[str]:
     return notes
 
 
+def solve_times(runs: pd.DataFrame) -> pd.Series:
+    """Wall time of solving, s: of runs in a warm process, or of all where there are none.
+
+    ``runs`` have a solution. Their whole time stands for methods that mark no solving.
+    """
+    warm = runs.warm.astype(bool)
+    times: pd.Series = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
+    return times[warm] if warm.any() else times
+
+
 def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str, Any]:
     good = cell.good
     rewards = good.reward.to_numpy(dtype=np.float64)
@@ -131,7 +141,6 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
     best_still = references.get((cell.task, "still")) if still and not locked else None
     mean = float(rewards.mean()) if len(rewards) else math.nan
     told = set(cell.runs.told.iloc[0].split(", ")) if len(cell.runs) else set()
-    solve = good.solve_s.where(good.solve_s > 0, good.wall_s)[_warm(good)]
     return {
         "task": cell.task,
         "method": cell.method,
@@ -155,7 +164,7 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
         "corrections": int(good.solution_corrections.sum()) if len(good) else 0,
         **{name: _median(cell.runs[name]) for name in _SPENT},
         "build_s": _median(cell.runs.build_s),
-        "solve_s": _median(solve),
+        "solve_s": _median(solve_times(good)),
     }
 
 
@@ -163,12 +172,6 @@ def _median(values: pd.Series) -> float:
     """NaN where there is no value, as for runs that crashed."""
     known = values.dropna()
     return float(known.median()) if len(known) else math.nan
-
-
-def _warm(runs: pd.DataFrame) -> pd.Series:
-    """Runs to take times from: those in a warm process, or all where there are none."""
-    warm = runs.warm.astype(bool)
-    return warm if warm.any() else ~warm
 
 
 def _cells(row: Mapping[Any, Any]) -> tuple[str, ...]:

@@ -1,0 +1,351 @@
+"""Reward against spend on constructed runs: curves, areas, targets, Pareto sets."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import bootstrap
+
+from analysis.frontier import (
+    anytime_frame,
+    area_frame,
+    dominated,
+    draw_anytime,
+    pareto_frame,
+    pareto_tables,
+    targets_frame,
+    targets_tables,
+)
+from analysis.progress import SPENDS, by_trial, progress
+from analysis.results import Results
+from coartic import load_task
+
+BEST = -465  # proven optimum of two-armed 1
+NAN = math.nan
+
+
+def run(method, rewards=None, *, reward=None, number=0, **more):
+    """A row of runs.parquet; ``rewards`` by trial, NaN where it failed."""
+    learned = [] if rewards is None else rewards
+    done = [value for value in learned if not math.isnan(value)]
+    reward = max(done, default=None) if reward is None else reward
+    return {
+        "rewards": learned, "task": "two-armed-1", "method": method, "variant": "",
+        "run": number, "run_id": f"{method}-{number}", "status": "ok" if reward else "infeasible",
+        "reason": "", "reward": reward, "hands": "LRLR", "parameters": "{}",
+        "told": "corrective process, reward by trial", "trials": len(learned),
+        "movement_ticks": -sum(done), "forward_kinematics": 100 * max(1, len(learned)),
+        "jacobians": 10 * max(1, len(learned)), "solver_iterations": 0, "build_s": 0.0,
+        "solve_s": 0.5, "wall_s": 1.0, "warm": True, "solution_corrections": 0,
+        "other_arm_travel": 0.0, "proven_bound": None, **more,
+    }  # fmt: skip
+
+
+def folder(rows, tmp_path):
+    learning = pd.DataFrame(
+        [
+            {"run_id": row["run_id"], "trial": trial, "reward": reward}
+            for row in rows
+            for trial, reward in enumerate(row["rewards"])
+        ],
+        columns=["run_id", "trial", "reward"],
+    ).astype({"reward": "Int32"})
+    learning.to_parquet(tmp_path / "learning.parquet")
+    counts = ("reward", "proven_bound", "trials", "movement_ticks", "forward_kinematics")
+    runs = pd.DataFrame(rows).drop(columns="rewards").astype(dict.fromkeys(counts, "Int64"))
+    task = load_task("two-armed-1")
+    cells = runs[["task", "method", "variant"]].drop_duplicates().to_dict("records")
+    specification = {"tasks": {task.name: task.model_dump(mode="json")}, "cells": cells}
+    return Results(tmp_path, {"specification": specification}, runs, pd.DataFrame())
+
+
+def of(frame, method, spend="trials"):
+    return frame[(frame.method == method) & (frame.spend == spend)]
+
+
+def totals(ticks, trials):
+    return {
+        "trials": trials, "movement_ticks": ticks, "forward_kinematics": 50.0, "solve_s": 1.0,
+    }  # fmt: skip
+
+
+# Progress
+
+
+def test_steps_of_a_run_with_failed_trials():
+    """The failed trials share the ticks that the others leave: (62 - 38) / 2 each."""
+    found = by_trial(np.array([NAN, -10, NAN, -12, -8, -8]), totals(62.0, 6.0))
+    assert found.rewards.tolist() == [-10, -8]
+    assert found.spent["trials"].tolist() == [2, 5]
+    assert found.spent["movement_ticks"].tolist() == [22, 54]
+    assert found.spent["forward_kinematics"] == pytest.approx([50 * 2 / 6, 50 * 5 / 6])
+
+
+trial_rewards = st.lists(st.one_of(st.just(NAN), st.integers(-30, -1)), min_size=1, max_size=30)
+
+
+@given(trial_rewards)
+def test_the_best_within_a_budget_is_that_of_the_trials_it_pays(rewards):
+    """Failed trials took 7 ticks each, and every trial its share of 50 evaluations."""
+    cost = [7 if math.isnan(r) else -r for r in rewards]
+    found = by_trial(np.array(rewards, dtype=float), totals(float(sum(cost)), len(rewards)))
+    for budget in range(len(rewards) + 1):
+        best = max((r for r in rewards[:budget] if not math.isnan(r)), default=-math.inf)
+        paid = {
+            "trials": budget,
+            "movement_ticks": sum(cost[:budget]),
+            "forward_kinematics": 50 * budget / len(rewards),
+        }
+        for spend, amount in paid.items():
+            assert found.best(spend, np.array([amount + 1e-6])) == best
+    assert (np.diff(found.rewards) > 0).all()
+
+
+# Anytime curves
+
+
+def test_a_mean_waits_for_the_slowest_run(tmp_path):
+    rows = [
+        run("m", [-600.0, -500.0, -500.0, -480.0], number=0),
+        run("m", [NAN, NAN, -520.0, -500.0], number=1),
+    ]
+    curve = of(anytime_frame(folder(rows, tmp_path)), "m").set_index("budget")
+    assert curve.index.tolist() == [1, 2, 3, 4]
+    assert curve.solved.tolist() == [1, 1, 2, 2]
+    assert curve["mean"].isna().tolist() == [True, True, False, False]
+    assert curve.loc[[3, 4], "mean"].tolist() == [-510, -490]
+    assert curve.loc[4, ["low", "high"]].tolist() == [-500, -480]
+    assert curve["median"].isna().tolist() == [True, True, False, False]
+
+
+def test_a_curve_ends_with_the_first_run_that_does(tmp_path):
+    rows = [
+        run("m", [-500.0] * 10, number=0),
+        run("m", [-490.0] * 10, number=1),
+    ]
+    curve = of(anytime_frame(folder(rows, tmp_path)), "m", "movement_ticks")
+    assert curve.budget.iloc[[0, -1]].tolist() == [490, 4900]
+    assert curve["mean"].isna().sum() == (curve.budget < 500).sum() > 0
+    assert (curve["mean"].dropna() == -495).all()
+
+
+def test_planners_are_points(tmp_path):
+    rows = [
+        run("planner", reward=-480, number=0, forward_kinematics=300),
+        run("planner", reward=-470, number=1, forward_kinematics=500),
+        run("sometimes", reward=-470, number=0),
+        run("sometimes", number=1),
+    ]
+    frame = anytime_frame(folder(rows, tmp_path))
+    assert set(frame.kind) == {"point"}
+    point = of(frame, "planner", "forward_kinematics").squeeze()
+    assert (point.budget, point["mean"], point["median"]) == (400, -475, -475)
+    assert of(frame, "planner").budget.tolist() == [0]
+    half = of(frame, "sometimes").squeeze()
+    assert (half.runs, half.solved) == (2, 1)
+    assert math.isnan(half["mean"])
+
+
+def test_intervals_are_those_of_the_percentile_bootstrap(tmp_path):
+    rng = np.random.default_rng(0)
+    last = rng.integers(-600, -470, size=20).astype(float)
+    rows = [run("m", [-700.0, value], number=i) for i, value in enumerate(last)]
+    results = folder([*rows, run("other", [-500.0])], tmp_path)
+    frame = anytime_frame(results, seed=3)
+    found = of(frame, "m").iloc[-1]
+    expected = bootstrap(
+        (last,), np.mean, method="percentile", n_resamples=20_000, rng=rng
+    ).confidence_interval
+    assert (found.low, found.high) == pytest.approx(tuple(expected), abs=0.1 * last.std())
+    alone = anytime_frame(folder(rows, tmp_path), seed=3)
+    pd.testing.assert_frame_equal(alone, frame[frame.method == "m"])
+    assert of(frame, "other")[["low", "high"]].isna().all(axis=None)
+
+
+def test_cold_runs_have_no_part_in_times_alone(tmp_path):
+    rows = [run("m", [-500.0], number=0, warm=False), run("m", [-480.0], number=1)]
+    frame = anytime_frame(folder(rows, tmp_path))
+    assert of(frame, "m").runs.tolist() == [2]
+    assert set(of(frame, "m", "solve_s").runs) == {1}
+
+
+# Areas
+
+
+def test_areas_in_closed_form(tmp_path):
+    """16 trials: a step at trial 4 comes halfway through the logarithm."""
+    half = [-930.0] * 3 + [-465.0] * 13  # a gap of 1, then of 0
+    rows = [
+        run("half", half),
+        run("constant", [1.2 * BEST] * 16),
+        run("worse than none", [4.0 * BEST] * 16),
+        run("planner", reward=BEST),
+        run("nothing"),
+        run("ended", [1.2 * BEST] * 4),
+        run("late", [NAN] * 7 + [BEST] * 9),
+    ]
+    frame = area_frame(folder(rows, tmp_path))
+    areas = frame[frame.spend == "trials"].set_index("method").area
+    assert areas["half"] == pytest.approx(0.5)
+    assert areas["constant"] == areas["ended"] == pytest.approx(0.2)
+    assert areas["worse than none"] == areas["nothing"] == 1
+    assert areas["planner"] == 0
+    assert areas["late"] == pytest.approx(0.75)
+    assert frame.area.between(0, 1).all()
+
+
+@settings(max_examples=20)
+@given(st.lists(st.integers(-1200, BEST), min_size=2, max_size=12))
+def test_areas_are_integrals(tmp_path_factory, rewards):
+    results = folder([run("m", [float(r) for r in rewards])], tmp_path_factory.mktemp("area"))
+    steps = progress(results)
+    logs = np.linspace(0, math.log(len(rewards)), 20_001)
+    middle = np.exp((logs[1:] + logs[:-1]) / 2)
+    gaps = np.minimum(1, (BEST - steps["m-0"].best("trials", middle)) / -BEST)
+    found = of(area_frame(results, steps), "m").area.item()
+    assert found == pytest.approx(gaps.mean(), abs=2e-3)
+
+
+# Targets
+
+
+def test_runs_that_never_reach_a_target_count(tmp_path):
+    """Within 5 % of -465 is -488: three of four reach it, the last one is censored."""
+    rows = [
+        run("m", [-500.0, -488.0, -488.0, -488.0], number=0),
+        run("m", [-500.0, -489.0, -488.0, -465.0], number=1),
+        run("m", [-500.0, -489.0, -489.0, -488.0], number=2),
+        run("m", [-500.0, -489.0, -489.0, -489.0], number=3),
+    ]
+    found = of(targets_frame(folder(rows, tmp_path)), "m").set_index("share")
+    assert found.target.tolist() == [-488, -474, -469]
+    assert found.reached.tolist() == [3, 1, 1]
+    assert found["median"].tolist() == [3, math.inf, math.inf]
+    assert found.horizon.tolist() == [4, 4, 4]
+    # Clopper & Pearson's limits for 3 of 4: 0.194 and 0.994.
+    assert found.loc[0.05, ["reached_low", "reached_high"]].tolist() == pytest.approx(
+        [0.1941, 0.9937], abs=1e-4
+    )
+
+
+def test_ends_that_depend_on_rewards_do_not_make_medians(tmp_path):
+    """Nine runs end without the target before one that reaches it: no median of it alone."""
+    rows = [run("m", [-500.0] * 10, number=i) for i in range(9)]
+    rows.append(run("m", [-900.0] * 9 + [-470.0], number=9))
+    results = folder(rows, tmp_path)
+    for spend in ("movement_ticks", "trials"):
+        found = of(targets_frame(results), "m", spend).iloc[0]
+        assert (found.reached, found["median"]) == (1, math.inf)
+    found = of(targets_frame(results), "m", "movement_ticks").iloc[0]
+    assert (found.low, found.horizon) == (math.inf, 5000)
+
+
+def test_planners_that_miss_never_reach_it(tmp_path):
+    """Those that missed were quicker: dropped from the runs at risk, half of the runs
+    would look like all of them."""
+    rows = [run("p", reward=-470, number=i, forward_kinematics=500) for i in range(4)]
+    rows += [run("p", reward=-600, number=4 + i, forward_kinematics=100) for i in range(5)]
+    rows += [run("p", number=9, forward_kinematics=None)]
+    found = of(targets_frame(folder(rows, tmp_path)), "p", "forward_kinematics").iloc[0]
+    assert (found.runs, found.reached, found["median"]) == (10, 4, math.inf)
+    rows[4]["reward"] = -480
+    found = of(targets_frame(folder(rows, tmp_path)), "p", "forward_kinematics").iloc[0]
+    assert (found.reached, found["median"]) == (5, 500)
+
+
+def test_targets_of_the_restricted_optimum(tmp_path):
+    rows = [run("still", [-490.0]), run("moving", [-490.0], other_arm_travel=0.1)]
+    results = folder(rows, tmp_path)
+    assert of(targets_frame(results), "still").reached.tolist() == [0, 0, 0]
+    frame = targets_frame(results, other_arm="still")
+    assert of(frame, "still").reached.tolist() == [1, 1, 1]
+    assert of(frame, "still").target.tolist() == [-514, -499, -494]
+    assert not len(of(frame, "moving"))
+
+
+@settings(max_examples=20)
+@given(trial_rewards, st.sampled_from(SPENDS))
+def test_nearer_targets_take_longer(tmp_path_factory, rewards, spend):
+    rewards = [BEST + 10 * value for value in rewards]
+    results = folder([run("m", rewards)], tmp_path_factory.mktemp("near"))
+    found = of(targets_frame(results, shares=[0.5, 0.2, 0.1, 0.05, 0.01]), "m", spend)
+    assert (np.diff(found.reached) <= 0).all()
+    times = found["median"].to_numpy()
+    assert (times[1:] >= times[:-1]).all()
+
+
+def test_what_the_target_table_shows(tmp_path):
+    rows = [run("m", [-600.0] * 9 + [-470.0], number=i) for i in range(8)]
+    rows += [run("m", [-600.0] * 10, number=8), run("p", reward=-470)]
+    (table,) = targets_tables(folder(rows, tmp_path))
+    assert table.columns == ("method", "within 5 %: -488", "within 2 %: -474", "within 1 %: -469")
+    assert table.rows[0] == ("m", "8/9, 10 [10, 10]", "8/9, 10 [10, 10]", "0/9")
+    assert table.rows[1] == ("p", "1/1, 0", "1/1, 0", "0/1")
+    rows = [run("m", [-600.0, -470.0 if i < 2 else -600.0], number=i) for i in range(20)]
+    (table,) = targets_tables(folder(rows, tmp_path))
+    assert table.rows[0][1] == "2/20, > 2"
+
+
+# Pareto sets
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12))
+def test_domination_by_brute_force(points):
+    reward, amount = np.array(points, dtype=float).T
+    for i, (reward_i, amount_i) in enumerate(points):
+        for j, (reward_j, amount_j) in enumerate(points):
+            better = reward_j >= reward_i and amount_j <= amount_i and points[i] != points[j]
+            assert dominated(reward, amount)[i, j] == better
+
+
+def test_fronts(tmp_path):
+    rows = [
+        run("cheap", reward=-600, told="goals", forward_kinematics=10),
+        run("twin", reward=-600, told="goals", forward_kinematics=10),
+        run("good", reward=-470, told="goals, Jacobian", forward_kinematics=90),
+        run("wasteful", reward=-480, told="goals", forward_kinematics=95),
+        run("beaten", reward=-610, told="goals, Jacobian", forward_kinematics=12),
+        run("lucky", reward=-465, told="goals", forward_kinematics=1),
+        run("lucky", told="goals", number=1, forward_kinematics=1),
+    ]
+    frame = pareto_frame(folder(rows, tmp_path))
+    assert "lucky" not in set(frame.method)
+    found = frame[frame.spend == "forward_kinematics"].set_index("method")
+    assert set(found.index[found.front]) == {"cheap", "twin", "good"}
+    assert set(found.index[found.front_told]) == {"cheap", "twin", "good", "wasteful"}
+    kinds = frame[frame.spend == "information"].set_index("method")
+    assert kinds.amount.to_dict() == {
+        "good": 2, "wasteful": 1, "cheap": 1, "twin": 1, "beaten": 2,
+    }  # fmt: skip
+    assert set(kinds.index[kinds.front]) == {"good", "wasteful"}
+    (table,) = pareto_tables(folder(rows, tmp_path))
+    shown = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
+    assert set(shown) == {"good", "wasteful", "cheap", "twin"}
+    assert shown["wasteful"]["kinematics"] == "95 ○"
+    assert shown["good"]["kinematics"] == "90 ●"
+
+
+def test_an_empty_folder_gives_empty_frames(tmp_path):
+    results = folder([run("nothing")], tmp_path)
+    results = Results(
+        tmp_path,
+        {"specification": {**results.manifest["specification"], "cells": []}},
+        results.runs[:0],
+        results.sequences,
+    )
+    for frame in (anytime_frame(results), area_frame(results), targets_frame(results)):
+        assert not len(frame)
+        assert {"task", "method", "spend"} <= set(frame.columns)
+
+
+def test_a_drawing_of_curves(tmp_path):
+    rows = [run("m", [-600.0, -500.0, -480.0], number=i) for i in range(3)]
+    results = folder([*rows, run("p", reward=-470)], tmp_path)
+    draw_anytime(results, "two-armed-1", tmp_path / "curves.svg", methods=["m", "p"])
+    text = (tmp_path / "curves.svg").read_text()
+    assert all(f"<!-- {label} -->" in text for label in ("m", "p", "optimum", "trials"))
+    with pytest.raises(ValueError, match="no curve of task 'ascending'"):
+        draw_anytime(results, "ascending", tmp_path / "none.png")
