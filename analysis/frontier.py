@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from analysis.methods import methods_frame
+from analysis.methods import STILL, methods_frame
 from analysis.optimum import optima
 from analysis.progress import SPENDS, Array, Progress, progress
 from analysis.results import CellRuns, Results
@@ -228,7 +228,10 @@ def pareto_frame(results: Results) -> pd.DataFrame:
     """
     methods = methods_frame(results)
     methods = methods[(methods.solved == methods.runs) & (methods.runs > 0)]
-    methods = methods.assign(information=methods.told.str.len().astype(float))
+    methods = methods.assign(
+        method=(methods.method + " " + methods.variant).str.strip(),
+        information=methods.told.str.len().astype(float),
+    )
     parts = []
     for _, rows in methods.groupby("task", sort=False):
         reward, told = rows.reward.to_numpy(), [frozenset(letters) for letters in rows.told]
@@ -306,6 +309,27 @@ def pareto_tables(results: Results) -> list[Table]:
     return tables
 
 
+def frontier_page(results: Results) -> str:
+    """Targets over trials and Pareto sets as a Markdown page."""
+    steps = progress(results)
+    tables = [
+        *targets_tables(results, steps),
+        *targets_tables(results, steps, other_arm="still"),
+        *pareto_tables(results),
+    ]
+    parts = [
+        "# Reward and what it costs",
+        "Targets: runs that came within a share of the optimum, of all runs; median trials with "
+        "its 95 % interval over all runs (Kaplan-Meier; those that could have gone on are "
+        "censored, the others never reach it). Pareto sets: ● no method has a mean reward as high "
+        "for as little spend, ○ none that was told no more. Spend is the median over runs; early "
+        "kinematics and time are spread evenly over a run's trials. docs/results.md says more.",
+    ]
+    for table in tables:
+        parts += [f"## {table.title}", table.to_markdown()]
+    return "\n\n".join(parts) + "\n"
+
+
 def _selected(
     results: Results, steps: Steps | None
 ) -> Iterator[tuple[CellRuns, str, list[Progress]]]:
@@ -319,7 +343,7 @@ def _selected(
 
 def _comparable(cell: CellRuns, other_arm: OtherArm) -> bool:
     """Whether a method's solutions keep to the restriction of an optimum."""
-    return other_arm == "free" or bool((cell.good.other_arm_travel == 0.0).all())
+    return other_arm == "free" or bool((cell.good.other_arm_travel <= STILL).all())
 
 
 def _budgets(runs: Sequence[Progress], spend: str) -> Array:

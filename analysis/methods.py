@@ -27,7 +27,7 @@ TOLD = {
     Information.SECONDARY_OBJECTIVES: "S",
 }
 """A letter for each kind of information, in the order in which the tables show them."""
-_STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
+STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 _SPENT = (
     "trials",
     "movement_ticks",
@@ -134,7 +134,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str, Any]:
     good = cell.good
     rewards = good.reward.to_numpy(dtype=np.float64)
-    still = bool(len(good)) and bool((good.other_arm_travel <= _STILL).all())
+    still = bool(len(good)) and bool((good.other_arm_travel <= STILL).all())
     # A base that is locked by a parameter is another problem, with another optimum.
     locked = set(good.parameters.map(lambda text: json.loads(text).get("base", BASE))) - {BASE}
     best = None if locked else references.get((cell.task, "free"))

@@ -291,6 +291,46 @@ def _applicable(entry: Entry, tasks: list[Task]) -> str:
 
 
 @app.command()
+def analyse(
+    folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
+) -> None:
+    """Signatures, claims and the reward-compute frontier of a results folder."""
+    from analysis.claims import claims_page, judge
+    from analysis.frontier import (
+        area_frame,
+        frontier_page,
+        pareto_frame,
+        targets_frame,
+    )
+    from analysis.results import load_results
+    from analysis.signatures import signatures_frame
+    from benchmarks.store import write_atomically
+
+    results = load_results(folder)
+    judged = judge(results)
+    pages = {"claims.md": claims_page(results, judged), "frontier.md": frontier_page(results)}
+    frames = {
+        "signatures.csv": signatures_frame(results),
+        "targets.csv": targets_frame(results),
+        "areas.csv": area_frame(results),
+        "pareto.csv": pareto_frame(results),
+    }
+    pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
+    try:
+        for name, text in pages.items():
+            write_atomically(folder / name, text.encode())
+    except OSError as error:
+        raise CoarticError(f"cannot write to {folder}: {error.strerror or error}") from None
+    _print(
+        _console(),
+        "Claims",
+        ("claim", "verdict", "evidence"),
+        [(entry.claim.id, entry.verdict, entry.evidence) for entry in judged],
+    )
+    print(f"In {folder}: {', '.join(pages)}.")
+
+
+@app.command()
 def show(
     run_id: Annotated[str, typer.Argument(help="Id of a run, or its beginning.")],
     folder: Records = Path("results"),
