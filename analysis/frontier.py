@@ -19,6 +19,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from analysis.methods import STILL, methods_frame
+from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import optima
 from analysis.progress import SPENDS, Array, Progress, progress
 from analysis.results import CellRuns, Results
@@ -224,10 +225,12 @@ def pareto_frame(results: Results) -> pd.DataFrame:
     it was not.
 
     Methods with runs that have no solution are left out: a mean of the others flatters
-    them. Means are taken as they are, without their sampling error.
+    them. So are the optimum's searches, which are references. Means are taken as they are,
+    without their sampling error.
     """
     methods = methods_frame(results)
     methods = methods[(methods.solved == methods.runs) & (methods.runs > 0)]
+    methods = methods[~methods.method.str.startswith(OPTIMUM)]
     methods = methods.assign(
         method=(methods.method + " " + methods.variant).str.strip(),
         information=methods.told.str.len().astype(float),
@@ -322,7 +325,8 @@ def frontier_page(results: Results) -> str:
         "Targets: runs that came within a share of the optimum, of all runs; median trials with "
         "its 95 % interval over all runs (Kaplan-Meier; those that could have gone on are "
         "censored, the others never reach it). Pareto sets: ● no method has a mean reward as high "
-        "for as little spend, ○ none that was told no more. Spend is the median over runs; early "
+        "for as little spend, ○ none that was told no more; methods with a run that has no "
+        "solution, and the optimum's searches, are left out. Spend is the median over runs; early "
         "kinematics and time are spread evenly over a run's trials. docs/results.md says more.",
     ]
     for table in tables:

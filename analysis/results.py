@@ -11,6 +11,8 @@ import pandas as pd
 
 from coartic import CoarticError, Task, parse_task
 
+FORMAT = 3  # of the tables, as benchmarks.tables writes them
+
 
 @dataclass(frozen=True)
 class CellRuns:
@@ -90,4 +92,9 @@ def load_results(folder: Path) -> Results:
         ) from None
     except (OSError, ValueError) as error:
         raise CoarticError(f"{folder}: results cannot be read: {error}") from None
+    if manifest.get("format") != FORMAT:
+        raise CoarticError(
+            f"{folder}: its tables have format {manifest.get('format')}, this version reads "
+            f"{FORMAT}; run the same `coartic run` again to make them anew from the records"
+        )
     return Results(folder, manifest, runs, sequences)
