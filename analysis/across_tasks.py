@@ -55,6 +55,8 @@ def scores_frame(results: Results) -> pd.DataFrame:
         rewards = cell.runs.reward.where(cell.runs.status == "ok")
         values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
         top = best[cell.task, "free"].reward
+        if top in (0, start):  # nothing to fall short of, or to gain
+            continue
         parts.append(
             pd.DataFrame(
                 {

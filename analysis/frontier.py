@@ -129,7 +129,9 @@ def area_frame(
     for cell, spend, runs in selected:
         optimum = references.get((cell.task, other_arm))
         end, trials = ends[cell.task, spend], ends[cell.task, "trials"]
-        if optimum is None or not runs or trials <= 1 or not _comparable(cell, other_arm):
+        if optimum is None or not optimum.reward or not runs:  # nothing to fall short of
+            continue
+        if trials <= 1 or not _comparable(cell, other_arm):
             continue
         start = end / trials
         areas = np.array([[_area(run, spend, optimum.reward, start, end)] for run in runs])
