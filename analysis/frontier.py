@@ -8,6 +8,7 @@ once.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -436,6 +437,9 @@ def _number(value: float) -> str:
     return f"{value:.3g}"
 
 
+_DASHES = ("-", "--", ":")  # after every ten colours
+
+
 def draw_anytime(
     results: Results,
     task: str,
@@ -457,15 +461,16 @@ def draw_anytime(
     frame = frame[frame.kind == "curve" if methods is None else frame.method.isin(methods)]
     if not len(frame):
         raise ValueError(f"no curve of task {task!r} over {spend!r}")
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = Figure(figsize=(10, 5.5), layout="constrained")
     axes = figure.subplots()
-    for method, rows in frame.groupby("method", sort=False):
+    dashes = itertools.chain.from_iterable([style] * 10 for style in itertools.cycle(_DASHES))
+    for (method, rows), style in zip(frame.groupby("method", sort=False), dashes, strict=False):
         budget, mean = rows.budget.to_numpy(), rows["mean"].to_numpy()
         if len(rows) == 1 and budget[0] == 0:
             axes.axhline(mean[0], linestyle=":", linewidth=1, label=str(method), color="0.5")
             continue
         (line,) = axes.step(
-            budget, mean, "-" if len(rows) > 1 else "o", where="post", label=str(method)
+            budget, mean, style if len(rows) > 1 else "o", where="post", label=str(method)
         )
         axes.fill_between(
             budget, rows.low, rows.high, step="post", alpha=0.2, color=line.get_color()
@@ -477,5 +482,5 @@ def draw_anytime(
     axes.set_xlabel(LABELS[spend])
     axes.set_ylabel("best reward so far")
     axes.set_title(task, loc="left", parse_math=False)
-    axes.legend(fontsize=8, frameon=False)
+    figure.legend(fontsize=7, frameon=False, loc="outside right upper")
     figure.savefig(path, dpi=150)
