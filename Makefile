@@ -13,7 +13,7 @@ benchmark: $(READY)
 	$(BIN)/coartic run paper --out $(OUT)
 
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto
 
 check: $(READY)
 	$(BIN)/ruff format --check .
