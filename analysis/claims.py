@@ -184,9 +184,14 @@ class Data:
         return {str(key): value for key, value in rows.iloc[0].items()}
 
 
-def judge(results: Results, claims: Iterable[Claim] | None = None) -> list[Judged]:
-    """Every claim with its verdict, p-values corrected over all of them (Holm)."""
-    data = Data(results)
+def judge(
+    results: Results, claims: Iterable[Claim] | None = None, *, data: Data | None = None
+) -> list[Judged]:
+    """Every claim with its verdict, p-values corrected over all of them (Holm).
+
+    ``data`` keeps what was computed of the same results, for whoever needs it as well.
+    """
+    data = Data(results) if data is None else data
     found: list[tuple[Claim, Finding]] = []
     for claim in CLAIMS if claims is None else claims:
         data.used.clear()

@@ -315,9 +315,8 @@ def pareto_tables(results: Results) -> list[Table]:
     return tables
 
 
-def frontier_page(results: Results) -> str:
+def frontier_page(results: Results, steps: Steps) -> str:
     """Targets over trials and Pareto sets as a Markdown page."""
-    steps = progress(results)
     tables = [
         *targets_tables(results, steps),
         *targets_tables(results, steps, other_arm="still"),

@@ -295,24 +295,28 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims and the reward-compute frontier of a results folder."""
-    from analysis.claims import claims_page, judge
+    from analysis.claims import Data, claims_page, judge
     from analysis.frontier import (
         area_frame,
         frontier_page,
         pareto_frame,
         targets_frame,
     )
+    from analysis.progress import progress
     from analysis.results import load_results
-    from analysis.signatures import signatures_frame
     from benchmarks.store import write_atomically
 
     results = load_results(folder)
-    judged = judge(results)
-    pages = {"claims.md": claims_page(results, judged), "frontier.md": frontier_page(results)}
+    data, steps = Data(results), progress(results)
+    judged = judge(results, data=data)
+    pages = {
+        "claims.md": claims_page(results, judged),
+        "frontier.md": frontier_page(results, steps),
+    }
     frames = {
-        "signatures.csv": signatures_frame(results),
-        "targets.csv": targets_frame(results),
-        "areas.csv": area_frame(results),
+        "signatures.csv": data.signatures.drop(columns="label"),
+        "targets.csv": targets_frame(results, steps),
+        "areas.csv": area_frame(results, steps),
         "pareto.csv": pareto_frame(results),
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
