@@ -20,7 +20,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -28,12 +27,9 @@ import pandas as pd
 from scipy import stats
 
 from analysis.frontier import targets_frame
-from analysis.methods import methods_frame
-from analysis.optimum import optima
 from analysis.published import TRIALS, published_cell, published_exhaustive
-from analysis.results import CellRuns, Results
-from analysis.signatures import signatures_frame
-from analysis.signatures.cell import Cell, cells_of
+from analysis.results import Results
+from analysis.signatures.cell import Cell
 from analysis.statistics import (
     FEWEST,
     Inference,
@@ -43,11 +39,11 @@ from analysis.statistics import (
     mean,
     probability_of_improvement,
 )
+from analysis.study import SEED, Study
 from analysis.table import Table
 from coartic.robot import Array
 
 LEVEL = 0.05
-SEED = 0
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
 _LEARNER = "dual-process/"
 _SMOOTH = {
@@ -105,42 +101,18 @@ class Judged:
 class Data:
     """A results folder as the claims read it."""
 
-    results: Results
+    study: Study
     used: list[str] = field(default_factory=list)
     """Run ids read since the last claim."""
 
-    @cached_property
-    def cells(self) -> dict[tuple[str, str], CellRuns]:
-        """Cells by task and label."""
-        return {(cell.task, cell.label): cell for cell in self.results.cells}
-
-    @cached_property
-    def trajectories(self) -> dict[tuple[str, str], Cell]:
-        """Executed solutions by task and label."""
-        return {
-            (cell.task.name, f"{cell.method} {cell.variant}".strip()): cell
-            for cell in cells_of(self.results)
-        }
-
-    @cached_property
-    def signatures(self) -> pd.DataFrame:
-        """All signatures, with the label of each cell."""
-        frame = signatures_frame(self.results, seed=SEED)
-        return frame.assign(label=(frame.method + " " + frame.variant).str.strip())
-
-    @cached_property
-    def methods(self) -> dict[tuple[str, str], dict[str, Any]]:
-        """Rows of the table of methods by task and label."""
-        return {
-            (row["task"], f"{row['method']} {row['variant']}".strip()): {
-                str(key): value for key, value in row.items()
-            }
-            for row in methods_frame(self.results).to_dict("records")
-        }
+    @property
+    def results(self) -> Results:
+        """The stored results."""
+        return self.study.results
 
     def runs(self, task: str, method: str) -> pd.DataFrame:
         """Solved runs of a method; raises MissingError where there are none."""
-        cell = self.cells.get((task, method))
+        cell = self.study.cells.get((task, method))
         if cell is None or not len(cell.runs):
             raise MissingError(f"no runs of {method} on {task}")
         if len(cell.good) < len(cell.runs):
@@ -171,12 +143,12 @@ class Data:
     def cell(self, task: str, method: str) -> Cell:
         """Executed solutions; raises MissingError where there are none."""
         self.runs(task, method)
-        return self.trajectories[task, method]
+        return self.study.trajectories[task, method]
 
     def signature(self, task: str, method: str, name: str, where: str = "") -> dict[str, Any]:
         """The first row of a signature whose ``where`` begins so; MissingError without one."""
         self.runs(task, method)
-        frame = self.signatures
+        frame = self.study.signatures
         rows = frame[(frame.task == task) & (frame.label == method) & (frame.signature == name)]
         rows = rows[rows["where"].str.startswith(where) & rows.value.notna()]
         if not len(rows):
@@ -184,14 +156,9 @@ class Data:
         return {str(key): value for key, value in rows.iloc[0].items()}
 
 
-def judge(
-    results: Results, claims: Iterable[Claim] | None = None, *, data: Data | None = None
-) -> list[Judged]:
-    """Every claim with its verdict, p-values corrected over all of them (Holm).
-
-    ``data`` keeps what was computed of the same results, for whoever needs it as well.
-    """
-    data = Data(results) if data is None else data
+def judge(study: Study, claims: Iterable[Claim] | None = None) -> list[Judged]:
+    """Every claim with its verdict, p-values corrected over all of them (Holm)."""
+    data = Data(study)
     found: list[tuple[Claim, Finding]] = []
     for claim in CLAIMS if claims is None else claims:
         data.used.clear()
@@ -485,12 +452,12 @@ def _less_experience(data: Data) -> Finding:
     parts, holds = [], True
     for task, condition in _BEST:
         data.runs(task, _LEARNER + condition)
-        learner = data.methods[task, _LEARNER + condition]
+        learner = data.study.methods[task, _LEARNER + condition]
         better, best = [], False
         for cost in ("path-length", *_SMOOTH):
             name = f"trajectory-optimisation/{cost}"
             data.runs(task, name)
-            plan = data.methods[task, name]
+            plan = data.study.methods[task, name]
             holds &= plan["trials"] == 0 and len(plan["told"]) > len(learner["told"])
             if plan["reward"] >= learner["reward"]:
                 better.append(f"{cost} ({plan['told']})")
@@ -512,14 +479,14 @@ def _computation(data: Data) -> Finding:
         shown = []
         for method in (_LEARNER + condition, "trajectory-optimisation/path-length"):
             data.runs(task, method)
-            row = data.methods[task, method]
+            row = data.study.methods[task, method]
             shown.append(row["forward_kinematics"] + row["jacobians"])
         parts.append(f"{task} {shown[0]:.3g}, {shown[0] / TRIALS:.0f} and {shown[1]:.3g}")
     return Finding(None, "evaluations in a run, a trial and a plan: " + "; ".join(parts))
 
 
 def _to_the_optimum(data: Data) -> Finding:
-    known, parts = optima(data.results), []
+    known, parts = data.study.optima, []
     for task, condition in CELLS:
         gap = mean(data.rewards(task, condition), seed=SEED)
         arm = "free" if condition in ("EC2", "EC4") else "still"
@@ -538,7 +505,7 @@ def _to_the_optimum(data: Data) -> Finding:
 
 
 def _experience(data: Data) -> Finding:
-    frame = targets_frame(data.results)
+    frame = targets_frame(data.results, data.study.steps)
     frame = frame[(frame.spend == "trials") & (frame.share == 0.05)]
     parts = []
     for task, condition in _BEST:

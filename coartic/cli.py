@@ -295,26 +295,26 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims and the reward-compute frontier of a results folder."""
-    from analysis.claims import Data, claims_page, judge
+    from analysis.claims import claims_page, judge
     from analysis.frontier import (
         area_frame,
         frontier_page,
         pareto_frame,
         targets_frame,
     )
-    from analysis.progress import progress
     from analysis.results import load_results
+    from analysis.study import Study
     from benchmarks.store import write_atomically
 
     results = load_results(folder)
-    data, steps = Data(results), progress(results)
-    judged = judge(results, data=data)
+    study = Study(results)
+    judged, steps = judge(study), study.steps
     pages = {
         "claims.md": claims_page(results, judged),
         "frontier.md": frontier_page(results, steps),
     }
     frames = {
-        "signatures.csv": data.signatures.drop(columns="label"),
+        "signatures.csv": study.signatures.drop(columns="label"),
         "targets.csv": targets_frame(results, steps),
         "areas.csv": area_frame(results, steps),
         "pareto.csv": pareto_frame(results),

@@ -7,6 +7,7 @@ import pytest
 from analysis.claims import CLAIMS, Claim, Finding, MissingError, claims_page, judge
 from analysis.results import Results
 from analysis.statistics import Inference
+from analysis.study import Study
 from benchmarks.methods import registry
 from benchmarks.suites import Cell
 from coartic import load_task
@@ -52,7 +53,7 @@ test.__test__ = False
     ],
 )
 def test_verdicts(claim, verdict):
-    (judged,) = judge(NOTHING, [claim])
+    (judged,) = judge(Study(NOTHING), [claim])
     assert judged.verdict == verdict
 
 
@@ -64,7 +65,7 @@ def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
         planted(True, 0.02, 0.04),
         planted(None, 0.9, place=""),  # measured: no part of the family
     ]
-    judged = judge(NOTHING, claims)
+    judged = judge(Study(NOTHING), claims)
     assert [entry.p for entry in judged[:3]] == pytest.approx([0.06, 0.003, 0.06])
     assert np.isnan(judged[3].p)
     verdicts = [entry.verdict for entry in judged]
@@ -164,7 +165,7 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
 )  # fmt: skip
 def test_judges_on_planted_runs(claim, rows, verdict, tmp_path):
     (wanted,) = [entry for entry in CLAIMS if entry.id == claim]
-    (judged,) = judge(planted_results(rows, tmp_path), [wanted])
+    (judged,) = judge(Study(planted_results(rows, tmp_path)), [wanted])
     assert judged.verdict == verdict, judged.evidence
 
 
@@ -188,7 +189,7 @@ def test_learning_that_does_not_last_is_not_supported(tmp_path):
         ([-9, -10, -11, -12], "not supported"),
         ([-9, 10, -11, 12], "cannot tell"),
     ):
-        (judged,) = judge(planted_results(seven(replays), tmp_path), [claim])
+        (judged,) = judge(Study(planted_results(seven(replays), tmp_path)), [claim])
         assert judged.verdict == verdict
 
 
@@ -205,7 +206,7 @@ def test_learning_that_does_not_last_is_not_supported(tmp_path):
 )
 def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words, tmp_path):
     (claim,) = [entry for entry in CLAIMS if entry.id == "ec3-alternates"]
-    (judged,) = judge(planted_results(rows, tmp_path), [claim])
+    (judged,) = judge(Study(planted_results(rows, tmp_path)), [claim])
     assert judged.verdict == "cannot tell"
     assert words in judged.evidence
 
@@ -214,7 +215,7 @@ def test_what_the_folder_lacks_is_said():
     def decide(data):
         raise MissingError("no runs of dual-process/EC1 on ascending")
 
-    (judged,) = judge(NOTHING, [Claim("c", "s", "here", "t", decide)])
+    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "here", "t", decide)])
     assert judged.verdict == "cannot tell"
     assert judged.evidence == "not in this folder: no runs of dual-process/EC1 on ascending"
     assert judged.run_ids == ()
@@ -239,7 +240,7 @@ def folder(tmp_path_factory):
 
 
 def test_the_register_on_runs(folder):
-    judged = {entry.claim.id: entry for entry in judge(folder)}
+    judged = {entry.claim.id: entry for entry in judge(Study(folder))}
     assert len(judged) == len(CLAIMS)
     # Few runs, yet these are never in doubt.
     for name in ("first-movement-sacrificed", "ec3-beats-exhaustive"):
@@ -259,13 +260,13 @@ def test_the_register_on_runs(folder):
 
 
 def test_the_register_is_the_same_every_time(folder):
-    first, second = judge(folder), judge(folder)
+    first, second = judge(Study(folder)), judge(Study(folder))
     assert [(j.verdict, j.evidence) for j in first] == [(j.verdict, j.evidence) for j in second]
     np.testing.assert_array_equal([j.p for j in first], [j.p for j in second])
 
 
 def test_the_page_names_every_run(folder):
-    judged = judge(folder)
+    judged = judge(Study(folder))
     page = claims_page(folder, judged)
     assert page.startswith("# Claims")
     for entry in judged:
