@@ -25,7 +25,6 @@ from analysis.results import Results
 from analysis.statistics import (
     CONFIDENCE,
     RESAMPLES,
-    Array,
     Inference,
     bootstrap_estimate,
     higher,
@@ -33,6 +32,7 @@ from analysis.statistics import (
     sample,
 )
 from coartic.initial import initial_hands
+from coartic.robot import Array
 
 PROFILE_RESAMPLES = 1_999
 

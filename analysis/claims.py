@@ -40,7 +40,7 @@ from analysis.statistics import (
     probability_of_improvement,
 )
 from analysis.study import SEED, Study
-from analysis.table import Table
+from analysis.table import Table, interval, tally
 from coartic.robot import Array
 
 LEVEL = 0.05
@@ -236,7 +236,7 @@ def _learning_improves(data: Data) -> Finding:
         if not np.isfinite(replays).all():
             raise MissingError(f"a replay of every run of {condition} on {task}")
         tests.append(bootstrap_test(replays, initial, seed=SEED))
-        parts.append(f"{task} {condition} {initial:.0f} to {_interval(mean(replays, seed=SEED))}")
+        parts.append(f"{task} {condition} {initial:.0f} to {interval(mean(replays, seed=SEED))}")
     return Finding(
         all(test.estimate > 0 for test in tests),
         "noiseless replay with the final tables: " + "; ".join(parts),
@@ -258,7 +258,7 @@ def _first_movement_sacrificed(data: Data) -> Finding:
             bootstrap_test(total, float(cell.initial.ticks), "less", seed=SEED),
         ]
         parts.append(
-            f"{task}: first movement {initial} to {_interval(mean(first, seed=SEED))} ticks, "
+            f"{task}: first movement {initial} to {interval(mean(first, seed=SEED))} ticks, "
             f"all {cell.initial.ticks} to {np.mean(total):.1f}"
         )
     holds = all(
@@ -306,7 +306,7 @@ def _as_often(data: Data, task: str, condition: str, hands: str) -> tuple[bool |
     low = a - b - math.hypot(a - found[0].low, found[1].high - b)
     high = a - b + math.hypot(found[0].high - a, b - found[1].low)
     text = (
-        f"{_counts(counts)} of {ours} runs, published {_counts(known)}; share of {hands} "
+        f"{tally(counts)} of {ours} runs, published {tally(known)}; share of {hands} "
         f"{a - b:+.0%} [{low:+.0%}, {high:+.0%}], Fisher's exact test p = {p:.2g}"
     )
     if p < LEVEL:
@@ -333,7 +333,7 @@ def _ec3_alternates(data: Data) -> Finding:
     low = stats.binomtest(counts["LRLR"], total, alternative="greater").proportion_ci().low
     return Finding(
         True if low >= 0.8 else False if counts["LRLR"] < 0.8 * total else None,
-        f"{_counts(counts)} of {total} runs: at least {low:.0%} of all (95 %, exact)",
+        f"{tally(counts)} of {total} runs: at least {low:.0%} of all (95 %, exact)",
     )
 
 
@@ -348,7 +348,7 @@ def _ec3_beats_exhaustive(data: Data) -> Finding:
     test = bootstrap_test(rewards, float(best), seed=SEED)
     return Finding(
         test.estimate > 0,
-        f"{_interval(mean(rewards, seed=SEED))} against {best:.0f} (published {published[1]})",
+        f"{interval(mean(rewards, seed=SEED))} against {best:.0f} (published {published[1]})",
         (test,),
     )
 
@@ -396,7 +396,7 @@ def _sequences_change(data: Data) -> Finding:
             )
         )
         parts.append(
-            f"{task}: " + ", ".join(f"{c} {_counts(n)}" for c, n in zip(pair, counts, strict=True))
+            f"{task}: " + ", ".join(f"{c} {tally(n)}" for c, n in zip(pair, counts, strict=True))
         )
     return Finding(all(test.estimate > 0 for test in tests), "; ".join(parts), tuple(tests))
 
@@ -498,7 +498,7 @@ def _to_the_optimum(data: Data) -> Finding:
             best.reward - gap.low, gap.confidence,
         )  # fmt: skip
         parts.append(
-            f"{task} {condition}: {_interval(left)} ticks from {best.reward} "
+            f"{task} {condition}: {interval(left)} ticks from {best.reward} "
             f"({left.estimate / -best.reward:.1%})"
         )
     return Finding(None, "; ".join(parts))
@@ -549,20 +549,9 @@ def _higher(data: Data, task: str, higher: str, lower: str) -> tuple[Inference, 
     apart = difference_of_means(a, b, seed=SEED)
     better = probability_of_improvement(a, b, seed=SEED)
     return test, (
-        f"{task}: {higher} − {lower} = {_interval(apart)}, P(improvement) {better.estimate:.2f} "
+        f"{task}: {higher} − {lower} = {interval(apart)}, P(improvement) {better.estimate:.2f} "
         f"[{better.low:.2f}, {better.high:.2f}]"
     )
-
-
-def _interval(found: Inference) -> str:
-    if math.isnan(found.low):
-        return f"{found.estimate:.1f}"
-    return f"{found.estimate:.1f} [{found.low:.1f}, {found.high:.1f}]"
-
-
-def _counts(counts: dict[str, int]) -> str:
-    ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-    return ", ".join(f"{hands} {count}" for hands, count in ordered)
 
 
 _BOOTSTRAP = "one-tailed bootstrap test"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from analysis.published import (
 )
 from analysis.results import CellRuns, Results
 from analysis.statistics import CONFIDENCE
-from analysis.table import NONE, Table
+from analysis.table import NONE, Table, interval, tally
 
 Rewards = Sequence[float] | NDArray[np.float64]
 
@@ -87,7 +86,7 @@ def _cells_table(results: Results) -> Table:
                 _difference_text(rewards, paper.summary),
                 _verdict(cell.task, rewards, paper.summary if same_length else None),
                 _beside(_distinct(cell.runs.initial_reward), _initial_text(cell.task)),
-                _beside(_counts(good.hands), _published_hands(paper)),
+                _beside(tally(good.hands.value_counts().to_dict()), _published_hands(paper)),
             )
         )
     columns = (
@@ -267,10 +266,7 @@ def _mean_sd(rewards: Rewards) -> str:
 def _difference_text(rewards: Rewards, published: Summary | None) -> str:
     if published is None or len(rewards) == 0:
         return NONE
-    found = difference(rewards, published)
-    if math.isnan(found.low):
-        return f"{found.estimate:+.1f}"
-    return f"{found.estimate:+.1f} [{found.low:+.1f}, {found.high:+.1f}]"
+    return interval(difference(rewards, published), "+.1f")
 
 
 def _verdict(task: str, rewards: Rewards, published: Summary | None) -> str:
@@ -300,10 +296,6 @@ def _published_hands(paper: PublishedCell) -> str:
     if not paper.sequences:
         return NONE
     return ", ".join(f"{s.hands} {s.runs or ''}".strip() for s in paper.sequences)
-
-
-def _counts(values: pd.Series) -> str:
-    return ", ".join(f"{value} {count}" for value, count in values.value_counts().items()) or NONE
 
 
 def _beside(ours: str, published: str) -> str:

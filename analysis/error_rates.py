@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy import stats
 
 from analysis import statistics
@@ -28,8 +27,8 @@ from analysis.across_tasks import interquartile_mean
 from analysis.equivalence import bootstrap_equivalence, difference
 from analysis.published import Summary
 from analysis.table import Table
+from coartic.robot import Array
 
-Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]
 
 RUNS = 20

@@ -22,14 +22,15 @@ from scipy.stats import binomtest
 from analysis.methods import STILL, methods_frame
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import optima
-from analysis.progress import SPENDS, Array, Progress, progress
+from analysis.progress import SPENDS, Progress, progress
 from analysis.results import CellRuns, Results
+from analysis.statistics import CONFIDENCE
 from analysis.survival import kaplan_meier_median
-from analysis.table import NONE, Table
+from analysis.table import Table, short
+from coartic.robot import Array
 
 SHARES = (0.05, 0.02, 0.01)
 """Distances from the optimum that count as reached, as shares of it."""
-CONFIDENCE = 0.95
 RESAMPLES = 2000
 POINTS = 60
 """Budgets on an anytime curve."""
@@ -306,7 +307,7 @@ def pareto_tables(results: Results) -> list[Table]:
         for method, own in kept.groupby("method", sort=False):
             first = own.iloc[0]
             cells = (
-                _number(row["amount"]) + (" ●" if row["front"] else " ○" * row["front_told"])
+                short(row["amount"]) + (" ●" if row["front"] else " ○" * row["front_told"])
                 for row in own.to_dict("records")
             )
             lines.append((str(method), first.told, f"{first.reward:.1f}", *cells))
@@ -418,22 +419,10 @@ def _target_cell(row: Mapping[Any, Any]) -> str:
     median, horizon = row["median"], row["horizon"]
     if not row["reached"] or (math.isinf(median) and math.isinf(horizon)):
         return text
-    text += f", {_number(median)}" if math.isfinite(median) else f", > {_number(horizon)}"
+    text += f", {short(median)}" if math.isfinite(median) else f", > {short(horizon)}"
     if row["runs"] == 1 or math.isinf(row["low"]):
         return text
-    return text + f" [{_number(row['low'])}, {_number(row['high'])}]"
-
-
-def _number(value: float) -> str:
-    """An amount with three figures: 950, 12.3 k, 0.21; ∞ where there is none."""
-    if math.isnan(value):
-        return NONE
-    if math.isinf(value):
-        return "∞"
-    for size, unit in ((1e6, " M"), (1e3, " k")):
-        if value >= size:
-            return f"{value / size:.3g}{unit}"
-    return f"{value:.3g}"
+    return text + f" [{short(row['low'])}, {short(row['high'])}]"
 
 
 _DASHES = ("-", "--", ":")  # after every ten colours

@@ -13,7 +13,7 @@ import pandas as pd
 from analysis.optimum import BASE, Optimum, optima
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.results import CellRuns, Results
-from analysis.table import NONE, Table
+from analysis.table import NONE, Table, short, tally
 from coartic.method import Information
 
 TOLD = {
@@ -157,10 +157,9 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
             sum((rewards > known.reward).sum() for known in (best, best_still) if known)
         ),
         "other_arm": "still" if still else "moves" if len(good) else "",
-        "hands": ", ".join(
-            f"{hands} {count}" if len(good) > 1 else str(hands)
-            for hands, count in good.hands.value_counts().items()
-        ),
+        "hands": tally(good.hands.value_counts().to_dict())
+        if len(good) > 1
+        else "".join(good.hands),
         "corrections": int(good.solution_corrections.sum()) if len(good) else 0,
         **{name: _median(cell.runs[name]) for name in _SPENT},
         "build_s": _median(cell.runs.build_s),
@@ -195,7 +194,7 @@ def _cells(row: Mapping[Any, Any]) -> tuple[str, ...]:
         row["told"] or NONE,
         row["hands"] or NONE,
         row["other_arm"] or NONE,
-        *(_count(row[name]) for name in _SPENT),
+        *(short(row[name] or math.nan) for name in _SPENT),
         _seconds(row["solve_s"]),
     )
 
@@ -204,16 +203,6 @@ def _seconds(value: float) -> str:
     if math.isnan(value):
         return NONE
     return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
-
-
-def _count(value: float) -> str:
-    """A count with three figures: 950, 12.3 k, 4.98 M."""
-    if not value or math.isnan(value):
-        return NONE
-    for size, unit in ((1e6, " M"), (1e3, " k")):
-        if value >= 0.9995 * size:
-            return f"{value / size:.3g}{unit}"
-    return f"{value:.0f}"
 
 
 def _title(name: str, references: dict[tuple[str, str], Optimum], results: Results) -> str:

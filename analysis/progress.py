@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from analysis.methods import solve_times
 from analysis.results import Results
+from coartic.robot import Array
 
-Array = NDArray[np.float64]
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
 """What can be spent: columns of ``runs.parquet``; ``solve_s`` is wall time in s."""
 

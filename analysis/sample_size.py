@@ -1,4 +1,4 @@
-"""How many runs a difference of two means needs.
+"""How many runs a difference of two means needs, and what difference so many runs find.
 
 By the noncentral t distribution with Welch's degrees of freedom. Exact for normal samples
 of equal variance (J. Cohen 1988, Statistical Power Analysis for the Behavioral Sciences,
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from scipy import special, stats
+from scipy import optimize, special, stats
 
 LEVEL = 0.05
 POWER = 0.8
@@ -43,7 +43,8 @@ def power(
     critical = float(special.stdtrit(freedom, 1 - level / tails))
     found = float(stats.nct.sf(critical, freedom, shift))
     if tails == 2:
-        found += float(stats.nct.cdf(-critical, freedom, shift))
+        # The lower tail, mirrored: scipy's cdf is NaN far out.
+        found += float(stats.nct.sf(critical, freedom, -shift))
     return found
 
 
@@ -75,3 +76,33 @@ def runs_needed(
         middle = (fewest + most) // 2
         fewest, most = (fewest, middle) if enough(middle) else (middle + 1, most)
     return most
+
+
+def smallest_difference(
+    first_sd: float,
+    second_sd: float,
+    runs: int,
+    *,
+    target: float = POWER,
+    level: float = LEVEL,
+    tails: int = 1,
+) -> float:
+    """Smallest true difference of means that :func:`power` finds with ``target``, > 0.
+
+    In the unit of the SDs; 0 without any spread, where every difference is found. Raises
+    ValueError as :func:`power`, and for a target that does not lie between ``level`` and 1.
+    """
+    if not level < target < 1:
+        raise ValueError("smallest_difference needs a power between the level and 1")
+
+    def excess(difference: float) -> float:
+        found = power(difference, first_sd, second_sd, runs, level=level, tails=tails)
+        return found - target
+
+    scale = math.hypot(first_sd, second_sd)
+    if scale == 0:
+        return 0.0
+    most = scale
+    while excess(most) < 0:
+        most *= 2
+    return float(optimize.brentq(excess, 0.0, most, xtol=1e-9 * scale))

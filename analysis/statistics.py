@@ -25,10 +25,11 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize, special, stats
 
-Array = NDArray[np.float64]
+from coartic.robot import Array
+
 Alternative = Literal["greater", "less", "two-sided"]
 
 CONFIDENCE = 0.95
@@ -192,7 +193,8 @@ def probability_of_improvement(
     From 0 to 1; 0.5 where neither is higher (Agarwal et al. 2021; the Mann-Whitney
     statistic over its maximum). BCa interval. Where every run of one sample is higher than
     every run of the other, no resample differs and the bootstrap is silent: the interval
-    then is Newcombe's (2006, method 5), with the estimate as one of its ends.
+    then is Newcombe's (2006, method 5), with the estimate as one of its ends. Fewer than
+    three values in a sample give no interval here either.
     """
     found = bootstrap_estimate(
         "probability of improvement",
@@ -202,7 +204,7 @@ def probability_of_improvement(
         resamples=resamples,
         seed=seed,
     )
-    if found.estimate not in (0.0, 1.0):
+    if found.estimate not in (0.0, 1.0) or min(found.n) < FEWEST:
         return found
     far = _separated(found.n, found.estimate, confidence)
     return replace(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.sample_size import power, runs_needed
+from analysis.sample_size import power, runs_needed, smallest_difference
 
 
 @pytest.mark.parametrize(
@@ -67,3 +67,29 @@ def test_limits():
     for runs, tails in ((1, 1), (5, 3)):
         with pytest.raises(ValueError, match="power needs"):
             power(1, 1, 1, runs, tails=tails)
+
+
+def test_two_tails_far_out():
+    """Far beyond the critical value scipy's cdf of the other tail is NaN."""
+    assert power(15, 4, 4, 20, tails=2) == pytest.approx(1)
+    assert runs_needed(300, 1, 1, tails=2) == 2
+
+
+@pytest.mark.parametrize("tails", [1, 2])
+@pytest.mark.parametrize("sds", [(3, 3), (7, 2), (12, 0)])
+def test_the_smallest_difference_is_what_the_runs_find(sds, tails):
+    found = smallest_difference(*sds, 20, tails=tails)
+    assert power(found, *sds, 20, tails=tails) == pytest.approx(0.8, abs=1e-6)
+    assert (
+        runs_needed(found * 1.0001, *sds, tails=tails)
+        <= 20
+        < runs_needed(found * 0.98, *sds, tails=tails)
+    )
+
+
+def test_the_smallest_difference_of_textbooks_and_without_spread():
+    """Cohen (1988), table 2.4: 64 runs of each find half an SD, two-tailed."""
+    assert smallest_difference(10, 10, 64, tails=2) == pytest.approx(5, abs=0.03)
+    assert smallest_difference(0, 0, 5) == 0
+    with pytest.raises(ValueError, match="power between"):
+        smallest_difference(1, 1, 5, target=1.0)

@@ -175,6 +175,15 @@ def test_degenerate_samples(estimate):
     assert found.seed is None
 
 
+def test_shares_of_few_runs_have_no_interval_even_where_they_are_apart():
+    for first, second in (([4.0], 1.0), ([4.0, 5.0], [1.0] * 9), ([4.0] * 9, [1.0, 2.0])):
+        for function in (statistics.probability_of_improvement, statistics.cliffs_delta):
+            found = function(first, second, seed=0)
+            assert found.estimate == 1.0
+            assert math.isnan(found.low)
+            assert "fewer than 3" in found.note
+
+
 def test_where_bca_is_not_defined_the_percentiles_stand_in():
     """All in the middle half is equal, so the jackknife sees no change."""
     values = [0.0, 1, 1, 1, 1, 1, 1, 9]

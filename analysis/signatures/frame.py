@@ -27,10 +27,10 @@ from analysis.signatures.other_arm import preshaping, travel
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
 from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
 from analysis.signatures.subtasks import change_from_initial, excess, sacrifices
+from analysis.statistics import CONFIDENCE
 from coartic import Task
 from coartic.robot import HANDS, Array, Hand
 
-CONFIDENCE = 0.95
 SEED = 0
 """Of the permutation tests."""
 MIXED = "length unit, rad"

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
+from analysis.statistics import CONFIDENCE
 from coartic import Hand, Task
 from coartic.robot import Array
-
-CONFIDENCE = 0.95
 
 
 def movable(task: Task, hand: Hand) -> Array:
