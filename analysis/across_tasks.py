@@ -134,6 +134,32 @@ def interquartile_mean(
     )
 
 
+def task_mean(
+    values: Mapping[str, ArrayLike],
+    *,
+    seed: int,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+) -> Inference:
+    """Mean over tasks of the mean over runs, with stratified BCa interval.
+
+    Raises ValueError for values that are not finite. A task with fewer than three runs
+    leaves no interval (NaN).
+    """
+
+    def statistic(*strata: Array, axis: int = -1) -> Array:
+        return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
+
+    return bootstrap_estimate(
+        f"mean over {len(values)} tasks, stratified",
+        tuple(sample(runs) for runs in values.values()),
+        statistic,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+
+
 def probability_of_improvement(
     first: Mapping[str, ArrayLike],
     second: Mapping[str, ArrayLike],

@@ -294,14 +294,18 @@ def _applicable(entry: Entry, tasks: list[Task]) -> str:
 def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
-    """Signatures, claims and the reward-compute frontier of a results folder."""
+    """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
+    from analysis.across_tasks import scores_frame
     from analysis.claims import claims_page, judge
+    from analysis.comparisons import comparisons_page
     from analysis.frontier import (
         area_frame,
         frontier_page,
         pareto_frame,
         targets_frame,
     )
+    from analysis.overall import combined, overall_frame, profiles_frame
+    from analysis.pairwise import pairwise_frame
     from analysis.results import load_results
     from analysis.study import Study
     from benchmarks.store import write_atomically
@@ -309,11 +313,17 @@ def analyse(
     results = load_results(folder)
     study = Study(results)
     judged, steps = judge(study), study.steps
+    pairs, scores = pairwise_frame(study), combined(scores_frame(results))
+    overall = overall_frame(scores)
     pages = {
         "claims.md": claims_page(results, judged),
+        "comparisons.md": comparisons_page(study, pairs, overall, scores),
         "frontier.md": frontier_page(results, steps),
     }
     frames = {
+        "comparisons.csv": pairs,
+        "across_tasks.csv": overall,
+        "profiles.csv": profiles_frame(scores),
         "signatures.csv": study.signatures.drop(columns="label"),
         "targets.csv": targets_frame(results, steps),
         "areas.csv": area_frame(results, steps),
