@@ -549,8 +549,8 @@ def _higher(data: Data, task: str, higher: str, lower: str) -> tuple[Inference, 
     apart = difference_of_means(a, b, seed=SEED)
     better = probability_of_improvement(a, b, seed=SEED)
     return test, (
-        f"{task}: {higher} − {lower} = {interval(apart)}, P(improvement) {better.estimate:.2f} "
-        f"[{better.low:.2f}, {better.high:.2f}]"
+        f"{task}: {higher} − {lower} = {interval(apart)}, P(improvement) "
+        + interval(better, ".2f")
     )
 
 

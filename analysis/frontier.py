@@ -420,7 +420,7 @@ def _target_cell(row: Mapping[Any, Any]) -> str:
     if not row["reached"] or (math.isinf(median) and math.isinf(horizon)):
         return text
     text += f", {short(median)}" if math.isfinite(median) else f", > {short(horizon)}"
-    if row["runs"] == 1 or math.isinf(row["low"]):
+    if row["runs"] == 1 or math.isinf(row["low"]) or row["high"] == 0:  # 0: spent by none
         return text
     return text + f" [{short(row['low'])}, {short(row['high'])}]"
 

@@ -323,3 +323,24 @@ def test_entry_points():
     ):
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         assert done.stdout == f"coartic {__version__}\n"
+
+
+def test_analyse(monkeypatch, capsys, tmp_path):
+    out = tmp_path / "results"
+    chosen = ("--tasks", "ascending,two-armed-2", "--runs", 3, "--trials", 40)
+    assert call(monkeypatch, capsys, "run", "paper", "--out", out, *chosen)[0] == 0
+    code, text, _ = call(monkeypatch, capsys, "analyse", out)
+    assert code == 0
+    names = text.splitlines()[-1].removesuffix(".").partition(": ")[2].split(", ")
+    assert {"claims.md", "comparisons.md", "comparisons.csv", "profiles.csv"} <= set(names)
+    written = {name: (out / name).read_bytes() for name in names}
+    assert len(pd.read_csv(out / "comparisons.csv")) == 1  # EC4 against EC3
+    assert set(pd.read_csv(out / "profiles.csv").method) == {
+        "dual-process (EC1, EC3)",
+        "dual-process (EC1, EC4)",
+    }
+    assert call(monkeypatch, capsys, "analyse", out)[0] == 0
+    assert written == {name: (out / name).read_bytes() for name in names}
+    code, _, error = call(monkeypatch, capsys, "analyse", tmp_path)
+    assert code == 2
+    assert "not a results folder" in error

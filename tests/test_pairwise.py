@@ -1,0 +1,302 @@
+"""Methods against each other: planted cells, by hand and by enumeration."""
+
+import itertools
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.across_tasks import scores_frame
+from analysis.comparisons import comparisons_page
+from analysis.optimum import optima
+from analysis.overall import NEAR, combined, everywhere, overall_frame, profiles_frame
+from analysis.pairwise import COLUMNS, pairs, pairwise_frame
+from analysis.results import Results
+from analysis.sample_size import power, runs_needed
+from analysis.study import Study
+from benchmarks.methods import registry
+from benchmarks.suites import Cell
+from coartic import load_task
+
+from .test_harness import run_and_write
+from .test_methods_table import row
+
+T1, T2 = "two-armed-1", "two-armed-2"
+EC4 = [-484, -482, -486, -483, -485, -487, -481, -484]
+EC3 = [-506, -503, -507, -504, -506, -508, -502, -505]
+PLANNER = "goals, kinematic model, reward as a formula"
+
+
+def cell(method, rewards, task=T1, **more):
+    """Runs of one cell that share seeds with those of the others; None failed."""
+    return [
+        row(
+            method, reward, task=task, run=k, seed=1000 + k,
+            **{"status": "infeasible" if reward is None else "ok", **more},
+        )
+        for k, reward in enumerate(rewards)
+    ]  # fmt: skip
+
+
+def study(tmp_path, *cells, tasks=None):
+    runs = pd.DataFrame([r for c in cells for r in c])
+    runs = runs.astype({"reward": "Int64", "proven_bound": "Int64"})
+    tasks = tasks or {name: load_task(name) for name in runs.task.unique()}
+    initial = pd.DataFrame(
+        {
+            "task": [T1, T2, "ascending"],
+            "hands": ["RRRR", "RRRR", "RRR"],
+            "reward": pd.array([-671, -357, -319], "Int64"),
+        }
+    )
+    specification = {
+        "suite": "planted", "seed": 0,
+        "tasks": {name: task.model_dump(mode="json") for name, task in tasks.items()},
+        "cells": runs[["task", "method", "variant"]].drop_duplicates().to_dict("records"),
+    }  # fmt: skip
+    return Study(Results(tmp_path, {"specification": specification}, runs, initial))
+
+
+def page(of):
+    scores = combined(scores_frame(of.results))
+    return comparisons_page(of, pairwise_frame(of), overall_frame(scores), scores)
+
+
+def test_who_is_compared_with_whom_and_which_way(tmp_path):
+    """By kind and by what is told; all rewards are equal."""
+    same = [-500] * 4
+    found = study(
+        tmp_path,
+        cell("dual-process/EC1", same),
+        cell("dual-process/EC3", same),
+        cell("dual-process/EC4", same, travel=1.0),
+        cell("dual-process/EC4-nullspace", same, travel=1.0, told="reward by trial, goals"),
+        cell("dual-process/EC4", same, travel=1.0, variant="epsilon=0.5"),
+        cell("moving", same, travel=1.0),
+        cell("still", same, told="reward by trial"),
+        cell("planner", same[:1], told=PLANNER),
+        cell("optimum/multistart", same[:1], told=PLANNER),
+        cell("dual-process/EC1", same, task="ascending"),
+        cell("still", same, task="ascending", told="reward by trial"),
+        cell("still", same, task=T2),  # no learner there
+    )
+    learner = "dual-process/"
+    assert [
+        (p.first.task, p.kind, p.first.label.removeprefix(learner), p.second.label, p.expected)
+        for p in pairs(found)
+    ] == [
+        (T1, "conditions", "EC3", "dual-process/EC1", "greater"),
+        (T1, "conditions", "EC4", "dual-process/EC1", "greater"),
+        (T1, "conditions", "EC4", "dual-process/EC3", "greater"),
+        (T1, "variant", "EC4", "dual-process/EC4-nullspace", "less"),
+        (T1, "variant", "EC4", "dual-process/EC4 epsilon=0.5", "greater"),
+        (T1, "method", "EC4", "moving", "greater"),
+        (T1, "method", "EC4", "still", "greater"),
+        (T1, "method", "EC3", "still", "greater"),
+        (T1, "method", "EC4", "planner", "less"),
+        (T1, "method", "EC3", "planner", "less"),
+        ("ascending", "method", "EC1", "still", "greater"),
+    ]
+    frame = pairwise_frame(found)
+    planned = frame[frame.second == "planner"].iloc[0]
+    assert (planned.told_more, planned.told_less, planned.expected) == ("GKR", "AT", "lower")
+
+
+def test_a_planted_difference_and_what_pairing_does(tmp_path):
+    """The second is the first less 10, seed by seed: pairs know it, the tests do not."""
+    found = study(
+        tmp_path,
+        cell("dual-process/EC4", EC4, travel=1.0),
+        cell("worse", [reward - 10 for reward in EC4], travel=1.0, trials=5, jacobians=0),
+    )
+    (made,) = pairwise_frame(found).to_dict("records")
+    assert (made["difference"], made["low"], made["high"]) == (10, 10, 10)
+    assert made["interval"] == "paired by seed"
+    assert made["pairs"] == made["n_first"] == made["n_second"] == 8
+    assert made["correlation"] == pytest.approx(1)
+    assert made["independent_low"] < 9 < 11 < made["independent_high"]
+    assert made["expected"] == "higher"
+    assert made["improvement"] == made["delta"] == made["improvement_high"] == 1
+    # 8 and 8 runs: all 12 870 assignments are more than are drawn.
+    assert made["p_bootstrap"] == 0.0001
+    assert made["p_permutation"] == 0.0002
+    sd = np.std(EC4, ddof=1)
+    assert made["runs_2"] == runs_needed(9.3, sd, sd)
+    assert power(made["smallest"], sd, sd, 8) == pytest.approx(0.8)
+    assert made["smallest_share"] == pytest.approx(made["smallest"] / 465)
+    assert made["trials"] == 0.5
+    assert made["evaluations"] == pytest.approx(1_234_567 / (1_234_567 + 950))
+    assert "+10.0 (no spread in 8 runs)" in page(found)
+
+
+def test_effects_by_enumeration(tmp_path):
+    second = [-484, -500, -481, -490, -488, -484, -483, -470]
+    found = study(
+        tmp_path,
+        cell("dual-process/EC4", EC4, travel=1.0),
+        cell("other", second, travel=1.0),
+        cell("planner", [-484], travel=1.0, told=PLANNER),
+    )
+    other, planner = pairwise_frame(found).to_dict("records")
+    signs = [np.sign(a - b) for a in EC4 for b in second]
+    assert other["delta"] == pytest.approx(np.mean(signs))
+    assert other["improvement"] == pytest.approx(np.mean([(s + 1) / 2 for s in signs]))
+    assert other["difference"] == pytest.approx(np.mean(EC4) - np.mean(second))
+    assert other["correlation"] == pytest.approx(np.corrcoef(EC4, second)[0, 1])
+    # Against a known reward: the learner's spread alone, and all 2^8 signs.
+    apart = np.array(EC4) + 484
+    flips = np.array(list(itertools.product([1, -1], repeat=8))) @ apart
+    expected = min(1.0, 2 * min((flips >= apart.sum()).mean(), (flips <= apart.sum()).mean()))
+    assert planner["p_permutation"] == pytest.approx(expected)
+    assert planner["interval"] == "against a known value"
+    assert (planner["sd_second"], planner["pairs"]) == (0, 0)
+    assert planner["runs_1"] == runs_needed(4.65, np.std(EC4, ddof=1), 0)
+
+
+def test_holm_over_the_rows_of_a_task(tmp_path):
+    """By hand: the smallest p times the number of tests, the next times one less, rising."""
+    shifts = {"a": 20, "b": 2, "c": 1, "d": 0}
+    rng = np.random.default_rng(3)
+    drawn = {name: rng.integers(-4, 5, 8) for name in shifts}
+
+    def task(name):
+        return [
+            cell("dual-process/EC4", EC4, name, travel=1.0),
+            *(
+                cell(m, [int(r - s + e) for r, e in zip(EC4, drawn[m], strict=True)], name,
+                     travel=1.0)
+                for m, s in shifts.items()
+            ),
+        ]  # fmt: skip
+
+    frame = pairwise_frame(study(tmp_path, *task(T1), *task(T2)))
+    for _, rows in frame.groupby("task"):
+        assert len(rows) == 4  # the family: not the eight of the page
+        for kind in ("p_bootstrap", "p_permutation"):
+            largest = 0.0
+            for place, (p, adjusted) in enumerate(
+                sorted(zip(rows[kind], rows[f"{kind}_holm"], strict=True))
+            ):
+                largest = max(largest, p * (4 - place))
+                assert adjusted == pytest.approx(min(1.0, largest))
+
+
+def test_few_failed_and_missing_runs(tmp_path):
+    """One run each; none with a solution; a task of one's own: said, and no number made up."""
+    one = study(
+        tmp_path,
+        cell("dual-process/EC3", [-500]),
+        cell("dual-process/EC4", [-490], travel=1.0),
+        cell("planner", [-480], told=PLANNER),
+    )
+    frame = pairwise_frame(one)
+    assert frame.difference.tolist() == [10, -10, -20]
+    nothing = ["low", "high", "p_bootstrap", "p_permutation", "delta_low", "runs_1", "smallest"]
+    assert frame[nothing].isna().all(axis=None)
+    assert (frame.interval != "against a known value").all()
+    assert "not tested (too few runs) against dual-process/EC3" in page(one)
+
+    own = load_task(T1).model_copy(update={"name": "own", "radius": 0.2})
+    failed = study(
+        tmp_path,
+        cell("dual-process/EC4", [*EC4[:-1], None], "own", travel=1.0),
+        cell("never", [None] * 3, "own"),
+        cell("sometimes", [-490, None, -491, -495], "own", travel=1.0),
+        tasks={"own": own},
+    )
+    never, sometimes = pairwise_frame(failed).to_dict("records")
+    assert math.isnan(never["difference"])
+    assert never["note"] == "no run with a solution"
+    assert (sometimes["n_first"], sometimes["n_second"], sometimes["pairs"]) == (7, 3, 3)
+    assert sometimes["difference"] == pytest.approx((6 + 5 + 12) / 3)
+    assert math.isnan(sometimes["runs_1"])  # no optimum is known
+    assert sometimes["smallest"] > 0
+    text = page(failed)
+    assert "7 of 8, 3 of 4" in text
+    assert "Needs at least two tasks" in text
+
+
+def test_without_the_learner_there_is_nothing_to_compare(tmp_path):
+    alone = study(tmp_path, cell("m", EC4))
+    assert list(pairwise_frame(alone).columns) == COLUMNS.split()
+    assert pairwise_frame(alone).empty
+    assert "no runs of the learner" in page(alone)
+
+
+def test_few_runs_that_cannot_differ_are_said_to_be_few(tmp_path):
+    """3 and 3 runs: 2 of 20 assignments are as extreme as the most extreme one."""
+    few = study(
+        tmp_path,
+        cell("dual-process/EC4", EC4[:3], travel=1.0),
+        cell("dual-process/EC3", EC3[:3]),
+    )
+    assert pairwise_frame(few).p_permutation.tolist() == [0.1]
+    assert "Too few runs to tell anything apart: 1 permutation tests" in page(few)
+    enough = study(
+        tmp_path, cell("dual-process/EC4", EC4, travel=1.0), cell("dual-process/EC3", EC3)
+    )
+    assert "Too few runs" not in page(enough)
+    assert "dual-process/EC4 and other conditions: higher than dual-process/EC3" in page(enough)
+
+
+def test_one_row_over_one_and_two_armed_tasks(tmp_path):
+    made = study(
+        tmp_path,
+        cell("dual-process/EC1", [-292, -294, -300, -319], "ascending"),
+        cell("dual-process/EC1", [-671] * 4),  # where EC4 ran it is EC4's that count
+        cell("dual-process/EC4", [-465, -466, -500, -671], travel=1.0),
+        cell("dual-process/EC4", [-306] * 4, T2, travel=1.0, variant="epsilon=0.5"),
+        cell("failing", [-292, None], "ascending"),
+        cell("failing", [-465, -465]),
+    )
+    scores = combined(scores_frame(made.results))
+    scores = scores[scores.task != T2]
+    best = optima(made.results)
+    assert (best["ascending", "free"].reward, best[T1, "free"].reward) == (-292, -465)
+    name = "dual-process (EC1, EC4)"
+    assert sorted(everywhere(scores)) == sorted([name, "dual-process/EC1", "failing"])
+    overall = overall_frame(scores).set_index("method")
+    gaps = [0, 2 / 292, 8 / 292, 27 / 292, 0, 1 / 465, 35 / 465, 206 / 465]
+    assert overall.loc[name, "gap"] == pytest.approx(np.mean(gaps))
+    for near in NEAR:
+        column = f"within_{near:.0%}".rstrip("%")
+        assert overall.loc[name, column] == np.mean([gap <= near for gap in gaps])
+    middle = sorted([1, 25 / 27, 19 / 27, 0, 1, 205 / 206, 171 / 206, 0])[2:6]
+    assert overall.loc[name, "score"] == pytest.approx(np.mean(middle))
+    assert math.isnan(overall.loc["failing", "gap"])
+    assert overall.loc["failing", "gap_note"] == "1 runs without a solution"
+    assert overall.loc["failing", "within_1"] == 0.75  # the failed run reaches nothing
+    profiles = profiles_frame(scores).set_index(["method", "kind", "threshold"]).share
+    assert profiles[name, "gap", 0.01] == overall.loc[name, "within_1"]
+    assert profiles[name, "gap", 0.1] == 7 / 8
+    assert profiles[name, "score", 0.9] == 4 / 8
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    known = registry()
+    cells = [
+        Cell(load_task(task), known[method])
+        for task, conditions in (("ascending", ["EC1"]), (T1, ["EC3", "EC4"]))
+        for method in [
+            *(f"dual-process/{condition}" for condition in conditions),
+            "corrective-alone/given",
+            "random-search/pure",
+        ]
+    ]
+    return run_and_write(tmp_path_factory.mktemp("pairwise"), cells, runs=4, trials=200)
+
+
+def test_the_page_of_a_folder(folder):
+    text = page(Study(folder))
+    assert text == page(Study(folder))
+    frame = pairwise_frame(Study(folder))
+    assert len(frame) == 2 + 1 + 2 + 1  # the corrective process alone keeps the other arm still
+    assert frame.pairs[frame.second != "corrective-alone/given"].eq(4).all()
+    for name in ("## ascending", f"## {T1} †", "## Across tasks", "dual-process (EC1, EC4)"):
+        assert name in text
+    # Its trial 0 is the corrective process alone, so a learned reward cannot be below it.
+    alone = frame[frame.second == "corrective-alone/given"]
+    assert (alone.difference >= 0).all()
+    assert (alone.interval == "against a known value").all()
