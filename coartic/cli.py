@@ -295,7 +295,7 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims and the reward-compute frontier of a results folder."""
-    from analysis.claims import claims_page, judge
+    from analysis.claims import claims_frame, claims_page, judge
     from analysis.frontier import (
         area_frame,
         frontier_page,
@@ -314,6 +314,7 @@ def analyse(
         "frontier.md": frontier_page(results, steps),
     }
     frames = {
+        "claims.csv": claims_frame(judged),
         "signatures.csv": study.signatures.drop(columns="label"),
         "targets.csv": targets_frame(results, steps),
         "areas.csv": area_frame(results, steps),
@@ -328,8 +329,11 @@ def analyse(
     _print(
         _console(),
         "Claims",
-        ("claim", "verdict", "evidence"),
-        [(entry.claim.id, entry.verdict, entry.evidence) for entry in judged],
+        ("claim", "verdict", "statement"),
+        [
+            (entry.claim.id, entry.verdict + " †" * entry.claim.fitted, entry.claim.statement)
+            for entry in judged
+        ],
     )
     print(f"In {folder}: {', '.join(pages)}.")
 
