@@ -296,7 +296,7 @@ def analyse(
 ) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
     from analysis.across_tasks import scores_frame
-    from analysis.claims import claims_page, judge
+    from analysis.claims import claims_frame, claims_page, judge
     from analysis.comparisons import comparisons_page
     from analysis.frontier import (
         area_frame,
@@ -321,6 +321,7 @@ def analyse(
         "frontier.md": frontier_page(results, steps),
     }
     frames = {
+        "claims.csv": claims_frame(judged),
         "comparisons.csv": pairs,
         "across_tasks.csv": overall,
         "profiles.csv": profiles_frame(scores),
@@ -338,8 +339,11 @@ def analyse(
     _print(
         _console(),
         "Claims",
-        ("claim", "verdict", "evidence"),
-        [(entry.claim.id, entry.verdict, entry.evidence) for entry in judged],
+        ("claim", "verdict", "statement"),
+        [
+            (entry.claim.id, entry.verdict + " †" * entry.claim.fitted, entry.claim.statement)
+            for entry in judged
+        ],
     )
     print(f"In {folder}: {', '.join(pages)}.")
 

@@ -1,0 +1,352 @@
+"""Comparisons that the paper does not make: measured, not judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from analysis.claims.data import BEST, CELLS, LEARNER, SMOOTH, Data, MissingError, rewards_of
+from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
+from analysis.claims.register import Claim, Finding
+from analysis.claims.resemblance import CRITERION, TEST, resembles
+from analysis.claims.two_armed import ONE, preshaping_by_run
+from analysis.claims.wording import interval
+from analysis.frontier import targets_frame
+from analysis.methods import TOLD
+from analysis.statistics import Inference, difference_of_means, mean
+from analysis.study import SEED
+from analysis.table import NONE, Table
+from coartic.method import Information
+
+_TASKS = tuple(task for task, _ in BEST)
+_UNINFORMED = {TOLD[Information.CORRECTIVE_PROCESS], TOLD[Information.REWARD_BY_TRIAL]}
+"""All that the paper's learner is told (condition 2 is also told where the hands are)."""
+_OPTIMUM = "optimum/"
+NEAR = 0.05
+"""Share of the optimum within which a run has come near it."""
+
+
+def _labels(data: Data, wanted: Callable[[str], bool]) -> list[str]:
+    """Labels whose row of the methods' table on any task is wanted, in the order of the plan."""
+    return list(
+        dict.fromkeys(
+            label
+            for task, label in data.study.cells
+            if task in _TASKS
+            and not label.startswith(_OPTIMUM)
+            and wanted(data.study.methods[task, label]["told"])
+        )
+    )
+
+
+def _by_task(data: Data, labels: list[str], what: str, cell: Callable[[str, str], str]) -> Table:
+    """A row per method, a column per task; a dash where the folder lacks the runs."""
+    rows = []
+    for label in labels:
+        shown = []
+        for task in _TASKS:
+            try:
+                data.runs(task, label)
+            except MissingError:
+                shown.append(NONE)
+            else:
+                shown.append(cell(task, label))
+        if set(shown) != {NONE}:
+            rows.append((label, *shown))
+    return Table(what, ("method", *_TASKS), tuple(rows))
+
+
+def _uninformed(told: str) -> bool:
+    return TOLD[Information.REWARD_BY_TRIAL] in told and set(told) <= _UNINFORMED
+
+
+def _experience(data: Data) -> Finding:
+    frame = targets_frame(data.results, data.study.steps)
+    frame = frame[(frame.spend == "trials") & (frame.share == NEAR)]
+    reached = {(row["task"], row["method"]): row for row in frame.to_dict("records")}
+
+    def cell(task: str, label: str) -> str:
+        row = reached.get((task, label))
+        if row is None:
+            return NONE
+        median = "never" if math.isinf(row["median"]) else f"{row['median']:.0f}"
+        reward = data.study.methods[task, label]["reward"]
+        return f"{row['reached']}/{row['runs']}, {median} ({reward:.1f})"
+
+    for task, condition in BEST:
+        data.runs(task, LEARNER + condition)
+    table = _by_task(data, _labels(data, _uninformed), "Experience", cell)
+    return Finding(
+        None,
+        f"runs within {NEAR:.0%} of the optimum with all joints free, median trials until then "
+        "(runs that never do counted as censored), and in brackets the mean reward at the end; "
+        "every method that is told no more than the learner",
+        table=table,
+    )
+
+
+def _computation(data: Data) -> Finding:
+    for task, condition in BEST:
+        data.runs(task, LEARNER + condition)
+
+    def cell(task: str, label: str) -> str:
+        row = data.study.methods[task, label]
+        spent = row["forward_kinematics"] + row["jacobians"]
+        each = f", {spent / row['trials']:.0f} a trial" if row["trials"] > 1 else ""
+        return f"{spent:.3g}{each}"
+
+    uninformed = _labels(data, _uninformed)
+    informed = [
+        label
+        for label in _labels(data, lambda told: not _uninformed(told))
+        if " " not in label and not label.startswith(LEARNER)
+    ]
+    table = _by_task(data, [*uninformed, *informed], "Computation", cell)
+    return Finding(
+        None,
+        "evaluations of forward kinematics and Jacobian in a run (median), and per trial: methods "
+        "that are told no more than the learner, then informed search in its default form",
+        table=table,
+    )
+
+
+def _to_the_optimum(data: Data) -> Finding:
+    known, rows = data.study.optima, []
+    for task, condition in CELLS:
+        gap = mean(data.rewards(task, condition), seed=SEED)
+        arm = "free" if condition in ("EC2", "EC4") else "still"
+        best = known.get((task, arm))
+        if best is None:
+            raise MissingError(f"no optimum of {task} is known")
+        left = Inference(
+            best.reward - gap.estimate, gap.n, gap.method, best.reward - gap.high,
+            best.reward - gap.low, gap.confidence,
+        )  # fmt: skip
+        share = f"{left.estimate / -best.reward:.1%}"
+        rows.append((task, condition, str(best.reward), interval(left), share))
+    columns = ("task", "condition", "optimum", "ticks from it", "share")
+    return Finding(
+        None,
+        "; ".join(f"{task} {condition} {share}" for task, condition, _, _, share in rows),
+        table=Table("Distance to the optimum", columns, tuple(rows)),
+    )
+
+
+def _proposals(data: Data) -> Finding:
+    rows = []
+    for task, condition in BEST:
+        own = data.rewards(task, condition)
+        for variant, what in (
+            ("nullspace", "secondary objective in the corrective process's nullspace"),
+            ("biased", "noise biased towards the corrective process's suggestion"),
+        ):
+            other = rewards_of(data.learned(task, f"{condition}-{variant}"))
+            apart = difference_of_means(other, own, seed=SEED)
+            rows.append((task, condition, what, interval(apart)))
+    return Finding(
+        None,
+        "; ".join(f"{task} {what.split()[0]} {apart}" for task, _, what, apart in rows),
+        table=Table("Proposals", ("task", "condition", "change", "gain in reward"), tuple(rows)),
+    )
+
+
+def _absent_without_looking_ahead(data: Data) -> Finding:
+    parts = []
+    for method in (f"{LEARNER}EC1", *CONTROLS):
+        apart, change = context_distance(data, method), sacrifice(data, method)
+        if apart is None or change is None:
+            raise MissingError(f"runs of {method} on ascending and descending")
+        parts.append(
+            f"{method}: postures at goal 1 {apart:.2f} apart, first movement {change[0]:+.1f} and "
+            f"all {change[1]:+.1f} ticks against the initial solution"
+        )
+    return Finding(None, "; ".join(parts))
+
+
+REPRESENTATIVES = (
+    ("learner", f"{LEARNER}EC1", f"{LEARNER}EC4"),
+    ("CMA-ES", "cma-es/bandit", "cma-es/bandit"),
+    (
+        "shortest path",
+        "trajectory-optimisation/path-length",
+        "trajectory-optimisation/path-length",
+    ),
+    ("least jerk", "trajectory-optimisation/jerk", "trajectory-optimisation/jerk"),
+    (
+        "one goal ahead",
+        "posture-based/one-goal",
+        "posture-based/one-goal hands=every, other_arm=free",
+    ),
+    ("nullspace, next goal", "nullspace-qp/next-goal", "nullspace-qp/next-goal"),
+    ("corrective alone", "corrective-alone/given", "corrective-alone/every"),
+)
+"""Name, label on the one-armed tasks, label on the two-armed ones."""
+STEP_APART = 0.1
+"""Ten steps of movement: postures (length unit, rad) or shares of a way this far apart count."""
+TURN_APART = 0.05
+"""Turning angles this far apart count, rad."""
+PRESENCE = (
+    "Present means: *context*, mean postures at goal 1 of the ascending and the descending task "
+    "lie more than 0.1 apart (ten steps), with p < 5 % where there are several runs; "
+    "*sacrifice*, the first movement of the ascending task is longer than the initial solution's "
+    "by more than one tick (the interval's lower end, where there is one) and the whole shorter; "
+    "*motor-equivalent*, context is present and its motor-equivalent part (per root of dimension) "
+    "exceeds the other; *preshaping*, on two-armed task 1 the mean over goals and runs is more "
+    "than 0.1 above that of the corrective process with its best hands; *lead*, the contexts are "
+    "distinguishable before goal 1 is hit; *turning*, the turning angles of the ascending task "
+    "sum to at least 0.05 rad less than the initial solution's. A dash: cannot be said of the "
+    "runs in this folder"
+)
+
+
+def _shared_signatures(data: Data) -> Finding:
+    data.runs("ascending", f"{LEARNER}EC1")
+    data.runs("descending", f"{LEARNER}EC1")
+    rows = []
+    for name, one, two in REPRESENTATIVES:
+        shown = (
+            _context(data, one), _sacrifice(data, one), _equivalence(data, one),
+            _preshaping(data, two), _lead(data, one), _turning(data, one),
+        )  # fmt: skip
+        if set(shown) != {NONE}:
+            rows.append((name, *shown))
+    columns = (
+        "method", "context", "sacrifice (first, all)", "motor-equivalent", "preshaping",
+        "lead", "turning",
+    )  # fmt: skip
+    return Finding(None, PRESENCE, table=Table("Signatures", columns, tuple(rows)))
+
+
+def _said(present: bool, numbers: str) -> str:
+    return f"{'yes' if present else 'no'}, {numbers}"
+
+
+def _context_present(data: Data, label: str) -> tuple[bool, float] | None:
+    apart = context_distance(data, label)
+    if apart is None:
+        return None
+    try:
+        p = data.signature("ascending", label, "context dependence", "goal 1")["p"]
+    except MissingError:
+        p = math.nan
+    return apart > STEP_APART and not p >= 0.05, apart
+
+
+def _context(data: Data, label: str) -> str:
+    found = _context_present(data, label)
+    return NONE if found is None else _said(found[0], f"{found[1]:.2f}")
+
+
+def _sacrifice(data: Data, label: str) -> str:
+    try:
+        first = data.signature("ascending", label, "first subtask against initial")
+        total = data.signature("ascending", label, "total against initial")
+    except MissingError:
+        return NONE
+    low = first["value"] if math.isnan(first["low"]) else first["low"]
+    return _said(low > 1 and total["value"] < 0, f"{first['value']:+.1f}, {total['value']:+.1f}")
+
+
+def _equivalence(data: Data, label: str) -> str:
+    found = _context_present(data, label)
+    if found is None:
+        return NONE
+    same, other = (
+        data.signature("ascending", label, name, "goal 1")["value"]
+        for name in ("motor-equivalent part", "non-motor-equivalent part")
+    )
+    return _said(found[0] and same > other, f"{same:.3f} and {other:.3f}")
+
+
+def _preshaping(data: Data, label: str) -> str:
+    try:
+        own = preshaping_by_run(data.cell(ONE, label))
+        alone = preshaping_by_run(data.cell(ONE, "corrective-alone/every"))
+    except MissingError:
+        return NONE
+    if not len(own) or not len(alone):
+        return NONE
+    return _said(own.mean() > alone.mean() + STEP_APART, f"{own.mean():+.2f}")
+
+
+def _lead(data: Data, label: str) -> str:
+    try:
+        data.runs("ascending", label)
+        several = len(data.runs("descending", label)) > 1
+        lead = data.signature("ascending", label, "lead time", "goal 1")
+    except MissingError:
+        return "no" if context_distance(data, label) is not None and several else NONE
+    return _said(lead["value"] > 0, f"{lead['value']:.0f} ticks")
+
+
+def _turning(data: Data, label: str) -> str:
+    try:
+        own, initial = (
+            sum(
+                data.signature("ascending", name, "turning angle", goal)["value"]
+                for goal in ("goal 1", "goal 2")
+            )
+            for name in (label, "corrective-alone/given")
+        )
+    except MissingError:
+        return NONE
+    return _said(own <= initial - TURN_APART, f"{own:.2f} rad")
+
+
+BEYOND: tuple[Claim, ...] = (
+    Claim(
+        "absent-without-looking-ahead",
+        "Dependence on context and the sacrifice of the first movement, in methods that do not "
+        "look beyond the current goal. (The paper calls the reward for the whole task crucial; no "
+        "learner here is rewarded for each subtask instead.)",
+        "Beyond the paper",
+        "context distance at goal 1, and ticks against the initial solution (ascending)",
+        _absent_without_looking_ahead,
+    ),
+    *(
+        Claim(
+            f"resembles-{cost}",
+            f"Learned movements beside those planned for {what}: whether {CRITERION}.",
+            "Beyond the paper",
+            TEST,
+            resembles(cost),
+        )
+        for cost, what in SMOOTH.items()
+        if cost != "squared-changes"
+    ),
+    Claim(
+        "distance-to-optimum",
+        "How far the learner stays from the optimum.",
+        "Beyond the paper",
+        "mean gap with BCa interval; the optimum is the condition's own (other arm free or still)",
+        _to_the_optimum,
+    ),
+    Claim(
+        "reward-by-experience",
+        "What uninformed search gets from its trials.",
+        "Beyond the paper",
+        f"trials to come within {NEAR:.0%} of the optimum (Kaplan-Meier median)",
+        _experience,
+    ),
+    Claim(
+        "computation",
+        "How much each method evaluates.",
+        "Beyond the paper",
+        "forward kinematics and Jacobians",
+        _computation,
+    ),
+    Claim(
+        "proposals",
+        "What the paper's proposals for the learner gain.",
+        "Beyond the paper",
+        "difference of mean learned rewards with BCa interval",
+        _proposals,
+    ),
+    Claim(
+        "shared-signatures",
+        "Which signatures of coarticulation informed and uninformed search share.",
+        "Beyond the paper",
+        "presence as defined below",
+        _shared_signatures,
+    ),
+)

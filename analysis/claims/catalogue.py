@@ -1,0 +1,19 @@
+"""All claims, in the order of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from analysis.claims.beyond import BEYOND
+from analysis.claims.general import GENERAL
+from analysis.claims.one_armed import ONE_ARMED
+from analysis.claims.register import Claim, Judged, judge_claims
+from analysis.claims.two_armed import TWO_ARMED
+from analysis.study import Study
+
+CLAIMS: tuple[Claim, ...] = (*ONE_ARMED, *TWO_ARMED, *GENERAL, *BEYOND)
+
+
+def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
+    """Every claim with its verdict; see :func:`analysis.claims.register.judge_claims`."""
+    return judge_claims(study, claims)

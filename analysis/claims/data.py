@@ -1,0 +1,194 @@
+"""What judges read of a results folder, with a record of what each has read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.published import TRIALS
+from analysis.results import Results
+from analysis.signatures.cell import Cell
+from analysis.statistics import FEWEST
+from analysis.study import Study
+from coartic import Execution, Task, corrective_trial, initial_hands
+from coartic.errors import NotApplicableError
+from coartic.robot import Array
+
+LEARNER = "dual-process/"
+
+CELLS = (
+    ("ascending", "EC1"),
+    ("descending", "EC1"),
+    ("two-armed-1", "EC2"),
+    ("two-armed-1", "EC3"),
+    ("two-armed-1", "EC4"),
+    ("two-armed-2", "EC3"),
+    ("two-armed-2", "EC4"),
+)
+"""Tasks and conditions of the paper."""
+
+BEST = (
+    ("ascending", "EC1"),
+    ("descending", "EC1"),
+    ("two-armed-1", "EC4"),
+    ("two-armed-2", "EC4"),
+)
+"""The condition that explores most, by task."""
+
+SMOOTH = {
+    "squared-changes": "least squared configuration changes (Jordan)",
+    "acceleration": "least acceleration",
+    "jerk": "least jerk (Flash & Hogan)",
+}
+"""Smoothness costs of trajectory optimisation, in words."""
+
+
+class MissingError(Exception):
+    """The folder lacks what a claim needs."""
+
+
+@dataclass
+class Data:
+    """A results folder as the claims read it."""
+
+    study: Study
+    _runs: list[str] = field(default_factory=list)
+    _others: list[str] = field(default_factory=list)
+
+    @property
+    def results(self) -> Results:
+        """The stored results."""
+        return self.study.results
+
+    @property
+    def run_ids(self) -> tuple[str, ...]:
+        """Runs read since :meth:`forget`."""
+        return tuple(dict.fromkeys(self._runs))
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What else was read since :meth:`forget`."""
+        return tuple(dict.fromkeys(self._others))
+
+    def forget(self) -> None:
+        """Begin a new record of what is read."""
+        self._runs.clear()
+        self._others.clear()
+
+    def note(self, run_ids: tuple[str, ...]) -> None:
+        """Record runs as read."""
+        self._runs += run_ids
+
+    def runs(self, task: str, method: str) -> pd.DataFrame:
+        """Solved runs of a method; raises MissingError where they cannot be judged."""
+        cell = self.study.cells.get((task, method))
+        if cell is None or not len(cell.runs):
+            raise MissingError(f"no runs of {method} on {task}")
+        if len(cell.good) < len(cell.runs):
+            failed = len(cell.runs) - len(cell.good)
+            raise MissingError(
+                f"{failed} of {len(cell.runs)} runs of {method} on {task} have no solution"
+            )
+        if method.startswith(LEARNER):
+            trials = sorted(set(cell.runs.trials))
+            if trials != [TRIALS]:
+                raise MissingError(
+                    f"runs of {method} on {task} with {TRIALS} trials, as the paper's have "
+                    f"(here {', '.join(map(str, trials))})"
+                )
+            if len(cell.runs) < FEWEST:
+                raise MissingError(f"at least {FEWEST} runs of {method} on {task}")
+        self.note(tuple(cell.good.run_id))
+        return cell.good
+
+    def learned(self, task: str, condition: str) -> pd.DataFrame:
+        """Runs of the paper's learner."""
+        return self.runs(task, LEARNER + condition)
+
+    def rewards(self, task: str, condition: str) -> Array:
+        """Learned rewards, shape ``(runs,)``."""
+        return rewards_of(self.learned(task, condition))
+
+    def replays(self, task: str, condition: str, hands: str | None = None) -> Array:
+        """Rewards of noiseless replays of runs (that learned ``hands``), shape ``(runs,)``.
+
+        Not the learned reward, which as the best of all trials is never below trial 0's.
+        """
+        runs = self.learned(task, condition)
+        if hands is not None:
+            runs = runs[runs.hands == hands]
+        replays = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        if not np.isfinite(replays).all():
+            raise MissingError(f"a replay of every run of {condition} on {task}")
+        return replays
+
+    def group(self, task: str, condition: str, hands: str) -> Array:
+        """Learned rewards of the runs that learned a hand sequence, shape ``(runs,)``."""
+        runs = self.learned(task, condition)
+        found = rewards_of(runs[runs.hands == hands])
+        if len(found) < FEWEST:
+            raise MissingError(
+                f"at least {FEWEST} runs of {condition} on {task} that learned {hands} "
+                f"(here {len(found)})"
+            )
+        return found
+
+    def cell(self, task: str, method: str) -> Cell:
+        """Executed solutions; raises MissingError where there are none."""
+        self.runs(task, method)
+        return self.study.trajectories[task, method]
+
+    def signature(self, task: str, method: str, name: str, where: str = "") -> dict[str, Any]:
+        """The first row of a signature whose ``where`` begins so; MissingError without one."""
+        self.runs(task, method)
+        frame = self.study.signatures
+        rows = frame[(frame.task == task) & (frame.label == method) & (frame.signature == name)]
+        rows = rows[rows["where"].str.startswith(where) & rows.value.notna()]
+        if not len(rows):
+            raise MissingError(f"{name} of {method} on {task} has no value")
+        return {str(key): value for key, value in rows.iloc[0].items()}
+
+    def task(self, name: str) -> Task:
+        """A task of the folder."""
+        known = self.results.tasks
+        if name not in known:
+            raise MissingError(f"task {name}")
+        return known[name]
+
+    def initial(self, name: str) -> Execution:
+        """A task's initial solution: the corrective process alone with the task's hands."""
+        task = self.task(name)
+        try:
+            execution = corrective_trial(task, initial_hands(task))
+        except NotApplicableError:
+            execution = None
+        if execution is None or not execution.completed:
+            raise MissingError(f"the corrective process alone does not complete {name}")
+        self._others.append(f"the corrective process on {name}")
+        return execution
+
+    def sequences(self, task: str) -> dict[str, float]:
+        """Reward of the corrective process alone by hand sequence; NaN where it fails."""
+        table = self.results.sequences
+        own = table[table.task == task] if len(table) else table
+        if not len(own):
+            raise MissingError(f"the corrective process alone on {task}")
+        self._others.append("sequences.parquet")
+        rewards = own.reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        return dict(zip(map(str, own.hands), rewards.tolist(), strict=True))
+
+    def best_sequences(self, task: str) -> tuple[list[str], float]:
+        """Hand sequences that are best by the corrective process alone, and their reward."""
+        known = {h: r for h, r in self.sequences(task).items() if np.isfinite(r)}
+        if not known:
+            raise MissingError(f"a hand sequence with which the corrective process does {task}")
+        best = max(known.values())
+        return [hands for hands, reward in known.items() if reward == best], best
+
+
+def rewards_of(runs: pd.DataFrame) -> Array:
+    """Rewards as numbers, shape ``(runs,)``."""
+    return runs.reward.to_numpy(dtype=np.float64)

@@ -1,0 +1,141 @@
+"""The register as a page to read and as a frame."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+import pandas as pd
+
+from analysis.claims import register
+from analysis.claims.register import Judged
+from analysis.results import Results
+from analysis.table import NONE, Table
+
+FITTED = (
+    "† entered the choice of the two-armed tasks' goals, which are a reconstruction "
+    "(docs/model.md): a reproduction, no independent test."
+)
+
+
+def claims_frame(judged: Iterable[Judged]) -> pd.DataFrame:
+    """One row per claim.
+
+    Columns: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence`` (with its
+    table, row by row), ``test``, ``p`` (largest of the claim's tests), ``adjusted_p`` (Holm),
+    ``place``, ``figure`` (of the paper), ``runs`` (ids, space-separated), ``sources`` (what
+    else it rests on).
+    """
+    return pd.DataFrame(
+        [
+            {
+                "id": entry.claim.id,
+                "section": entry.claim.section,
+                "statement": entry.claim.statement,
+                "verdict": entry.verdict,
+                "fitted": entry.claim.fitted,
+                "evidence": _whole(entry),
+                "test": entry.claim.test,
+                "p": entry.p,
+                "adjusted_p": entry.adjusted_p,
+                "place": entry.claim.place,
+                "figure": entry.claim.figure,
+                "runs": " ".join(entry.run_ids),
+                "sources": ", ".join(entry.sources),
+            }
+            for entry in judged
+        ]
+    )
+
+
+def claims_page(results: Results, judged: Sequence[Judged]) -> str:
+    """The register as a Markdown page: counts, a table of verdicts, then claim by claim.
+
+    The runs behind each claim are in :func:`claims_frame`.
+    """
+    specification = results.manifest["specification"]
+    tests = sum(not math.isnan(entry.p) for entry in judged)
+    parts = [
+        "# Claims",
+        f"What Shah, Barto & Fagg (2013) say of their model, tested on suite "
+        f"`{specification['suite']}`: {specification['runs']} runs of {specification['trials']} "
+        f"trials, seed {specification['seed']}.",
+        _summary(judged),
+        f"{_rules()} {FITTED} Run ids of every claim are in `claims.csv`.",
+        Table(
+            "Verdicts",
+            ("claim", "verdict", "adjusted p"),
+            tuple(
+                (f"[{entry.claim.id}](#{entry.claim.id})", _verdict(entry), _p(entry.adjusted_p))
+                for entry in judged
+            ),
+        ).to_markdown(),
+        f"p: the largest of a claim's tests, adjusted by Holm over {tests} claims.",
+    ]
+    for section, entries in itertools.groupby(judged, key=lambda entry: entry.claim.section):
+        parts += [f"## {section}", *map(_entry, entries)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _summary(judged: Sequence[Judged]) -> str:
+    paper = [entry for entry in judged if entry.claim.place]
+    lines = []
+    for name, entries in (
+        ("Independent tests", [e for e in paper if not e.claim.fitted]),
+        ("Reproductions †", [e for e in paper if e.claim.fitted]),
+    ):
+        found = Counter(entry.verdict for entry in entries)
+        counted = ", ".join(
+            f"{found[verdict]} {verdict}"
+            for verdict in ("supported", "not supported", "cannot tell")
+        )
+        lines.append(f"**{name}**: {len(entries)} claims, {counted}.")
+    return "  \n".join(lines)
+
+
+def _rules() -> str:
+    """The rules as the register's own docstring has them."""
+    return (register.__doc__ or "").split("\n\n", 1)[1].strip().replace("\n", " ")
+
+
+def _entry(entry: Judged) -> str:
+    claim = entry.claim
+    where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+    lines = [
+        f"### {claim.id}",
+        f"{claim.statement} **{_verdict(entry).capitalize()}.**",
+        f"- Seen: {entry.evidence}.",
+        f"- Test: {claim.test}.",
+    ]
+    if claim.place and entry.methods:
+        p = f"p = {_p(entry.p)}, adjusted {_p(entry.adjusted_p)}"
+        lines.append(f"- {p}; {'; '.join(entry.methods)}.")
+    lines.append(f"- Place: {where}. Rests on: {_basis(entry)}.")
+    text = "\n\n".join([*lines[:2], "\n".join(lines[2:])])
+    return text if entry.table is None else f"{text}\n\n{entry.table.to_markdown()}"
+
+
+def _basis(entry: Judged) -> str:
+    runs = [f"{len(entry.run_ids)} runs"] if entry.run_ids else []
+    return ", ".join([*runs, *entry.sources]) or "nothing in this folder"
+
+
+def _verdict(entry: Judged) -> str:
+    return entry.verdict + (" †" if entry.claim.fitted else "")
+
+
+def _p(value: float) -> str:
+    return NONE if math.isnan(value) else f"{value:.2g}"
+
+
+def _whole(entry: Judged) -> str:
+    if entry.table is None:
+        return entry.evidence
+    names = entry.table.columns
+    rows = (
+        ", ".join(f"{name} {cell}" for name, cell in zip(names, row, strict=True))
+        for row in entry.table.rows
+    )
+    return f"{entry.evidence}. " + "; ".join(rows)

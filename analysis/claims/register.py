@@ -1,0 +1,135 @@
+"""What a claim is, and the rules of its verdict.
+
+*Supported*: what the claim says is seen, and the largest p-value of the tests it rests on
+(they must all hold: an intersection-union test) stays below 5 % after Holm's correction over
+the paper's claims. *Not supported*: the contrary is significant, or what can be counted
+exactly is not there. *Cannot tell*: neither, or the folder lacks the runs. Comparisons that
+the paper does not make are *measured*, not judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from analysis.claims.data import Data, MissingError
+from analysis.statistics import Inference, holm
+from analysis.study import Study
+from analysis.table import Table
+
+LEVEL = 0.05
+Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
+Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was seen of one claim, before any correction of its tests."""
+
+    holds: bool | None
+    """Whether what the claim says is seen; None where nothing is judged."""
+    evidence: str
+    tests: tuple[Inference, ...] = ()
+    """One-tailed tests that it rests on, turned so that a positive estimate is as claimed."""
+    table: Table | None = None
+    """Numbers that are more than a sentence can hold."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One statement and how it is decided."""
+
+    id: str
+    statement: str
+    section: Section
+    test: str
+    judge: Callable[[Data], Finding]
+    place: str = ""
+    """Section of the paper that makes it; empty for comparisons of our own."""
+    figure: str = ""
+    """Figure of the paper that shows it, where one does."""
+    fitted: bool = False
+    """Whether it entered the choice of the two-armed tasks' goals."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim with its verdict."""
+
+    claim: Claim
+    verdict: Verdict
+    evidence: str
+    p: float = math.nan
+    """Largest of its tests; NaN without a test, and where nothing is judged."""
+    adjusted_p: float = math.nan
+    """The same, adjusted over the paper's claims (Holm)."""
+    methods: tuple[str, ...] = ()
+    """Tests, in words."""
+    run_ids: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
+    """What it rests on beside runs."""
+    table: Table | None = None
+
+
+def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
+    """Every claim with its verdict, p-values corrected over all of them (Holm)."""
+    data = Data(study)
+    found: list[tuple[Claim, Finding, tuple[str, ...], tuple[str, ...]]] = []
+    for claim in claims:
+        data.forget()
+        try:
+            finding = claim.judge(data)
+        except MissingError as missing:
+            found.append((claim, Finding(None, f"not in this folder: {missing}"), (), ()))
+        else:
+            found.append((claim, finding, data.run_ids, data.others))
+    largest = [_largest(finding) if claim.place else math.nan for claim, finding, *_ in found]
+    return [
+        Judged(
+            claim,
+            _verdict(claim, finding, adjusted, seen=bool(run_ids or sources)),
+            finding.evidence,
+            p,
+            adjusted,
+            tuple(dict.fromkeys(map(_in_words, finding.tests))),
+            run_ids,
+            sources,
+            finding.table,
+        )
+        for (claim, finding, run_ids, sources), p, adjusted in zip(
+            found, largest, holm(largest), strict=True
+        )
+    ]
+
+
+def _in_words(test: Inference) -> str:
+    return (
+        test.method if not (math.isnan(test.p) and test.note) else f"{test.method} ({test.note})"
+    )
+
+
+def _largest(finding: Finding) -> float:
+    """All tests of a claim must hold: its p-value is the largest."""
+    return max((t.p for t in finding.tests if not math.isnan(t.p)), default=math.nan)
+
+
+def _verdict(claim: Claim, finding: Finding, p: float, *, seen: bool) -> Verdict:
+    if not seen:
+        return "cannot tell"
+    if not claim.place:
+        return "measured"
+    if finding.holds is None:
+        return "cannot tell"
+    if finding.holds:
+        # NaN: counted exactly, or no spread in any sample.
+        return "cannot tell" if p >= LEVEL else "supported"
+    if not finding.tests:
+        return "not supported"
+    return "not supported" if any(map(_contrary, finding.tests)) else "cannot tell"
+
+
+def _contrary(test: Inference) -> bool:
+    """Of a one-tailed test: the contrary is as significant as p is near to one."""
+    return test.estimate < 0 if math.isnan(test.p) else test.p >= 1 - LEVEL / 2

@@ -1,0 +1,64 @@
+"""Whether learned postures resemble those of a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.claims.data import LEARNER, Data, MissingError
+from analysis.claims.register import Finding
+from analysis.claims.wording import interval
+from analysis.statistics import bootstrap_test, mean
+from analysis.study import SEED
+from coartic.robot import Array
+
+SHARE = 0.5
+CRITERION = (
+    "the postures at the goals lie less than half as far from the plan's as the initial "
+    "solution's do"
+)
+TEST = (
+    "one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to the "
+    "plan, learned over initial, is below 0.5; BCa interval of the ratio"
+)
+_OPTIMUM = "optimum/dynamic-programming"
+
+
+def resembles(cost: str) -> Callable[[Data], Finding]:
+    """A judge of the resemblance to the plan of one smoothness cost."""
+
+    def decide(data: Data) -> Finding:
+        tests, parts = [], []
+        for task in ("ascending", "descending"):
+            learner, initial = data.cell(task, f"{LEARNER}EC1"), data.initial(task)
+            (plan,) = data.cell(task, f"trajectory-optimisation/{cost}").runs
+            planned = plan.execution.configurations
+            before = _apart(initial.configurations, planned)
+            ratios = np.array(
+                [_apart(run.execution.configurations, planned) / before for run in learner.runs]
+            )
+            test = bootstrap_test(-ratios, -SHARE, seed=SEED)
+            tests.append(replace(test, method=f"{test.method}, sign turned"))
+            parts.append(
+                f"{task}: initial {before:.2f} from the plan, learned "
+                f"{interval(mean(ratios, seed=SEED), 2)} times as far"
+                + _optimum(data, task, planned, before)
+            )
+        return Finding(all(t.estimate > 0 for t in tests), "; ".join(parts), tuple(tests))
+
+    return decide
+
+
+def _optimum(data: Data, task: str, planned: Array, before: float) -> str:
+    try:
+        (best,) = data.cell(task, _OPTIMUM).runs
+    except MissingError:
+        return ""
+    return f", the optimum {_apart(best.execution.configurations, planned) / before:.2f} times"
+
+
+def _apart(q: Array, planned: Array) -> float:
+    """Mean distance of postures at the goals, length unit and rad mixed."""
+    return float(np.linalg.norm(q - planned, axis=-1).mean())
