@@ -117,7 +117,10 @@ def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFram
     """
     path = folder / f"{name}.parquet"
     try:
-        table = pd.read_parquet(path, **({"dtype_backend": "numpy_nullable"} if nullable else {}))
+        if nullable:
+            table = pd.read_parquet(path, dtype_backend="numpy_nullable")
+        else:
+            table = pd.read_parquet(path)
     except FileNotFoundError:
         raise CoarticError(f"{path} is missing; {_ANEW}") from None
     except (OSError, ValueError) as error:

@@ -295,13 +295,17 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims and the reward-compute frontier of a results folder."""
+    from analysis.signatures.page import signatures_page
+
     from analysis.claims import claims_page, judge
     from analysis.frontier import (
+        anytime_frame,
         area_frame,
-        frontier_page,
+        for_both_arms,
         pareto_frame,
         targets_frame,
     )
+    from analysis.frontier_page import frontier_page
     from analysis.results import load_results
     from analysis.study import Study
     from benchmarks.store import write_atomically
@@ -311,12 +315,14 @@ def analyse(
     judged, steps = judge(study), study.steps
     pages = {
         "claims.md": claims_page(results, judged),
-        "frontier.md": frontier_page(results, steps),
+        "frontier.md": frontier_page(study),
+        "signatures.md": signatures_page(study),
     }
     frames = {
         "signatures.csv": study.signatures.drop(columns="label"),
-        "targets.csv": targets_frame(results, steps),
-        "areas.csv": area_frame(results, steps),
+        "anytime.csv": anytime_frame(results, steps),
+        "targets.csv": for_both_arms(targets_frame, results, steps),
+        "areas.csv": for_both_arms(area_frame, results, steps),
         "pareto.csv": pareto_frame(results),
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
