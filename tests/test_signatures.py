@@ -663,3 +663,21 @@ def test_nulls_are_nulls():
         if "20 and 20 runs" in test.name or "ΔV" in test.name:
             share, _, _ = signature_nulls.rate(test, 60)
             assert share < 0.2
+
+
+def test_every_test_finds_what_is_planted():
+    """Each test that has nulls has effects as well, and finds them more often than nulls."""
+    kinds = {simulation.name.split(",")[0] for simulation in signature_nulls.nulls()}
+    assert kinds == {simulation.name.split(",")[0] for simulation in signature_nulls.planted()}
+    for simulation in signature_nulls.planted():
+        share, low, _ = signature_nulls.rate(simulation, 30)
+        assert low > signature_nulls.ALPHA, f"{simulation.name}: {share}"
+
+
+def test_intervals_hold_the_truth():
+    for simulation in signature_nulls.coverage():
+        share, _, high = signature_nulls.rate(simulation, 150)
+        low_counts = "Poisson, 0.1" in simulation.name
+        assert high > (0.6 if low_counts else 0.9), f"{simulation.name}: {share}"
+    (_, first), (truth, second), _ = signature_nulls.entropies(400)
+    assert first < second < truth == pytest.approx(0.8813, abs=1e-4)  # biased downwards
