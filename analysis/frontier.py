@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -19,14 +19,13 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from analysis.methods import STILL, methods_frame
+from analysis.methods import STILL, methods_frame, solve_times
 from analysis.optimum import METHODS as OPTIMUM
-from analysis.optimum import optima
+from analysis.optimum import locks_base, optima
 from analysis.progress import SPENDS, Progress, progress
 from analysis.results import CellRuns, Results
 from analysis.statistics import CONFIDENCE
 from analysis.survival import kaplan_meier_median
-from analysis.table import Table, short
 from coartic.robot import Array
 
 SHARES = (0.05, 0.02, 0.01)
@@ -34,7 +33,10 @@ SHARES = (0.05, 0.02, 0.01)
 RESAMPLES = 2000
 POINTS = 60
 """Budgets on an anytime curve."""
+TIME_TOLERANCE = 0.1
+"""Relative difference up to which two solve times are a tie."""
 OtherArm = Literal["free", "still"]
+OTHER_ARMS: tuple[OtherArm, ...] = ("free", "still")
 Steps = Mapping[str, Progress]
 LABELS = {
     "trials": "trials",
@@ -61,7 +63,7 @@ def anytime_frame(results: Results, steps: Steps | None = None, *, seed: int = 0
     Tibshirani, 1993), pointwise, not a band around the whole curve; they are missing for
     a single run. ``seed`` is that of the resampling; a cell's rows do not depend on other
     cells. Runs whose time is not taken (:func:`analysis.methods.solve_times`) have no part
-    in the curve over time.
+    in the curve over time, nor methods with a base that a parameter locks in any.
     """
     rows: list[dict[str, Any]] = []
     for cell, spend, runs in _selected(results, steps):
@@ -95,6 +97,14 @@ def anytime_frame(results: Results, steps: Steps | None = None, *, seed: int = 0
     return pd.DataFrame(rows, columns=columns.split())
 
 
+def for_both_arms(
+    frame: Callable[..., pd.DataFrame], results: Results, steps: Steps | None = None
+) -> pd.DataFrame:
+    """:func:`area_frame` or :func:`targets_frame` of both optima, one below the other."""
+    parts = [frame(results, steps, other_arm=other_arm) for other_arm in OTHER_ARMS]
+    return pd.concat(parts, ignore_index=True)
+
+
 def area_frame(
     results: Results,
     steps: Steps | None = None,
@@ -116,10 +126,11 @@ def area_frame(
     ``end`` over the number of trials, one average trial: areas compare within a task, a
     spend and a folder only. The steps are integrated exactly.
 
-    Columns: ``task``, ``method``, ``spend``, ``start``, ``end``, ``runs``, mean ``area`` with
-    its percentile bootstrap interval ``low`` to ``high``. Tasks without a known optimum and
-    spends without a run that learns have no rows; with ``other_arm="still"`` neither have
-    methods that move the arm that is not chosen.
+    Columns: ``task``, ``method``, ``other_arm`` (which optimum), ``spend``, ``start``, ``end``,
+    ``runs``, mean ``area`` with its percentile bootstrap interval ``low`` to ``high``. Tasks
+    without a known optimum, spends without a run that learns, and methods with a base that a
+    parameter locks have no rows; with ``other_arm="still"`` neither have methods that move the
+    arm that is not chosen.
     """
     references = optima(results)
     selected = list(_selected(results, steps))
@@ -142,6 +153,7 @@ def area_frame(
             {
                 "task": cell.task,
                 "method": cell.label,
+                "other_arm": other_arm,
                 "spend": spend,
                 "start": start,
                 "end": end,
@@ -151,7 +163,7 @@ def area_frame(
                 "high": high[0],
             }
         )
-    columns = "task method spend start end runs area low high"
+    columns = "task method other_arm spend start end runs area low high"
     return pd.DataFrame(rows, columns=columns.split())
 
 
@@ -165,23 +177,26 @@ def targets_frame(
     """Spend to come near the optimum R*: one row per task, method, spend and share.
 
     A run reaches a share when its gap, R* − reward, is at most that share of |R*|.
-    Columns: ``task``, ``method``, ``spend``, ``share``, ``target`` (the reward that this
-    takes), ``runs``, ``reached`` (how many runs), ``reached_low`` and ``reached_high`` (exact
-    95 % interval of the probability to reach it, Clopper & Pearson, 1934), ``median`` spend
-    to reach it with the interval ``low`` to ``high``
+    Columns: ``task``, ``method``, ``other_arm`` (which optimum), ``spend``, ``share``,
+    ``target`` (the reward that this takes), ``runs``, ``reached`` (how many runs),
+    ``reached_low`` and ``reached_high`` (exact 95 % interval of the probability to reach it,
+    Clopper & Pearson, 1934), ``median`` spend to reach it with the interval ``low`` to ``high``
     (:func:`analysis.survival.kaplan_meier_median`), and ``horizon``.
 
     The median is over all runs, infinite where half of them did not reach the target; so
     are limits that the runs do not bound. Runs that could have gone on are right-censored,
     all at the horizon: the least spend at which one of them ended. (Each at its own end
     would make censoring depend on the outcome: worse trials take more ticks. Lin et al.,
-    1997, on costs.) What was reached behind the horizon counts in ``reached`` only. Runs
-    that ended by themselves never reach a target that they missed: a planner's, one
-    without a solution, one with fewer trials than others of its cell. The horizon of
-    planners is infinite. Runs whose time is not taken have no part in those over time.
+    1997, on costs.) What was reached behind the horizon counts in ``reached`` only. A run
+    could have gone on if its budget of trials stopped it (:attr:`Progress.stopped
+    <analysis.progress.Progress.stopped>`). Runs that ended by themselves never reach a
+    target that they missed: a planner's, an exhaustive search's that tried all it had, one
+    without a solution. The horizon is infinite where all runs ended by themselves. Runs
+    whose time is not taken have no part in those over time.
 
-    Tasks without a known optimum have no rows; with ``other_arm="still"`` neither have
-    methods that move the arm that is not chosen.
+    Tasks without a known optimum have no rows, nor have methods with a base that a parameter
+    locks, for which it is no optimum; with ``other_arm="still"`` neither have methods that
+    move the arm that is not chosen.
     """
     references = optima(results)
     rows: list[dict[str, Any]] = []
@@ -200,6 +215,7 @@ def targets_frame(
                 {
                     "task": cell.task,
                     "method": cell.label,
+                    "other_arm": other_arm,
                     "spend": spend,
                     "share": share,
                     "target": target,
@@ -213,136 +229,120 @@ def targets_frame(
                     "horizon": horizon,
                 }
             )
-    columns = "task method spend share target runs reached reached_low reached_high"
+    columns = "task method other_arm spend share target runs reached reached_low reached_high"
     return pd.DataFrame(rows, columns=f"{columns} median low high horizon".split())
 
 
-def pareto_frame(results: Results) -> pd.DataFrame:
+def pareto_frame(results: Results, *, seed: int = 0) -> pd.DataFrame:
     """Mean reward against spend: one row per task, method and spend, best reward first.
 
     A method is on the front if no other has a mean reward as high for as little spend, with
-    either one better; ties are all on it. Columns: ``task``, ``method``, ``told`` (a letter
-    for each kind of information, :data:`analysis.methods.TOLD`), ``runs``, ``solved``, mean
-    ``reward``, ``spend`` (:data:`LABELS`; ``information`` is the number of kinds of
-    information told, which does not weigh them), ``amount`` (median over runs), ``front``,
-    and ``front_told``: whether it is on the front among methods that were told nothing that
-    it was not.
+    either one better; ties are all on it. Times within :data:`TIME_TOLERANCE` of each other
+    are ties: they vary between machines and between runs. Columns: ``task``, ``method``,
+    ``told`` (a letter for each kind of information, :data:`analysis.methods.TOLD`), ``runs``,
+    ``solved``, mean ``reward``, ``spend`` (:data:`LABELS`; ``information`` is the number of
+    kinds of information told, which does not weigh them), ``amount`` (median over runs),
+    ``front``, ``front_share`` (of :data:`RESAMPLES` bootstrap resamples, in how many it is on
+    the front), and ``front_told`` and ``told_share``: the same among methods that were told
+    nothing that it was not.
 
-    Methods with runs that have no solution are left out: a mean of the others flatters
-    them. So are the optimum's searches, which are references. Means are taken as they are,
-    without their sampling error.
+    Runs are resampled within their cell, reward and spend of a run together, by run number:
+    methods that did the same in every run stay tied, as methods that share their seeds may.
+    A method with a single run is taken as it is. Methods with runs that have no solution are
+    left out: a mean of the others flatters them. So are the optimum's searches, which are
+    references, and methods with a base that a parameter locks.
     """
     methods = methods_frame(results)
     methods = methods[(methods.solved == methods.runs) & (methods.runs > 0)]
-    methods = methods[~methods.method.str.startswith(OPTIMUM)]
-    methods = methods.assign(
-        method=(methods.method + " " + methods.variant).str.strip(),
-        information=methods.told.str.len().astype(float),
-    )
+    methods = methods.assign(method=(methods.method + " " + methods.variant).str.strip())
+    cells = {
+        (cell.task, cell.label): cell
+        for cell in results.cells
+        if not cell.method.startswith(OPTIMUM) and not locks_base(cell.runs)
+    }
+    methods = methods[[key in cells for key in zip(methods.task, methods.method, strict=True)]]
     parts = []
-    for _, rows in methods.groupby("task", sort=False):
-        reward, told = rows.reward.to_numpy(), [frozenset(letters) for letters in rows.told]
+    for task, rows in methods.groupby("task", sort=False):
+        chosen = [cells[str(task), label] for label in rows.method]
+        told = [frozenset(letters) for letters in rows.told]
         no_more = np.array([[other <= own for other in told] for own in told])
+        rewards = [cell.runs.reward.to_numpy(dtype=np.float64) for cell in chosen]
+        mean = rows.reward.to_numpy()
+        means = np.stack([_resampled(values, seed).mean(axis=-1) for values in rewards], axis=-1)
         for spend in LABELS:
-            amount = rows[spend].to_numpy(dtype=np.float64)
-            worse = dominated(reward, amount)
+            spent = [
+                _spent(cell, spend, letters) for cell, letters in zip(chosen, told, strict=True)
+            ]
+            amount = np.array([float(_median(values)) for values in spent])
+            amounts = np.stack([_median(_resampled(values, seed)) for values in spent], axis=-1)
+            tolerance = TIME_TOLERANCE if spend == "solve_s" else 0.0
+            worse = dominated(mean, amount, tolerance)
+            again = dominated(means, amounts, tolerance)
+            known, seen = ~np.isnan(amount), ~np.isnan(amounts)
             parts.append(
                 rows[["task", "method", "told", "runs", "solved", "reward"]].assign(
                     spend=spend,
                     amount=amount,
-                    front=~worse.any(axis=1) & ~np.isnan(amount),
-                    front_told=~(worse & no_more).any(axis=1) & ~np.isnan(amount),
+                    front=~worse.any(axis=-1) & known,
+                    front_share=(~again.any(axis=-1) & seen).mean(axis=0),
+                    front_told=~(worse & no_more).any(axis=-1) & known,
+                    told_share=(~(again & no_more).any(axis=-1) & seen).mean(axis=0),
                 )
             )
-    columns = "task method told runs solved reward spend amount front front_told"
+    columns = "task method told runs solved reward spend amount front front_share"
+    columns += " front_told told_share"
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns.split())
 
 
-def dominated(reward: Array, amount: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Whether method i is dominated by method j, shape ``(n, n)``: rewards and amounts (n,)."""
-    as_good = (reward[None] >= reward[:, None]) & (amount[None] <= amount[:, None])
-    better = (reward[None] > reward[:, None]) | (amount[None] < amount[:, None])
+def dominated(
+    reward: Array, amount: Array, tolerance: float = 0.0
+) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Whether method i is dominated by method j, shape ``(..., n, n)``.
+
+    ``reward`` and ``amount`` have shape ``(..., n)``. Amounts whose ratio is at most
+    1 + ``tolerance`` are ties. Domination has no cycles all the same: along one the reward
+    could not change, and amounts would only fall.
+    """
+    own, other = reward[..., :, None], reward[..., None, :]
+    spent, others = amount[..., :, None], amount[..., None, :]
+    room = 1 + tolerance
+    as_good = (other >= own) & (others <= spent * room)
+    better = (other > own) | (others * room < spent)
     return as_good & better
 
 
-def targets_tables(
-    results: Results,
-    steps: Steps | None = None,
-    *,
-    spend: str = "trials",
-    other_arm: OtherArm = "free",
-) -> list[Table]:
-    """:func:`targets_frame` over one spend as a table of text per task.
-
-    A cell is: runs that reached the target of all runs, median spend [95 % interval]; the
-    median is greater than the horizon where too few reached it within that.
-    """
-    frame = targets_frame(results, steps, other_arm=other_arm)
-    tables = []
-    for name, rows in frame[frame.spend == spend].groupby("task", sort=False):
-        targets = rows.drop_duplicates("share")
-        columns = [
-            f"within {share:.3g} %: {target}"
-            for share, target in zip(100 * targets.share, targets.target, strict=True)
-        ]
-        lines = [
-            (str(method), *map(_target_cell, own.to_dict("records")))
-            for method, own in rows.groupby("method", sort=False)
-        ]
-        title = f"{name}: {LABELS[spend]} to come near the optimum, other arm {other_arm}"
-        tables.append(Table(title, ("method", *columns), tuple(lines)))
-    return tables
+def _spent(cell: CellRuns, spend: str, told: frozenset[str]) -> Array:
+    """What each run spent (n,); NaN for times that are not taken."""
+    if spend == "information":
+        return np.full(len(cell.runs), float(len(told)))
+    if spend == "solve_s":
+        times = solve_times(cell.good)
+        return times.reindex(cell.runs.index).to_numpy(dtype=np.float64, na_value=np.nan)
+    return cell.runs[spend].to_numpy(dtype=np.float64, na_value=np.nan)
 
 
-def pareto_tables(results: Results) -> list[Table]:
-    """The methods on some front of :func:`pareto_frame`, as a table of text per task.
-
-    ● is on the front of all methods, ○ on that of the methods told no more.
-    """
-    frame = pareto_frame(results)
-    tables = []
-    for name, rows in frame.groupby("task", sort=False):
-        kept = rows[rows.groupby("method").front_told.transform("any")]
-        lines = []
-        for method, own in kept.groupby("method", sort=False):
-            first = own.iloc[0]
-            cells = (
-                short(row["amount"]) + (" ●" if row["front"] else " ○" * row["front_told"])
-                for row in own.to_dict("records")
-            )
-            lines.append((str(method), first.told, f"{first.reward:.1f}", *cells))
-        columns = ("method", "told", "reward", *LABELS.values())
-        tables.append(Table(f"{name}: Pareto sets of reward and spend", columns, tuple(lines)))
-    return tables
-
-
-def frontier_page(results: Results, steps: Steps) -> str:
-    """Targets over trials and Pareto sets as a Markdown page."""
-    tables = [
-        *targets_tables(results, steps),
-        *targets_tables(results, steps, other_arm="still"),
-        *pareto_tables(results),
-    ]
-    parts = [
-        "# Reward and what it costs",
-        "Targets: runs that came within a share of the optimum, of all runs; median trials with "
-        "its 95 % interval over all runs (Kaplan-Meier; those that could have gone on are "
-        "censored, the others never reach it). Pareto sets: ● no method has a mean reward as high "
-        "for as little spend, ○ none that was told no more; methods with a run that has no "
-        "solution, and the optimum's searches, are left out. Spend is the median over runs; early "
-        "kinematics and time are spread evenly over a run's trials. docs/results.md says more.",
-    ]
-    for table in tables:
-        parts += [f"## {table.title}", table.to_markdown()]
-    return "\n\n".join(parts) + "\n"
+def _median(values: Array) -> Array:
+    """Median over the last axis of the values that are known; NaN where none is."""
+    ordered = np.sort(values, axis=-1)  # NaN last
+    count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
+    sides = [np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[-1] - 1)]
+    middle: Array = np.concatenate(
+        [np.take_along_axis(ordered, side, axis=-1) for side in sides], axis=-1
+    ).mean(axis=-1)
+    return middle
 
 
 def _selected(
     results: Results, steps: Steps | None
 ) -> Iterator[tuple[CellRuns, str, list[Progress]]]:
-    """Every cell and spend with the runs whose steps are known."""
+    """Every cell and spend with the runs whose steps are known.
+
+    Without cells whose parameters lock the base: they solve another problem than the task.
+    """
     steps = progress(results) if steps is None else steps
     for cell in results.cells:
+        if locks_base(cell.runs):
+            continue
         runs = [steps[str(run_id)] for run_id in cell.runs.run_id]
         for spend in SPENDS:
             yield cell, spend, [run for run in runs if run.known(spend)]
@@ -379,17 +379,24 @@ def _bootstrap_mean(values: Array, seed: int) -> tuple[Array, Array, Array]:
     if len(values) < 2:
         nothing = np.full(values.shape[1], math.nan)
         return values.mean(axis=0), nothing, nothing
-    means = _resampling(len(values), seed) @ values
+    draws = _draws(len(values), seed)
+    weights = (draws[:, :, None] == np.arange(len(values))).mean(axis=1)
+    means = weights @ values
     tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(means, [tail, 1 - tail], axis=0)
     return values.mean(axis=0), low, high
 
 
 @cache
-def _resampling(n: int, seed: int) -> Array:
-    """Weights of n runs in each bootstrap resample, shape ``(RESAMPLES, n)``."""
-    rng = np.random.default_rng(seed)
-    return rng.multinomial(n, np.full(n, 1 / n), size=RESAMPLES) / n
+def _draws(n: int, seed: int) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Which of n runs are in each bootstrap resample, shape ``(RESAMPLES, n)``."""
+    return np.random.default_rng(seed).integers(n, size=(RESAMPLES, n))
+
+
+def _resampled(values: Array, seed: int) -> Array:
+    """Bootstrap resamples of values (n,), shape ``(RESAMPLES, n)``."""
+    resamples: Array = values[_draws(len(values), seed)]
+    return resamples
 
 
 def _area(run: Progress, spend: str, optimum: float, start: float, end: float) -> float:
@@ -400,29 +407,13 @@ def _area(run: Progress, spend: str, optimum: float, start: float, end: float) -
 
 def _times(runs: Sequence[Progress], spend: str, target: float) -> tuple[Array, float]:
     """Spend of each run to reach a reward, infinite where it did not, and the horizon."""
-    most = max((run.total["trials"] for run in runs if run.solved), default=0.0)
     places = [int(np.searchsorted(run.rewards, target)) for run in runs]
     times = [
         float(run.spent[spend][place]) if place < len(run.rewards) else math.inf
         for run, place in zip(runs, places, strict=True)
     ]
-    ends = [
-        run.total[spend]
-        for run in runs
-        if run.learns and run.solved and run.total["trials"] == most
-    ]
+    ends = [run.total[spend] for run in runs if run.stopped and run.solved]
     return np.array(times), min(ends, default=math.inf)
-
-
-def _target_cell(row: Mapping[Any, Any]) -> str:
-    text = f"{row['reached']}/{row['runs']}"
-    median, horizon = row["median"], row["horizon"]
-    if not row["reached"] or (math.isinf(median) and math.isinf(horizon)):
-        return text
-    text += f", {short(median)}" if math.isfinite(median) else f", > {short(horizon)}"
-    if row["runs"] == 1 or math.isinf(row["low"]) or row["high"] == 0:  # 0: spent by none
-        return text
-    return text + f" [{short(row['low'])}, {short(row['high'])}]"
 
 
 _DASHES = ("-", "--", ":")  # after every ten colours

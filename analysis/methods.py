@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -10,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.optimum import BASE, Optimum, optima
 from analysis.optimum import METHODS as OPTIMUM
+from analysis.optimum import Optimum, locks_base, optima
 from analysis.results import CellRuns, Results
 from analysis.table import NONE, Table, short, tally
 from coartic.method import Information
@@ -135,8 +134,7 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
     good = cell.good
     rewards = good.reward.to_numpy(dtype=np.float64)
     still = bool(len(good)) and bool((good.other_arm_travel <= STILL).all())
-    # A base that is locked by a parameter is another problem, with another optimum.
-    locked = set(good.parameters.map(lambda text: json.loads(text).get("base", BASE))) - {BASE}
+    locked = locks_base(cell.runs)
     best = None if locked else references.get((cell.task, "free"))
     best_still = references.get((cell.task, "still")) if still and not locked else None
     mean = float(rewards.mean()) if len(rewards) else math.nan

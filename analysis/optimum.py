@@ -67,6 +67,12 @@ def optima(results: Results) -> dict[tuple[str, str], Optimum]:
     return found
 
 
+def locks_base(runs: pd.DataFrame) -> bool:
+    """Whether a parameter of these runs locks the base: another problem, another optimum."""
+    locks = runs.parameters.map(lambda text: json.loads(text).get("base", BASE))
+    return bool((locks != BASE).any())
+
+
 def essence(task: Task) -> str:
     """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
     content = task.model_dump(mode="json")

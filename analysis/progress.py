@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +32,8 @@ class Progress:
     """Spend of the whole run; NaN where it is not known, as for the time of cold runs."""
     learns: bool
     """Whether it made trials."""
+    stopped: bool = False
+    """Whether its budget of trials ended it: it could have gone on."""
 
     @property
     def solved(self) -> bool:
@@ -58,8 +62,13 @@ def progress(results: Results) -> dict[str, Progress]:
     CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
     a learner without its corrective process spends most of them on its first trial. Times
     are those of :func:`analysis.methods.solve_times`: without building.
+
+    A run was stopped if it made as many trials as it was given: by its parameter ``trials``
+    or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that
+    makes fewer, or has no budget, ended by itself.
     """
     rewards = _rewards_by_run(results)
+    limit = results.manifest.get("limits", {}).get("trials")
     found = {}
     for cell in results.cells:
         totals = cell.runs[["run_id", *SPENDS]].set_index("run_id").astype("Float64")
@@ -67,7 +76,13 @@ def progress(results: Results) -> dict[str, Progress]:
         table = totals.to_numpy(dtype=np.float64, na_value=np.nan)
         solved = (cell.runs.status == "ok").to_numpy(dtype=bool)
         own = cell.runs.reward.to_numpy(dtype=np.float64, na_value=np.nan)
-        for run_id, row, ok, reward in zip(totals.index, table, solved, own, strict=True):
+        given = cell.runs.parameters.map(lambda text: json.loads(text).get("trials", math.inf))
+        budgets = np.minimum(
+            given.to_numpy(dtype=np.float64), math.inf if limit is None else limit
+        )
+        for run_id, row, ok, reward, budget in zip(
+            totals.index, table, solved, own, budgets, strict=True
+        ):
             total = dict(zip(SPENDS, row.tolist(), strict=True))
             trials = rewards.get(str(run_id))
             if not ok:
@@ -77,11 +92,11 @@ def progress(results: Results) -> dict[str, Progress]:
                 spent = {name: np.array([value]) for name, value in total.items()}
                 found[str(run_id)] = Progress(np.array([reward]), spent, total, False)
             else:
-                found[str(run_id)] = by_trial(trials, total)
+                found[str(run_id)] = by_trial(trials, total, stopped=len(trials) >= budget)
     return found
 
 
-def by_trial(rewards: Array, total: dict[str, float]) -> Progress:
+def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) -> Progress:
     """Progress of a run from the reward of each of its trials (n,), NaN where it failed."""
     failed = np.isnan(rewards)
     best = np.maximum.accumulate(np.where(failed, -np.inf, rewards))
@@ -93,7 +108,7 @@ def by_trial(rewards: Array, total: dict[str, float]) -> Progress:
     share = number / len(rewards)
     spent = {name: total[name] * share for name in SPENDS}
     spent |= {"trials": number, "movement_ticks": np.cumsum(ticks)[steps]}
-    return Progress(best[steps], spent, total, True)
+    return Progress(best[steps], spent, total, True, stopped)
 
 
 def _rewards_by_run(results: Results) -> dict[str, Array]:

@@ -12,6 +12,7 @@ import pandas as pd
 from coartic import CoarticError, Task, parse_task
 
 FORMAT = 3  # of the tables, as benchmarks.tables writes them
+_ANEW = "start the same `coartic run` again: it makes the tables anew from the records"
 
 
 @dataclass(frozen=True)
@@ -68,24 +69,33 @@ class Results:
         ]
 
     def solutions(self) -> pd.DataFrame:
-        """Movements of every run's best trial."""
-        return pd.read_parquet(self.folder / "solutions.parquet")
+        """Movements of every run's solution. Raises CoarticError where they cannot be read.
+
+        That includes a run with a solution whose movements are missing.
+        """
+        table = read_table(self.folder, "solutions", nullable=False)
+        solved = self.runs.run_id[self.runs.status == "ok"]
+        lost = solved[~solved.isin(table.run_id)]
+        if len(lost):
+            raise CoarticError(
+                f"{self.folder / 'solutions.parquet'} is damaged (it lacks the movements of "
+                f"{len(lost)} runs, {lost.iloc[0]} the first of them); {_ANEW}"
+            )
+        return table
 
     def paths(self) -> pd.DataFrame:
-        """Waypoints of the movements that follow a path."""
-        return pd.read_parquet(self.folder / "paths.parquet")
+        """Waypoints of the movements that follow a path. Raises CoarticError as above."""
+        return read_table(self.folder, "paths", nullable=False)
 
     def learning(self) -> pd.DataFrame:
-        """Reward of every trial."""
-        return pd.read_parquet(self.folder / "learning.parquet", dtype_backend="numpy_nullable")
+        """Reward of every trial. Raises CoarticError as above."""
+        return read_table(self.folder, "learning")
 
 
 def load_results(folder: Path) -> Results:
     """Read a results folder. Raises CoarticError where it is not one or is damaged."""
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        runs = pd.read_parquet(folder / "runs.parquet", dtype_backend="numpy_nullable")
-        sequences = pd.read_parquet(folder / "sequences.parquet", dtype_backend="numpy_nullable")
     except FileNotFoundError as error:
         raise CoarticError(
             f"{folder} is not a results folder: {error.filename} is missing"
@@ -97,4 +107,26 @@ def load_results(folder: Path) -> Results:
             f"{folder}: its tables have format {manifest.get('format')}, this version reads "
             f"{FORMAT}; run the same `coartic run` again to make them anew from the records"
         )
-    return Results(folder, manifest, runs, sequences)
+    return Results(folder, manifest, read_table(folder, "runs"), read_table(folder, "sequences"))
+
+
+def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFrame:
+    """A table of a results folder, with nullable types unless it has no missing values.
+
+    Raises CoarticError where it is missing or damaged, or holds another table.
+    """
+    path = folder / f"{name}.parquet"
+    try:
+        if nullable:
+            table = pd.read_parquet(path, dtype_backend="numpy_nullable")
+        else:
+            table = pd.read_parquet(path)
+    except FileNotFoundError:
+        raise CoarticError(f"{path} is missing; {_ANEW}") from None
+    except (OSError, ValueError) as error:
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise CoarticError(f"{path} is damaged ({why}); {_ANEW}") from None
+    key = "task" if name == "sequences" else "run_id"
+    if key not in table.columns:
+        raise CoarticError(f"{path} is damaged (it has no column {key!r}); {_ANEW}")
+    return table

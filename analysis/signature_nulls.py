@@ -1,12 +1,15 @@
-"""False-positive rates of the signatures' tests: ``python -m analysis.signature_nulls [N]``.
+"""What the signatures' tests and intervals do: ``python -m analysis.signature_nulls [N]``.
 
-Every row simulates N data sets (2000 by default) in which there is nothing to find, tests
-each at 5 %, and prints the share of rejections with its exact binomial interval. The robot is
-the paper's, postures scatter about the start of task ascending. Takes a few minutes.
+Every row simulates N data sets (2000 by default) and prints a share with its exact binomial
+interval. Nulls: nothing to find, tested at 5 %, how often a test rejects. Planted effects: of
+a known size, how often it is found. Intervals: of nominal 95 %, how often they hold the true
+value. The robot is the paper's, postures scatter about the start of task ascending. Takes a
+few minutes.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import zlib
 from collections.abc import Callable
@@ -16,9 +19,11 @@ from functools import partial
 import numpy as np
 from scipy import stats
 
+from analysis.signatures import intervals
 from analysis.signatures.context import lead_time, permutation_p
 from analysis.signatures.locus import locus_slopes
 from analysis.signatures.manifold import movable, subspaces, synergy
+from analysis.signatures.recruitment import entropy
 from coartic import load_task
 from coartic.robot import Array
 
@@ -34,104 +39,260 @@ _WHOLE = np.array(_TASK.q0)
 _WHOLE[_JOINTS] = _POSTURE
 _JACOBIAN = _TASK.robot.jacobian(_WHOLE, "right")[:, _JOINTS]
 _NULLSPACE, _RANGE = subspaces(_JACOBIAN)
+_SD = 0.05  # of a joint over runs
 
 Scatter = Callable[[np.random.Generator, int], Array]
 
 
 def normal(rng: np.random.Generator, n: int) -> Array:
     """Independent joints of equal variance."""
-    return 0.05 * rng.standard_normal((n, len(_JOINTS)))
+    return _SD * rng.standard_normal((n, len(_JOINTS)))
 
 
 def correlated(rng: np.random.Generator, n: int) -> Array:
     """Unequal variances within either subspace, equal per dimension between them."""
     within = rng.standard_normal((n, 4)) * np.sqrt([2.5, 1.0, 0.4, 0.1])
     across = rng.standard_normal((n, 2)) * np.sqrt([1.8, 0.2])
-    return 0.05 * (within @ _NULLSPACE.T + across @ _RANGE.T)
+    return _SD * (within @ _NULLSPACE.T + across @ _RANGE.T)
 
 
 def heavy(rng: np.random.Generator, n: int) -> Array:
     """Joints with heavy tails (Student's t, 5 degrees of freedom)."""
-    return 0.05 * rng.standard_t(5, (n, len(_JOINTS)))
+    return _SD * rng.standard_t(5, (n, len(_JOINTS)))
 
 
 def skewed(rng: np.random.Generator, n: int) -> Array:
     """Joints with one-sided tails (exponential)."""
-    return 0.05 * rng.standard_exponential((n, len(_JOINTS)))
+    return _SD * rng.standard_exponential((n, len(_JOINTS)))
+
+
+SCATTERS: tuple[Scatter, ...] = (normal, correlated, heavy, skewed)
+_PARTS = {"motor-equivalent part": _NULLSPACE, "non-motor-equivalent part": _RANGE}
+VALUES: dict[str, tuple[Callable[[np.random.Generator, int], Array], float]] = {
+    "normal": (lambda rng, n: rng.standard_normal(n), 0.0),
+    "skewed (exponential)": (lambda rng, n: rng.standard_exponential(n), 1.0),
+    "counts (Poisson, 0.5)": (lambda rng, n: rng.poisson(0.5, n).astype(np.float64), 0.5),
+    "counts (Poisson, 0.1)": (lambda rng, n: rng.poisson(0.1, n).astype(np.float64), 0.1),
+    "two levels (70 and 30 %)": (
+        lambda rng, n: 3.0 * (rng.random(n) < 0.3) + 0.5 * rng.standard_normal(n),
+        0.9,
+    ),
+}
+"""Values of one run as signatures have them, with their true mean."""
 
 
 @dataclass(frozen=True)
-class Null:
-    """One way of having nothing to find."""
+class Simulation:
+    """One kind of data set and what is asked of it."""
 
     name: str
-    rejects: Callable[[np.random.Generator], bool]
-    """Simulate once and test."""
+    seen: Callable[[np.random.Generator], bool]
+    """Simulate once: whether the test rejects, or the interval holds the true value."""
 
 
-def nulls() -> list[Null]:
+def nulls() -> list[Simulation]:
     """Every test of a signature on every kind of scatter that it should stand."""
     found = []
-    for scatter in (normal, correlated, heavy, skewed):
+    for scatter in SCATTERS:
         kind = scatter.__name__
         for first, second in ((20, 20), (20, 8)):
             found.append(
-                Null(
+                Simulation(
                     f"context dependence, {kind}, {first} and {second} runs",
-                    partial(_context, scatter, first, second, None),
+                    partial(_context, scatter, first, second, None, None),
                 )
             )
-        for part, basis in (("motor-equivalent", _NULLSPACE), ("non-motor-equivalent", _RANGE)):
-            found.append(Null(f"{part} part, {kind}", partial(_context, scatter, 20, 20, basis)))
-        found.append(Null(f"lead time, {kind}", partial(_lead, scatter)))
+        for part, basis in _PARTS.items():
+            found.append(
+                Simulation(f"{part}, {kind}", partial(_context, scatter, 20, 20, basis, None))
+            )
+        found.append(Simulation(f"lead time, {kind}", partial(_lead, scatter, None)))
         for runs in (10, 20):
-            found.append(Null(f"ΔV z, {kind}, {runs} runs", partial(_synergy, scatter, runs)))
-        found.append(Null(f"locus slope, {kind}", partial(_locus, scatter)))
+            found.append(
+                Simulation(f"ΔV z, {kind}, {runs} runs", partial(_synergy, scatter, runs, 1.0))
+            )
+        found.append(Simulation(f"locus slope, {kind}", partial(_locus, scatter, 0.0)))
     return found
 
 
+def planted() -> list[Simulation]:
+    """Every test of a signature on an effect of known size.
+
+    Shifts between contexts are of 1.25 SD of a joint, in a direction that leaves the hand in
+    place (non-motor-equivalent part: that moves it); the lead is of all 12 ticks or of the
+    last 6. ΔV z: standard deviations that move the hand are half, or twice, the others. Locus:
+    1 SD of a joint per length unit.
+    """
+    found = []
+    for scatter in SCATTERS:
+        kind = scatter.__name__
+        away = {name: 1.25 * _SD * basis[:, 0] for name, basis in _PARTS.items()}
+        for first, second in ((20, 20), (20, 8)):
+            found.append(
+                Simulation(
+                    f"context dependence, {kind}, {first} and {second} runs",
+                    partial(_context, scatter, first, second, None, away["motor-equivalent part"]),
+                )
+            )
+        for part, basis in _PARTS.items():
+            found.append(
+                Simulation(
+                    f"{part}, {kind}", partial(_context, scatter, 20, 20, basis, away[part])
+                )
+            )
+        shift = away["motor-equivalent part"]
+        found.append(Simulation(f"lead time, any, {kind}", partial(_lead, scatter, shift)))
+        for ratio in (0.5, 2.0):
+            found.append(
+                Simulation(
+                    f"ΔV z, {kind}, 20 runs, {ratio:g} of the SD",
+                    partial(_synergy, scatter, 20, ratio),
+                )
+            )
+        found.append(Simulation(f"locus slope, {kind}", partial(_locus, scatter, _SD)))
+    return found
+
+
+def coverage() -> list[Simulation]:
+    """Every interval of a signature, by kind of value: whether it holds the true one."""
+    found = []
+    for name, (draw, mean) in VALUES.items():
+        for runs in (10, 20):
+            found.append(
+                Simulation(f"mean, {name}, {runs} runs", partial(_mean_held, draw, mean, runs))
+            )
+    for chance in (0.5, 0.9, 0.98):
+        for runs in (10, 20):
+            found.append(
+                Simulation(
+                    f"share, of {chance:g}, {runs} runs", partial(_share_held, chance, runs)
+                )
+            )
+    for scatter in SCATTERS:
+        kind = scatter.__name__
+        for ratio in (1.0, 0.5):
+            found.append(
+                Simulation(
+                    f"ΔV z, {kind}, 20 runs, {ratio:g} of the SD",
+                    partial(_synergy_held, scatter, ratio),
+                )
+            )
+        found.append(Simulation(f"locus slope, {kind}", partial(_slope_held, scatter)))
+    return found
+
+
+def entropies(simulations: int, runs: int = 20, seed: int = SEED) -> list[tuple[float, float]]:
+    """True hand entropy, bit, and the mean of its estimate, for three sets of sequences.
+
+    It has no interval: where every run has the same hands, nothing says what else there is.
+    """
+    found = []
+    for chances in ((0.95, 0.05), (0.7, 0.3), (0.73, 0.17, 0.1)):
+        rng = np.random.default_rng([seed, runs, len(chances)])
+        draws = rng.choice(len(chances), p=chances, size=(simulations, runs))
+        estimates = [entropy(map(str, row)) for row in draws.tolist()]
+        found.append((float(stats.entropy(chances, base=2)), float(np.mean(estimates))))
+    return found
+
+
+def _mean_held(
+    draw: Callable[[np.random.Generator, int], Array],
+    truth: float,
+    runs: int,
+    rng: np.random.Generator,
+) -> bool:
+    _, low, high = intervals.mean(draw(rng, runs))
+    return low <= truth <= high
+
+
+def _share_held(chance: float, runs: int, rng: np.random.Generator) -> bool:
+    _, low, high = intervals.share((rng.random(runs) < chance).tolist())
+    return low <= chance <= high
+
+
+def _synergy_held(scatter: Scatter, ratio: float, rng: np.random.Generator) -> bool:
+    """Equal variances per dimension, those that move the hand times the ratio's square."""
+    found = synergy(_POSTURE + _squeezed(scatter(rng, 20), ratio), _JACOBIAN)
+    return found.low <= found.neutral - math.log(ratio) <= found.high
+
+
+def _slope_held(scatter: Scatter, rng: np.random.Generator) -> bool:
+    places = np.repeat(np.linspace(-1.0, 1.0, 5), 4)
+    postures = scatter(rng, len(places))[:, :1] + _SD * places[:, None]
+    slope = locus_slopes(postures, places)[0]
+    return slope.low <= _SD <= slope.high
+
+
+def _squeezed(postures: Array, ratio: float) -> Array:
+    """Deviations that move the hand, times a ratio."""
+    across: Array = postures @ _RANGE @ _RANGE.T
+    return postures + (ratio - 1.0) * across
+
+
 def _context(
-    scatter: Scatter, first: int, second: int, basis: Array | None, rng: np.random.Generator
+    scatter: Scatter,
+    first: int,
+    second: int,
+    basis: Array | None,
+    shift: Array | None,
+    rng: np.random.Generator,
 ) -> bool:
     groups = scatter(rng, first), scatter(rng, second)
+    if shift is not None:
+        groups = groups[0] + shift, groups[1]
     return permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA
 
 
-def _lead(scatter: Scatter, rng: np.random.Generator) -> bool:
-    """Movements of 12 ticks from a common start: any lead at all is an error."""
+def _lead(scatter: Scatter, shift: Array | None, rng: np.random.Generator) -> bool:
+    """Movements of 12 ticks from a common start: whether there is any lead at all."""
     way = np.linspace(0.0, 1.0, 12)[:, None]
-    groups = [way * scatter(rng, 20)[:, None, :] for _ in range(2)]
+    ends = [scatter(rng, 20), scatter(rng, 20)]
+    if shift is not None:
+        ends[0] = ends[0] + shift
+    groups = [way * end[:, None, :] for end in ends]
     jitter = [0.005 * rng.standard_normal(group.shape) for group in groups]
     first, second = (group + noise for group, noise in zip(groups, jitter, strict=True))
     return lead_time(first, second, rng, alpha=ALPHA, resamples=RESAMPLES) is not None
 
 
-def _synergy(scatter: Scatter, runs: int, rng: np.random.Generator) -> bool:
-    return synergy(_POSTURE + scatter(rng, runs), _JACOBIAN).p <= ALPHA
+def _synergy(scatter: Scatter, runs: int, ratio: float, rng: np.random.Generator) -> bool:
+    return synergy(_POSTURE + _squeezed(scatter(rng, runs), ratio), _JACOBIAN).p <= ALPHA
 
 
-def _locus(scatter: Scatter, rng: np.random.Generator) -> bool:
+def _locus(scatter: Scatter, slope: float, rng: np.random.Generator) -> bool:
     """Five tasks of four runs each; the first joint alone is looked at."""
     places = np.repeat(np.linspace(-1.0, 1.0, 5), 4)
-    return locus_slopes(scatter(rng, len(places))[:, :1], places)[0].p <= ALPHA
+    postures = scatter(rng, len(places))[:, :1] + slope * places[:, None]
+    return locus_slopes(postures, places)[0].p <= ALPHA
 
 
-def rate(null: Null, simulations: int, seed: int = SEED) -> tuple[float, float, float]:
-    """Share of rejections and its exact 95 % interval."""
-    rng = np.random.default_rng([seed, zlib.crc32(null.name.encode())])
-    rejected = sum(bool(null.rejects(rng)) for _ in range(simulations))
-    low, high = stats.binomtest(rejected, simulations).proportion_ci(0.95, method="exact")
-    return rejected / simulations, float(low), float(high)
+def rate(simulation: Simulation, simulations: int, seed: int = SEED) -> tuple[float, float, float]:
+    """Share of data sets in which it is seen, and its exact 95 % interval."""
+    rng = np.random.default_rng([seed, zlib.crc32(simulation.name.encode())])
+    seen = sum(bool(simulation.seen(rng)) for _ in range(simulations))
+    low, high = stats.binomtest(seen, simulations).proportion_ci(0.95, method="exact")
+    return seen / simulations, float(low), float(high)
 
 
 def main() -> None:
-    """Print one line per null."""
+    """Print one line per simulation; what departs from its nominal rate is marked."""
     simulations = int(sys.argv[1]) if len(sys.argv) > 1 else SIMULATIONS
-    print(f"{simulations} simulated nulls each, tested at {ALPHA:.0%}; interval at 95 %")
-    for null in nulls():
-        share, low, high = rate(null, simulations)
-        mark = "" if low <= ALPHA <= high else "  below" if high < ALPHA else "  ABOVE"
-        print(f"{null.name:55} {share:6.2%}  [{low:.2%}, {high:.2%}]{mark}", flush=True)
+    print(f"{simulations} simulated data sets each; intervals at 95 %")
+    for title, rows, nominal in (
+        (f"Nulls: rejected at {ALPHA:.0%}", nulls(), ALPHA),
+        ("Planted effects: detected", planted(), None),
+        (f"Intervals of {1 - ALPHA:.0%}: hold the true value", coverage(), 1 - ALPHA),
+    ):
+        print(f"\n{title}")
+        for row in rows:
+            share, low, high = rate(row, simulations)
+            mark = ""
+            if nominal is not None:
+                mark = "  BELOW" if high < nominal else "  ABOVE" if low > nominal else ""
+            print(f"{row.name:55} {share:6.2%}  [{low:.2%}, {high:.2%}]{mark}", flush=True)
+    print("\nHand entropy of 20 runs, bit: true, mean estimate")
+    for truth, estimate in entropies(simulations):
+        print(f"{truth:.3f}  {estimate:.3f}")
 
 
 if __name__ == "__main__":

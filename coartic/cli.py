@@ -299,14 +299,17 @@ def analyse(
     from analysis.claims import claims_frame, claims_page, judge
     from analysis.comparisons import comparisons_page
     from analysis.frontier import (
+        anytime_frame,
         area_frame,
-        frontier_page,
+        for_both_arms,
         pareto_frame,
         targets_frame,
     )
+    from analysis.frontier_page import frontier_page
     from analysis.overall import combined, overall_frame, profiles_frame
     from analysis.pairwise import pairwise_frame
     from analysis.results import load_results
+    from analysis.signatures.page import signatures_page
     from analysis.study import Study
     from benchmarks.store import write_atomically
 
@@ -318,7 +321,8 @@ def analyse(
     pages = {
         "claims.md": claims_page(results, judged),
         "comparisons.md": comparisons_page(study, pairs, overall, scores),
-        "frontier.md": frontier_page(results, steps),
+        "frontier.md": frontier_page(study),
+        "signatures.md": signatures_page(study),
     }
     frames = {
         "claims.csv": claims_frame(judged),
@@ -326,8 +330,9 @@ def analyse(
         "across_tasks.csv": overall,
         "profiles.csv": profiles_frame(scores),
         "signatures.csv": study.signatures.drop(columns="label"),
-        "targets.csv": targets_frame(results, steps),
-        "areas.csv": area_frame(results, steps),
+        "anytime.csv": anytime_frame(results, steps),
+        "targets.csv": for_both_arms(targets_frame, results, steps),
+        "areas.csv": for_both_arms(area_frame, results, steps),
         "pareto.csv": pareto_frame(results),
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}

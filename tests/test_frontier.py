@@ -1,5 +1,6 @@
 """Reward against spend on constructed runs: curves, areas, targets, Pareto sets."""
 
+import json
 import math
 
 import numpy as np
@@ -14,13 +15,14 @@ from analysis.frontier import (
     area_frame,
     dominated,
     draw_anytime,
+    for_both_arms,
     pareto_frame,
-    pareto_tables,
     targets_frame,
-    targets_tables,
 )
+from analysis.frontier_page import areas_tables, frontier_page, pareto_tables, targets_tables
 from analysis.progress import SPENDS, by_trial, progress
 from analysis.results import Results
+from analysis.study import Study
 from coartic import load_task
 
 BEST = -465  # proven optimum of two-armed 1
@@ -35,7 +37,8 @@ def run(method, rewards=None, *, reward=None, number=0, **more):
     return {
         "rewards": learned, "task": "two-armed-1", "method": method, "variant": "",
         "run": number, "run_id": f"{method}-{number}", "status": "ok" if reward else "infeasible",
-        "reason": "", "reward": reward, "hands": "LRLR", "parameters": "{}",
+        "reason": "", "reward": reward, "hands": "LRLR",
+        "parameters": json.dumps({"trials": len(learned)} if learned else {}),
         "told": "corrective process, reward by trial", "trials": len(learned),
         "movement_ticks": -sum(done), "forward_kinematics": 100 * max(1, len(learned)),
         "jacobians": 10 * max(1, len(learned)), "solver_iterations": 0, "build_s": 0.0,
@@ -64,6 +67,10 @@ def folder(rows, tmp_path):
 
 def of(frame, method, spend="trials"):
     return frame[(frame.method == method) & (frame.spend == spend)]
+
+
+def share(frame, method, spend, column="front_share"):
+    return of(frame, method, spend)[column].item()
 
 
 def totals(ticks, trials):
@@ -280,16 +287,172 @@ def test_nearer_targets_take_longer(tmp_path_factory, rewards, spend):
 def test_what_the_target_table_shows(tmp_path):
     rows = [run("m", [-600.0] * 9 + [-470.0], number=i) for i in range(8)]
     rows += [run("m", [-600.0] * 10, number=8), run("p", reward=-470)]
-    (table,) = targets_tables(folder(rows, tmp_path))
+    rows += [run("never", [-600.0] * 10), run("optimum/x", reward=BEST)]
+    ((table, never),) = targets_tables(targets_frame(folder(rows, tmp_path)), "trials")
     assert table.columns == ("method", "within 5 %: -488", "within 2 %: -474", "within 1 %: -469")
-    assert table.rows[0] == ("m", "8/9, 10 [10, 10]", "8/9, 10 [10, 10]", "0/9")
-    assert table.rows[1] == ("p", "1/1, 0", "1/1, 0", "0/1")
+    assert table.rows == (  # the larger share first
+        ("p", "1/1, 0", "1/1, 0", "0/1"),
+        ("m", "8/9, 10 [10, 10]", "8/9, 10 [10, 10]", "0/9"),
+    )
+    assert never == ["never"]
     rows = [run("m", [-600.0, -470.0 if i < 2 else -600.0], number=i) for i in range(20)]
-    (table,) = targets_tables(folder(rows, tmp_path))
+    ((table, never),) = targets_tables(targets_frame(folder(rows, tmp_path)), "trials")
     assert table.rows[0][1] == "2/20, > 2"
+    assert never == []
+
+
+def test_known_times(tmp_path):
+    """The target falls at trial 3 of 4: 900 + 700 + 488 ticks, 3/4 of what comes as a total."""
+    rows = [
+        run("m", [-900.0, -700.0, -488.0, -480.0], solve_s=2.0),
+        run("m", [-900.0, -700.0, -600.0, -500.0], number=1, solve_s=3.0),
+    ]
+    frame = targets_frame(folder(rows, tmp_path), shares=[0.05])
+    times = {"trials": 3, "movement_ticks": 2088, "forward_kinematics": 300, "solve_s": 1.5}
+    ends = {"trials": 4, "movement_ticks": 2568, "forward_kinematics": 400, "solve_s": 2.0}
+    for spend in SPENDS:
+        found = of(frame, "m", spend).squeeze()
+        assert (found["median"], found.horizon) == (times[spend], ends[spend])
+        assert found.reached == 1
+
+
+def test_an_exhaustive_search_never_reaches_what_it_missed(tmp_path):
+    """Two methods with the same trials: one had no more to try, one was stopped."""
+    trials = [-600.0, -500.0]
+    rows = [
+        run("exhaustive", trials, parameters="{}"),
+        run("early", trials, parameters='{"trials": 3}'),
+        run("stopped", trials),
+    ]
+    results = folder(rows, tmp_path)
+    horizons = targets_frame(results).query("spend == 'trials'").groupby("method").horizon.max()
+    assert horizons.to_dict() == {"exhaustive": math.inf, "early": math.inf, "stopped": 2}
+    ((_, never),) = targets_tables(targets_frame(results), "trials")
+    assert never == ["exhaustive", "early", "stopped"]
+    limited = Results(tmp_path, {**results.manifest, "limits": {"trials": 2}}, results.runs, None)
+    assert {run_id: run.stopped for run_id, run in progress(limited).items()} == {
+        "exhaustive-0": True, "early-0": True, "stopped-0": True,
+    }  # fmt: skip
+
+
+def test_a_locked_base_is_another_problem(tmp_path):
+    rows = [
+        run("locked", reward=BEST, parameters='{"base": "y"}'),
+        run("free", reward=BEST - 1, parameters='{"base": "task"}'),
+        run("learner", [-600.0, -500.0]),
+    ]
+    results = folder(rows, tmp_path)
+    for frame in (targets_frame, area_frame, anytime_frame, pareto_frame):
+        assert set(frame(results).method) == {"free", "learner"}
+    assert of(pareto_frame(results), "free", "information").front.item()
+
+
+def test_both_optima_in_one_frame(tmp_path):
+    rows = [run("still", [-490.0, -490.0]), run("moving", [-490.0, -480.0], other_arm_travel=0.1)]
+    results = folder(rows, tmp_path)
+    frame = for_both_arms(area_frame, results)
+    frame = frame[frame.spend == "trials"].set_index(["method", "other_arm"])
+    assert set(frame.index) == {("still", "free"), ("still", "still"), ("moving", "free")}
+    assert frame.area["still", "still"] == 0
+    assert frame.area["still", "free"] == pytest.approx(25 / 465)
+
+
+def test_what_the_area_table_shows(tmp_path):
+    rows = [run("b", [-930.0, -930.0], solve_s=0.0), run("a", [BEST, BEST])]
+    rows += [run("a", [BEST, BEST], number=1), run("optimum/x", reward=BEST)]
+    (table,) = areas_tables(area_frame(folder(rows, tmp_path)))
+    assert [row[0] for row in table.rows] == ["a", "b"]
+    assert table.columns[1:] == ("over trials", "over ticks", "over kinematics", "over solve s")
+    assert table.rows[0][1] == "0.000 [0.000, 0.000]"
+    assert table.rows[1][1] == "1.000"
+
+
+def test_the_page(tmp_path):
+    rows = [run("m", [-600.0, -470.0], number=i) for i in range(3)]
+    rows += [run("p", reward=-466), run("none", [-900.0, -900.0])]
+    study = Study(folder(rows, tmp_path))
+    page = frontier_page(study)
+    assert page == frontier_page(Study(study.results))
+    for arm in ("free", "still"):
+        for what in ("trials to come", "kinematics to come", "area under"):
+            assert page.count(f"### two-armed-1: {what}") == 2
+        assert f"other arm {arm}" in page
+    assert "No run within the widest: none." in page
+    assert "within 10% of each other count as ties" in page
 
 
 # Pareto sets
+
+
+def test_a_front_is_as_sure_as_its_runs(tmp_path):
+    """Two runs of 6: the mean of six draws from {0, 12} exceeds 6 in 22 of 64 cases, is at
+    least 6 in 42 of 64; ties are on the front."""
+    rows = [run("noisy", reward=-500 + 12 * (i % 2), number=i) for i in range(6)]
+    rows += [run("sure", reward=-494), run("worse", reward=-501)]
+    frame = pareto_frame(folder(rows, tmp_path))
+    kept = of(frame, "noisy", "information")
+    assert kept.front.item()
+    assert of(frame, "sure", "information").front.item()
+    assert share(frame, "noisy", "information") == pytest.approx(42 / 64, abs=0.04)
+    assert share(frame, "sure", "information") == pytest.approx(42 / 64, abs=0.04)
+    assert share(frame, "worse", "information") == 0
+    (table,) = pareto_tables(frame)
+    assert [(row[0], row[-1]) for row in table.rows] == [("noisy", "2 ◐"), ("sure", "2 ◐")]
+
+
+def test_reward_and_spend_are_resampled_together(tmp_path):
+    """Runs of one method trade ticks for reward along a line that the other one lies on, so
+    that a resample of both at once is never better in both."""
+    rows = [
+        run("line", reward=-500 + 10 * i, number=i, forward_kinematics=100 + 10 * i)
+        for i in range(3)
+    ]
+    rows += [run("point", reward=-490, forward_kinematics=110)]
+    frame = pareto_frame(folder(rows, tmp_path))
+    found = share(frame, "point", "forward_kinematics")
+    draws = np.stack(np.meshgrid(*[range(3)] * 3), axis=-1).reshape(-1, 3)  # all 27 resamples
+    mean, middle = draws.mean(axis=1), np.median(draws, axis=1)
+    beaten = (mean >= 1) & (middle <= 1) & ((mean > 1) | (middle < 1))
+    assert found == pytest.approx(1 - beaten.mean(), abs=0.03)
+
+
+def test_twins_stay_tied(tmp_path):
+    """Methods that did the same with the same seeds are on the front together or not at all."""
+    rows = [
+        run(name, reward=-500 + 7 * (i % 3), number=i, forward_kinematics=50 + i)
+        for name in ("a", "b")
+        for i in range(8)
+    ]
+    frame = pareto_frame(folder(rows, tmp_path))
+    assert (frame.front_share == 1).all()
+
+
+def test_times_that_are_about_the_same_are_ties(tmp_path):
+    rows = [
+        run("best", reward=-470, solve_s=1.09),
+        run("quicker by noise", reward=-480, solve_s=1.0),
+        run("quicker", reward=-480, solve_s=0.98),
+        run("slower twin", reward=-470, solve_s=1.19),
+        run("much slower twin", reward=-470, solve_s=1.3),
+    ]
+    for row, ticks in zip(rows, (109, 100, 98, 119, 130), strict=True):
+        row["forward_kinematics"] = ticks
+    frame = pareto_frame(folder(rows, tmp_path))
+    times = frame[frame.spend == "solve_s"].set_index("method").front
+    assert set(times.index[times]) == {"best", "quicker", "slower twin"}
+    counts = frame[frame.spend == "forward_kinematics"].set_index("method").front
+    assert set(counts.index[counts]) == {"best", "quicker"}
+
+
+def test_cold_runs_count_for_reward_but_not_for_time(tmp_path):
+    rows = [
+        run("m", reward=-480, number=i, warm=i > 0, solve_s=5.0 if i == 0 else 0.5)
+        for i in range(4)
+    ]
+    frame = pareto_frame(folder(rows, tmp_path))
+    assert of(frame, "m", "solve_s").amount.item() == 0.5
+    # Where only the cold run is drawn there is no time: 1 of 256 resamples.
+    assert 0.98 < share(frame, "m", "solve_s") < 1
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12))
@@ -299,6 +462,16 @@ def test_domination_by_brute_force(points):
         for j, (reward_j, amount_j) in enumerate(points):
             better = reward_j >= reward_i and amount_j <= amount_i and points[i] != points[j]
             assert dominated(reward, amount)[i, j] == better
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 9)), min_size=1, max_size=12))
+def test_no_tolerance_empties_a_front(points):
+    reward, amount = np.array(points, dtype=float).T
+    worse = dominated(reward, amount, 0.5)
+    assert not worse.any(axis=1).all()
+    assert not np.diag(worse).any()
+    batch = dominated(np.stack([reward, -reward]), np.stack([amount, amount]), 0.5)
+    np.testing.assert_array_equal(batch[0], worse)
 
 
 def test_fronts(tmp_path):
@@ -321,7 +494,7 @@ def test_fronts(tmp_path):
         "good": 2, "wasteful": 1, "cheap": 1, "twin": 1, "beaten": 2,
     }  # fmt: skip
     assert set(kinds.index[kinds.front]) == {"good", "wasteful"}
-    (table,) = pareto_tables(folder(rows, tmp_path))
+    (table,) = pareto_tables(frame)
     shown = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
     assert set(shown) == {"good", "wasteful", "cheap", "twin"}
     assert shown["wasteful"]["kinematics"] == "95 ○"

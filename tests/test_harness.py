@@ -1,6 +1,7 @@
 """Suites, the harness, and the tables it leaves behind."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -562,10 +563,42 @@ def test_every_sequence_is_sorted_and_bounded():
 def test_damaged_results_are_named(results, tmp_path):
     with pytest.raises(CoarticError, match="is not a results folder: .*manifest.json is missing"):
         load_results(tmp_path)
-    for name in ("manifest.json", "runs.parquet", "sequences.parquet"):
-        (tmp_path / name).write_bytes((results.folder / name).read_bytes()[:100])
+    (tmp_path / "manifest.json").write_text("{")
     with pytest.raises(CoarticError, match="results cannot be read"):
         load_results(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["runs", "sequences", "solutions", "paths", "learning"])
+def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
+    folder = shutil.copytree(results.folder, tmp_path / "copy")
+    table = folder / f"{name}.parquet"
+
+    def read():
+        found = load_results(folder)
+        return found.solutions(), found.paths(), found.learning()
+
+    read()
+    for content, why in (
+        (None, "is missing"),
+        (b"", "is damaged"),
+        (table.read_bytes()[:100], "is damaged"),
+        (table.read_bytes()[:-100] + bytes(100), "is damaged"),
+    ):
+        table.unlink() if content is None else table.write_bytes(content)
+        with pytest.raises(CoarticError, match=rf"{name}\.parquet {why}.*`coartic run` again"):
+            read()
+    pd.DataFrame({"x": [1]}).to_parquet(table)
+    with pytest.raises(CoarticError, match=rf"{name}\.parquet is damaged \(it has no column"):
+        read()
+
+
+def test_lost_solutions_are_noticed(results, tmp_path):
+    folder = shutil.copytree(results.folder, tmp_path / "copy")
+    whole = pd.read_parquet(folder / "solutions.parquet")
+    first = results.runs.run_id.iloc[0]
+    whole[whole.run_id != first].to_parquet(folder / "solutions.parquet")
+    with pytest.raises(CoarticError, match=f"lacks the movements of 1 runs, {first} the first"):
+        load_results(folder).solutions()
 
 
 def test_manifest(results):

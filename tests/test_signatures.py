@@ -12,7 +12,7 @@ from scipy import integrate
 
 from analysis import signature_nulls
 from analysis.results import Results
-from analysis.signatures import signatures_frame
+from analysis.signatures import intervals, signatures_frame
 from analysis.signatures.cell import Cell
 from analysis.signatures.context import (
     context_dependence,
@@ -23,7 +23,12 @@ from analysis.signatures.context import (
 )
 from analysis.signatures.locus import families, locus_slopes
 from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
-from analysis.signatures.other_arm import preshaping, travel
+from analysis.signatures.other_arm import (
+    preshaping,
+    preshaping_from_base,
+    preshaping_since_hit,
+    travel,
+)
 from analysis.signatures.paths import (
     base_reversals,
     dimensionless_jerk,
@@ -299,6 +304,76 @@ def test_preshaping_and_travel():
     assert travel(path)[1] == 0.0  # the right arm, when the left hand works
 
 
+def test_preshaping_by_the_base_alone():
+    """The left arm keeps its joints, the base brings it half a length nearer."""
+    task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
+    initial = execute(task, planned(posture(1.0), posture(4.0), hands="RL"))
+    bent = posture(1.5, right_1=0.8, right_2=-1.6)  # the right hand stays behind
+    hand = task.robot.forward_kinematics(bent, "right")
+    near = tiny_task(goals=[hand.tolist(), [7.5, 0.1]], initial_hands="RL")
+    path = trajectory(near, planned(bent, posture(4.0), hands="RL"))
+    assert path.execution.configurations[0, 0] > initial.configurations[0, 0] + 0.1
+    assert preshaping(path, initial)[0] > 0.05
+    for arm_alone in (preshaping_from_base, preshaping_since_hit):
+        assert arm_alone(path, initial)[0] == 0.0
+        assert math.isnan(arm_alone(path, initial)[1])
+
+
+def test_preshaping_by_the_arm_alone():
+    """The base never moves: all of it is the arm's."""
+    start = posture(left_1=1.0)
+    swung = posture(left_1=1.0, right_1=0.4)
+    robot = load_task("two-armed-1").robot
+    goals = [robot.forward_kinematics(q, hand).tolist()
+             for q, hand in ((swung, "right"), (posture(left_1=0.2), "left"))]  # fmt: skip
+    content = {"base": [0.0, 0.0], "left": start[2:6].tolist(), "right": start[6:].tolist()}
+    task = tiny_task(goals=goals, initial_hands="RL", start=content, locked_base=["x", "y"])
+    end = posture(left_1=0.2, right_1=0.4)
+    initial = execute(task, planned(swung, end, hands="RL"))
+    path = trajectory(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
+    whole = preshaping(path, initial)
+    assert 0.2 < whole[0] < 0.8
+    np.testing.assert_array_equal(preshaping_from_base(path, initial), whole)
+    np.testing.assert_array_equal(preshaping_since_hit(path, initial), whole)
+
+
+def test_what_its_own_hit_left_is_no_preshaping_since():
+    """The left arm keeps still after its hit of goal 1, in another posture than initially."""
+    task = load_task("two-armed-1")
+    initial = corrective_trial(task, "RRRR")
+    path = trajectory(task, corrective_trial(task, "LRLR").movements)
+    assert abs(preshaping_from_base(path, initial)[1]) > 0.1
+    np.testing.assert_array_equal(preshaping_since_hit(path, initial)[:3], [0, 0, 0])
+    moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
+    robot = task.robot
+    goals = [robot.forward_kinematics(q, hand).tolist()
+             for q, hand in zip(moved, ("left", "right"), strict=True)]  # fmt: skip
+    goals.append([7.0, 3.0])
+    small = tiny_task(goals=goals, initial_hands="LRL")
+    end = Movement(3, "left", "corrective")
+    still = execute(
+        small, [Movement(1, "left", "corrective"), Movement(2, "right", "corrective"), end]
+    )
+    path = trajectory(small, [*planned(*moved, hands="LR"), end])
+    configurations = path.execution.configurations
+    held = np.array(configurations[1])
+    held[2:6] = configurations[0, 2:6]
+    now, without, before = (
+        np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
+        for q in (configurations[1], held, still.configurations[1])
+    )
+    assert preshaping_since_hit(path, still)[1] == pytest.approx((without - now) / before)
+    assert abs(without - now) > 0.05
+
+
+def test_waiting_arms_keep_still_under_condition_3_only():
+    for condition, moves in (("EC3", False), ("EC4", True)):
+        run = learn(load_task("two-armed-1"), condition, seed=1, trials=400)
+        path = trajectory(run.task, run.solution)
+        own = preshaping_since_hit(path, corrective_trial(run.task, "RRRR"))
+        assert (np.nan_to_num(own) != 0).any() == moves
+
+
 def test_travel_is_the_column_of_the_runs():
     run = learn(load_task("two-armed-1"), "EC4", seed=3, trials=500)
     path = trajectory(run.task, run.solution)
@@ -383,6 +458,27 @@ def test_smoothness_leaves_out_what_does_not_move():
     path = trajectory(task, planned(posture(1.0), posture(1.0), hands="RR"))
     own = path.hand_path("right")[:91]
     assert smoothness(path) == (pytest.approx(spectral_arc_length(own)), math.inf)
+
+
+# Intervals
+
+
+def test_student_interval_by_hand():
+    """Mean 4, standard error 1, quantile of t with 2 degrees of freedom 4.302653."""
+    values = [4 - math.sqrt(3), 4.0, 4 + math.sqrt(3)]
+    assert intervals.mean(values) == pytest.approx((4.0, 4 - 4.302653, 4 + 4.302653), abs=1e-6)
+    assert intervals.mean([2.0, 2.0]) == (2.0, 2.0, 2.0)
+    assert np.isnan(intervals.mean([2.0])[1:]).all()
+
+
+def test_wilson_interval_by_hand():
+    """7 of 10: (p + z²/2n ± z √(p(1-p)/n + z²/4n²)) / (1 + z²/n), z = 1.959964."""
+    z, p, n = 1.959964, 0.7, 10
+    centre, half = p + z**2 / 2 / n, z * math.sqrt(p * (1 - p) / n + z**2 / 4 / n**2)
+    limits = (centre - half) / (1 + z**2 / n), (centre + half) / (1 + z**2 / n)
+    assert intervals.share([True] * 7 + [False] * 3) == pytest.approx((0.7, *limits), abs=1e-6)
+    assert intervals.share([True])[0] == 1.0
+    assert np.isnan(intervals.share([True])[1:]).all()
 
 
 # Locus
@@ -526,6 +622,22 @@ def test_frame_of_a_family(tmp_path):
     assert (contexts.why_not != "").all()  # a family is compared by its slopes
 
 
+def test_frame_has_the_student_interval_of_its_runs(tmp_path):
+    """The waiting arm bends by 0, 0.1, 0.2 and more: its travel over runs has a known mean."""
+    task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
+    bends = (0.0, 0.1, 0.2, 0.5)
+    solutions = [planned(posture(1.0, left_4=b), posture(4.0), hands="RL") for b in bends]
+    travelled = [execute(task, solution).configurations[0, 5] for solution in solutions]
+    frame = signatures_frame(results(tmp_path, [(task, "planner", solutions)]))
+    row = frame[(frame.signature == "travel of the other arm") & (frame["where"] == "goal 1")]
+    half = 3.1824463 * np.std(travelled, ddof=1) / 2  # Student's t, 3 degrees of freedom
+    mean = np.mean(travelled)
+    assert row[["value", "low", "high"]].squeeze().tolist() == pytest.approx(
+        [mean, mean - half, mean + half], abs=1e-7
+    )
+    assert row.n.item() == 4
+
+
 def test_cells_put_like_sequences_together():
     task = load_task("two-armed-2")
     runs = tuple(
@@ -551,3 +663,21 @@ def test_nulls_are_nulls():
         if "20 and 20 runs" in test.name or "ΔV" in test.name:
             share, _, _ = signature_nulls.rate(test, 60)
             assert share < 0.2
+
+
+def test_every_test_finds_what_is_planted():
+    """Each test that has nulls has effects as well, and finds them more often than nulls."""
+    kinds = {simulation.name.split(",")[0] for simulation in signature_nulls.nulls()}
+    assert kinds == {simulation.name.split(",")[0] for simulation in signature_nulls.planted()}
+    for simulation in signature_nulls.planted():
+        share, low, _ = signature_nulls.rate(simulation, 30)
+        assert low > signature_nulls.ALPHA, f"{simulation.name}: {share}"
+
+
+def test_intervals_hold_the_truth():
+    for simulation in signature_nulls.coverage():
+        share, _, high = signature_nulls.rate(simulation, 150)
+        low_counts = "Poisson, 0.1" in simulation.name
+        assert high > (0.6 if low_counts else 0.9), f"{simulation.name}: {share}"
+    (_, first), (truth, second), _ = signature_nulls.entropies(400)
+    assert first < second < truth == pytest.approx(0.8813, abs=1e-4)  # biased downwards

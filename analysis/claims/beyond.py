@@ -10,12 +10,11 @@ from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Claim, Finding
 from analysis.claims.resemblance import CRITERION, TEST, resembles
 from analysis.claims.two_armed import ONE, preshaping_by_run
-from analysis.claims.wording import interval
 from analysis.frontier import targets_frame
 from analysis.methods import TOLD
 from analysis.statistics import Inference, difference_of_means, mean
 from analysis.study import SEED
-from analysis.table import NONE, Table
+from analysis.table import NONE, Table, interval
 from coartic.method import Information
 
 _TASKS = tuple(task for task, _ in BEST)

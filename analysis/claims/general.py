@@ -11,11 +11,11 @@ from analysis.claims.data import BEST, CELLS, LEARNER, SMOOTH, Data
 from analysis.claims.reach import shortest_reach
 from analysis.claims.register import Claim, Finding
 from analysis.claims.resemblance import CRITERION, TEST, resembles
-from analysis.claims.wording import interval
 from analysis.published import TRIALS
 from analysis.signatures.subtasks import postures_before
 from analysis.statistics import bootstrap_test, mean
 from analysis.study import SEED
+from analysis.table import interval
 from coartic.task import hands_of
 
 CLOSE = 0.10

@@ -6,9 +6,9 @@ import numpy as np
 
 from analysis.claims.data import LEARNER, Data, MissingError
 from analysis.claims.register import Claim, Finding
-from analysis.claims.wording import interval
 from analysis.statistics import Inference, bootstrap_test, mean
 from analysis.study import SEED
+from analysis.table import interval
 
 CONTROLS = ("posture-based/one-goal", "corrective-alone/given")
 """Methods that do not look beyond the current goal."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from analysis.claims.data import LEARNER, Data, MissingError
 from analysis.claims.register import Finding
-from analysis.claims.wording import interval
 from analysis.statistics import bootstrap_test, mean
 from analysis.study import SEED
+from analysis.table import interval
 from coartic.robot import Array
 
 SHARE = 0.5
@@ -43,7 +43,7 @@ def resembles(cost: str) -> Callable[[Data], Finding]:
             tests.append(replace(test, method=f"{test.method}, sign turned"))
             parts.append(
                 f"{task}: initial {before:.2f} from the plan, learned "
-                f"{interval(mean(ratios, seed=SEED), 2)} times as far"
+                f"{interval(mean(ratios, seed=SEED), '.2f')} times as far"
                 + _optimum(data, task, planned, before)
             )
         return Finding(all(t.estimate > 0 for t in tests), "; ".join(parts), tuple(tests))

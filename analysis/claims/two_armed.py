@@ -11,7 +11,6 @@ from scipy import stats
 
 from analysis.claims.data import LEARNER, Data, MissingError, rewards_of
 from analysis.claims.register import LEVEL, Claim, Finding
-from analysis.claims.wording import counts, interval
 from analysis.published import published_cell, published_exhaustive, published_initial
 from analysis.signatures.cell import Cell
 from analysis.signatures.other_arm import preshaping
@@ -25,6 +24,7 @@ from analysis.statistics import (
     probability_of_improvement,
 )
 from analysis.study import SEED
+from analysis.table import interval, tally
 from coartic.robot import Array
 
 ONE, TWO = "two-armed-1", "two-armed-2"
@@ -97,7 +97,7 @@ def _as_often(data: Data, task: str, condition: str, hands: str) -> tuple[bool |
     low = a - b - math.hypot(a - wilson[0].low, wilson[1].high - b)
     high = a - b + math.hypot(wilson[0].high - a, b - wilson[1].low)
     text = (
-        f"{counts(found)} of {ours} runs, published {counts(known)}; share of {hands} "
+        f"{tally(found)} of {ours} runs, published {tally(known)}; share of {hands} "
         f"{a - b:+.0%} [{low:+.0%}, {high:+.0%}], Fisher's exact test p = {p:.2g}"
     )
     if p < LEVEL:
@@ -130,7 +130,7 @@ def _ec2_unreliable(data: Data) -> Finding:
     high = float(stats.binomtest(left, total, alternative="less").proportion_ci().high)
     return Finding(
         True if high <= NEARLY_ALL else False if _in_nearly_all(left, total)[0] else None,
-        f"{left} of {total} runs leave RRRR ({counts(found)}): at most {high:.0%} of all (95 %, "
+        f"{left} of {total} runs leave RRRR ({tally(found)}): at most {high:.0%} of all (95 %, "
         "exact)",
     )
 
@@ -183,7 +183,7 @@ def _no_reversal(data: Data) -> Finding:
 def _lrlr_in_all(data: Data, condition: str) -> Finding:
     found = Counter(data.learned(ONE, condition).hands)
     seen, text = _in_nearly_all(found["LRLR"], sum(found.values()))
-    return Finding(seen, f"LRLR in {text}" + (f"; {counts(found)}" if len(found) > 1 else ""))
+    return Finding(seen, f"LRLR in {text}" + (f"; {tally(found)}" if len(found) > 1 else ""))
 
 
 def _ec3_alternates(data: Data) -> Finding:
@@ -243,7 +243,7 @@ def _ec3_departs(data: Data) -> Finding:
     found = Counter(data.learned(TWO, "EC3").hands)
     away = sum(count for hands, count in found.items() if hands not in best)
     text = (
-        f"{counts(found)}; best of the corrective process alone {' and '.join(best)} "
+        f"{tally(found)}; best of the corrective process alone {' and '.join(best)} "
         f"({reward:.0f}): {away} of {sum(found.values())} runs depart from it"
     )
     if away:
@@ -262,7 +262,7 @@ def _ec4_keeps_lrlr(data: Data) -> Finding:
 
 def _ec4_mixed(data: Data) -> Finding:
     found = Counter(data.learned(TWO, "EC4").hands)
-    return Finding(len(found) > 1, f"{counts(found)} of {sum(found.values())} runs")
+    return Finding(len(found) > 1, f"{tally(found)} of {sum(found.values())} runs")
 
 
 def _higher(data: Data, task: str, higher: str, lower: str) -> tuple[Inference, str]:
@@ -272,7 +272,7 @@ def _higher(data: Data, task: str, higher: str, lower: str) -> tuple[Inference, 
     apart = difference_of_means(a, b, seed=SEED)
     better = probability_of_improvement(a, b, seed=SEED)
     return test, (
-        f"{task}: {higher} − {lower} = {interval(apart)}, P(improvement) {interval(better, 2)}"
+        f"{task}: {higher} − {lower} = {interval(apart)}, P(improvement) {interval(better, '.2f')}"
     )
 
 
@@ -315,7 +315,7 @@ def _sequences_change(data: Data) -> Finding:
             )
         )
         parts.append(
-            f"{task}: " + ", ".join(f"{c} {counts(n)}" for c, n in zip(pair, found, strict=True))
+            f"{task}: " + ", ".join(f"{c} {tally(n)}" for c, n in zip(pair, found, strict=True))
         )
     # Fisher's test has no contrary side: no difference leaves it open.
     changed = all(test.estimate > 0 for test in tests)
@@ -363,9 +363,9 @@ def _other_arm_prepares(data: Data) -> Finding:
         raise MissingError(f"at least {FEWEST} runs on {ONE} that use both hands")
     test = bootstrap_test(moving, still, seed=SEED)
     text = (
-        f"EC4 {interval(mean(moving, seed=SEED), 2)}, EC3 "
-        f"{interval(mean(still, seed=SEED), 2)}: "
-        f"{interval(difference_of_means(moving, still, seed=SEED), 2)}"
+        f"EC4 {interval(mean(moving, seed=SEED), '.2f')}, EC3 "
+        f"{interval(mean(still, seed=SEED), '.2f')}: "
+        f"{interval(difference_of_means(moving, still, seed=SEED), '.2f')}"
     )
     for label in ("corrective-alone/every", "posture-based/one-goal hands=every, other_arm=free"):
         try:

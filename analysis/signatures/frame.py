@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from analysis.results import Results
 from analysis.signatures.cell import Cell, cells_of, last_ticks, postures
@@ -21,13 +20,18 @@ from analysis.signatures.context import (
     lead_time,
     permutation_p,
 )
+from analysis.signatures.intervals import mean, share
 from analysis.signatures.locus import LEAST, Family, families, locus_slopes
 from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
-from analysis.signatures.other_arm import preshaping, travel
+from analysis.signatures.other_arm import (
+    preshaping,
+    preshaping_from_base,
+    preshaping_since_hit,
+    travel,
+)
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
 from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
 from analysis.signatures.subtasks import change_from_initial, excess, sacrifices
-from analysis.statistics import CONFIDENCE
 from coartic import Task
 from coartic.robot import HANDS, Array, Hand
 
@@ -156,23 +160,30 @@ def _recruitment(cell: Cell, best: list[str]) -> Iterator[Signature]:
 
 
 def _other_arm(cell: Cell) -> Iterator[Signature]:
-    names = ("preshaping of the other arm", "travel of the other arm")
+    names = (
+        "preshaping of the other arm",
+        "preshaping seen from the base",
+        "preshaping since its last hit",
+        "travel of the other arm",
+    )
     if len(cell.task.hands) < 2 or not cell.runs:
         why = ONE_HAND if cell.runs else NO_RUN
         yield from (Signature(name, why_not=why) for name in names)
         return
     if cell.initial is None:
-        yield Signature(names[0], why_not=NO_INITIAL)
+        yield from (Signature(name, why_not=NO_INITIAL) for name in names[:3])
     else:
         initial = cell.initial
-        yield from _by_goal(
-            names[0],
-            _goals(cell.task)[:-1],
-            [preshaping(run, initial)[:-1] for run in cell.runs],
-            "1",
-            "the other hand hits no later goal",
-        )
-    yield from _by_goal(names[1], _goals(cell.task), [travel(run) for run in cell.runs], "rad", "")
+        measures = (preshaping, preshaping_from_base, preshaping_since_hit)
+        for name, measure in zip(names[:3], measures, strict=True):
+            yield from _by_goal(
+                name,
+                _goals(cell.task)[:-1],
+                [measure(run, initial)[:-1] for run in cell.runs],
+                "1",
+                "the other hand hits no later goal",
+            )
+    yield from _by_goal(names[3], _goals(cell.task), [travel(run) for run in cell.runs], "rad", "")
 
 
 def _form(cell: Cell) -> Iterator[Signature]:
@@ -361,22 +372,17 @@ def _mean(
     n = len(known)
     if not n:
         return Signature(name, where, unit=unit, why_not=missing if len(given) else NO_RUN)
-    mean = float(known.mean())
-    if n == 1:
-        return Signature(name, where, mean, n=1, unit=unit, why_not="one run: no interval")
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1) * stats.sem(known))
-    return Signature(name, where, mean, mean - half, mean + half, n=n, unit=unit)
+    return Signature(name, where, *mean(known), n=n, unit=unit, why_not=_one_run(n))
 
 
 def _share(name: str, where: str, agrees: Sequence[bool]) -> Signature:
     """Share of runs, with Wilson's interval."""
     n = len(agrees)
-    test = stats.binomtest(sum(agrees), n)
-    if n == 1:
-        return Signature(name, where, float(agrees[0]), n=1, unit="1",
-                         why_not="one run: no interval")  # fmt: skip
-    low, high = test.proportion_ci(CONFIDENCE, method="wilson")
-    return Signature(name, where, sum(agrees) / n, float(low), float(high), n=n, unit="1")
+    return Signature(name, where, *share(agrees), n=n, unit="1", why_not=_one_run(n))
+
+
+def _one_run(n: int) -> str:
+    return "one run: no interval" if n == 1 else ""
 
 
 def _rng(seed: int, name: str, where: str) -> np.random.Generator:

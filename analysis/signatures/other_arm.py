@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.signatures.subtasks import postures_before
 from coartic import Execution, Hand, Trajectory
-from coartic.robot import Array
+from coartic.robot import BASE_DOF, Array
 
 
 def other(hand: Hand) -> Hand:
@@ -21,8 +21,48 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
     next goal it will hit, at the moment the current goal is hit; d_initial that of the same
     hand to the same goal at the same moment of ``initial`` (the corrective process alone
     with the task's hands). -∞ to 1: 1 is there already, 0 no nearer than initially, negative
-    farther away. Base and arm both count. NaN where the other hand hits no later goal.
+    farther away. Base and arm both count; the other two functions have the arm's part. NaN
+    where the other hand hits no later goal.
     """
+    return _nearer(path, initial, path.execution.configurations)
+
+
+def preshaping_from_base(path: Trajectory, initial: Execution) -> Array:
+    """The part of :func:`preshaping` that lies in the arm's joints, shape ``(G,)``.
+
+    1 - d/d_initial, where d is the distance of the waiting hand to its next goal if the base
+    were where it is in ``initial`` at that moment, with the joint angles of the arm as they
+    are. -∞ to 1: 0 where the arm's joints are as in the initial solution, whatever the base
+    does; all of the preshaping where the base is as in the initial solution; 1: the arm alone
+    would be there already. The rest takes a base that moved otherwise. A posture that the
+    arm's own last hit left counts as well; :func:`preshaping_since_hit` leaves it out. NaN
+    where the other hand hits no later goal.
+    """
+    moved = np.array(path.execution.configurations)
+    moved[:, :BASE_DOF] = initial.configurations[:, :BASE_DOF]
+    return _nearer(path, initial, moved)
+
+
+def preshaping_since_hit(path: Trajectory, initial: Execution) -> Array:
+    """The part of :func:`preshaping` that the arm does while it waits, shape ``(G,)``.
+
+    (d_held - d)/d_initial, where d_held is the distance if the arm had kept its joints since
+    its own last hit (since the start, before any), with the base where it is. Length per
+    length, -∞ to ∞: 0 where the arm keeps still, whatever the base does (always under the
+    exploration conditions 1 to 3); all of the preshaping where only the arm's waiting differs
+    from the initial solution. NaN where the other hand hits no later goal.
+    """
+    held = np.array(path.execution.configurations)
+    own_last = {"left": np.array(path.task.q0), "right": np.array(path.task.q0)}
+    for row, hand in zip(held, path.hands, strict=True):
+        own_last[hand] = np.array(row)
+        joints = path.task.robot.joints(other(hand))
+        row[joints] = own_last[other(hand)][joints]
+    return preshaping(path, initial) - _nearer(path, initial, held)
+
+
+def _nearer(path: Trajectory, initial: Execution, configurations: Array) -> Array:
+    """1 - d/d_initial with the waiting hands of ``configurations``, (G, dof), at each hit."""
     task = path.task
     result = np.full(len(task.goals), np.nan)
     for number, hand in enumerate(path.hands, 1):
@@ -33,10 +73,7 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
         goal = np.array(task.goals[later[0] - 1])
         distances = [
             float(np.linalg.norm(task.robot.forward_kinematics(q, waiting) - goal))
-            for q in (
-                path.execution.configurations[number - 1],
-                initial.configurations[number - 1],
-            )
+            for q in (configurations[number - 1], initial.configurations[number - 1])
         ]
         if distances[1] > 0:
             result[number - 1] = 1 - distances[0] / distances[1]
