@@ -154,6 +154,22 @@ def test_effects_by_enumeration(tmp_path):
     assert planner["runs_1"] == runs_needed(4.65, np.std(EC4, ddof=1), 0)
 
 
+def test_the_one_tailed_test_is_in_the_stated_direction(tmp_path):
+    """Both are 10 above the learner; only of the one that is told more was it expected."""
+    better = [reward + 10 for reward in EC4[::-1]]
+    found = study(
+        tmp_path,
+        cell("dual-process/EC4", EC4, travel=1.0),
+        cell("same", better, travel=1.0),
+        cell("more", better, travel=1.0, told=PLANNER),
+    )
+    same, more = pairwise_frame(found).to_dict("records")
+    assert (same["expected"], more["expected"]) == ("higher", "lower")
+    assert same["p_bootstrap"] > 0.99
+    assert more["p_bootstrap"] < 0.01
+    assert same["p_permutation"] == more["p_permutation"] < 0.01
+
+
 def test_holm_over_the_rows_of_a_task(tmp_path):
     """By hand: the smallest p times the number of tests, the next times one less, rising."""
     shifts = {"a": 20, "b": 2, "c": 1, "d": 0}
