@@ -1,17 +1,34 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
-from analysis.claims import CLAIMS, Claim, Finding, MissingError, claims_page, judge
+import analysis.signatures.cell
+from analysis.claims import (
+    CLAIMS,
+    Claim,
+    Finding,
+    MissingError,
+    claims_frame,
+    claims_page,
+    general,
+    judge,
+)
+from analysis.claims.reach import shortest_reach
 from analysis.results import Results
-from analysis.statistics import Inference
+from analysis.statistics import Inference, bootstrap_test, mean
 from analysis.study import Study
+from analysis.table import interval
 from benchmarks.methods import registry
 from benchmarks.suites import Cell
-from coartic import load_task
+from coartic import corrective_trial, load_task, trajectory
+from coartic.cli import app
 
+from .strategies import changed
 from .test_harness import run_and_write
 from .test_methods_table import row
 
@@ -26,10 +43,10 @@ def test(p):
 
 def planted(holds, *p, place="here", ids=("r",)):
     def decide(data):
-        data.used += ids
+        data.note(ids)
         return Finding(holds, "planted", tuple(map(test, p)))
 
-    return Claim("planted", "It is so.", place, "planted", decide)
+    return Claim("planted", "It is so.", "General", "planted", decide, place)
 
 
 test.__test__ = False
@@ -66,8 +83,9 @@ def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
         planted(None, 0.9, place=""),  # measured: no part of the family
     ]
     judged = judge(Study(NOTHING), claims)
-    assert [entry.p for entry in judged[:3]] == pytest.approx([0.06, 0.003, 0.06])
-    assert np.isnan(judged[3].p)
+    assert [entry.p for entry in judged[:3]] == [0.03, 0.001, 0.04]
+    assert [entry.adjusted_p for entry in judged[:3]] == pytest.approx([0.06, 0.003, 0.06])
+    assert np.isnan([judged[3].p, judged[3].adjusted_p]).all()
     verdicts = [entry.verdict for entry in judged]
     assert verdicts == ["cannot tell", "supported", "cannot tell", "measured"]
 
@@ -84,15 +102,32 @@ def learner(task, condition, rewards, hands="LRLR", initial=-671, trials=10_000,
     ]  # fmt: skip
 
 
-def planted_results(rows, tmp_path):
+SEQUENCES = {
+    "two-armed-1": {"LRLR": -533, "RRRR": -671, "LLLL": -727},
+    "two-armed-2": {"RRRR": -357, "RLRR": -357},
+}
+
+
+def planted_results(rows, tmp_path, sequences=SEQUENCES, tasks=()):
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     cells = runs[["task", "method", "variant"]].drop_duplicates().to_dict("records")
-    tasks = {name: load_task(name).model_dump(mode="json") for name in runs.task.unique()}
-    sequences = pd.DataFrame(
-        {"task": ["two-armed-1"] * 2, "hands": ["LRLR", "RRRR"], "reward": [-533, -671]}
-    )
-    specification = {"tasks": tasks, "cells": cells}
-    return Results(tmp_path, {"specification": specification}, runs, sequences)
+    known = {task.name: task for task in (*map(load_task, runs.task.unique()), *tasks)}
+    table = [
+        {"task": task, "hands": hands, "reward": reward}
+        for task, rewards in sequences.items()
+        for hands, reward in rewards.items()
+    ]
+    specification = {
+        "tasks": {name: task.model_dump(mode="json") for name, task in known.items()},
+        "cells": cells,
+    }
+    return Results(tmp_path, {"specification": specification}, runs, pd.DataFrame(table))
+
+
+def verdict_of(claim, study):
+    (wanted,) = [entry for entry in CLAIMS if entry.id == claim]
+    (judged,) = judge(study, [wanted])
+    return judged
 
 
 LOW = [-610, -612, -608, -611, -609, -613, -607, -610]
@@ -101,6 +136,8 @@ HIGH = [-484, -482, -486, -483, -485, -487, -481, -484]
 WORSE = [-350, -351, -352, -353, -351, -350, -352, -354]
 BETTER = [-330, -331, -332, -333, -331, -330, -332, -334]
 T1, T2 = "two-armed-1", "two-armed-2"
+RRLR = ["RRLR"] * 8 + ["RRRR"] * 8
+MIXED = ["RLRR"] * 8 + ["RRRR"] * 8
 
 
 def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
@@ -161,11 +198,36 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
          "cannot tell"),
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 100, ["RLRR", "RRRR"] * 400, -357),
          "supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", LOW + MIDDLE, RRLR), "not supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "cannot tell"),
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR, initial=-500), "not supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE * 3, "RRLR"), "not supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE, "RRLR"), "cannot tell"),
+        (
+            "ec3-better-than-ec2",
+            learner(T1, "EC2", MIDDLE + LOW, RRLR) + learner(T1, "EC3", HIGH), "supported",
+        ),
+        (  # better than all runs of EC2 together, but not than those with its best hands
+            "ec3-better-than-ec2",
+            learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE), "not supported",
+        ),
+        ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3), "supported"),
+        ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3, "RRLR"), "not supported"),
+        ("rlrr-better", learner(T2, "EC3", BETTER + WORSE, MIXED, -357), "supported"),
+        ("rlrr-better", learner(T2, "EC3", WORSE + BETTER, MIXED, -357), "not supported"),
+        ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "cannot tell"),  # a tie
+        ("ec3-departs", learner(T2, "EC3", BETTER, "RLLR", -357), "supported"),
+        ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3), "supported"),
+        ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3, "RRLR"), "not supported"),
+        ("ec4-mixed", learner(T2, "EC4", WORSE + BETTER, MIXED, -357), "supported"),
+        ("ec4-mixed", learner(T2, "EC4", WORSE, "RLRR", -357), "not supported"),
     ],
 )  # fmt: skip
 def test_judges_on_planted_runs(claim, rows, verdict, tmp_path):
-    (wanted,) = [entry for entry in CLAIMS if entry.id == claim]
-    (judged,) = judge(Study(planted_results(rows, tmp_path)), [wanted])
+    judged = verdict_of(claim, Study(planted_results(rows, tmp_path)))
     assert judged.verdict == verdict, judged.evidence
 
 
@@ -183,14 +245,13 @@ def seven(replays):
 
 def test_learning_that_does_not_last_is_not_supported(tmp_path):
     """The best of all trials is never below the first; what is kept may be."""
-    (claim,) = [entry for entry in CLAIMS if entry.id == "learning-improves"]
     for replays, verdict in (
         ([9, 10, 11, 12], "supported"),
         ([-9, -10, -11, -12], "not supported"),
         ([-9, 10, -11, 12], "cannot tell"),
     ):
-        (judged,) = judge(Study(planted_results(seven(replays), tmp_path)), [claim])
-        assert judged.verdict == verdict
+        study = Study(planted_results(seven(replays), tmp_path))
+        assert verdict_of("learning-improves", study).verdict == verdict
 
 
 @pytest.mark.parametrize(
@@ -205,8 +266,7 @@ def test_learning_that_does_not_last_is_not_supported(tmp_path):
     ],
 )
 def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words, tmp_path):
-    (claim,) = [entry for entry in CLAIMS if entry.id == "ec3-alternates"]
-    (judged,) = judge(Study(planted_results(rows, tmp_path)), [claim])
+    judged = verdict_of("ec3-alternates", Study(planted_results(rows, tmp_path)))
     assert judged.verdict == "cannot tell"
     assert words in judged.evidence
 
@@ -215,10 +275,212 @@ def test_what_the_folder_lacks_is_said():
     def decide(data):
         raise MissingError("no runs of dual-process/EC1 on ascending")
 
-    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "here", "t", decide)])
+    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "General", "t", decide, "here")])
     assert judged.verdict == "cannot tell"
     assert judged.evidence == "not in this folder: no runs of dual-process/EC1 on ascending"
     assert judged.run_ids == ()
+
+
+@pytest.mark.parametrize(
+    ("claim", "task", "rewards", "verdict"),
+    [
+        ("right-hand-better", T1, {"RRRR": -671, "LLLL": -727}, "supported"),
+        ("right-hand-better", T1, {"RRRR": -727, "LLLL": -671}, "not supported"),
+        ("right-hand-better", T1, {"RRRR": -727}, "cannot tell"),
+        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -360}, "supported"),
+        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -357}, "cannot tell"),
+        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -350}, "not supported"),
+        ("ec3-departs", T2, {"RRRR": -350, "LLLL": -360}, "not supported"),
+    ],
+)
+def test_judges_on_planted_sequences(claim, task, rewards, verdict, tmp_path):
+    rows = learner(task, "EC3", MIDDLE, "RRRR")
+    study = Study(planted_results(rows, tmp_path, {task: rewards}))
+    assert verdict_of(claim, study).verdict == verdict
+
+
+def test_the_base_reverses_where_goals_lie_back_and_forth(tmp_path):
+    rows = learner(T1, "EC3", MIDDLE)
+    judged = verdict_of("initial-base-reverses", Study(planted_results(rows, tmp_path)))
+    assert judged.verdict == "supported"
+    assert judged.run_ids == ()
+    assert judged.sources == ("the corrective process on two-armed-1",)
+    forth = changed(T1, goals=[[4.0, 2.0], [6.0, 2.0], [8.0, 2.0], [10.0, 2.0]])
+    study = Study(planted_results(rows, tmp_path, tasks=[forth]))
+    assert verdict_of("initial-base-reverses", study).verdict == "not supported"
+
+
+def ensured(failed=0):
+    return [
+        {**entry, "failed_trials": failed * (k == 5)} for k, entry in enumerate(seven([9, 10, 11]))
+    ]
+
+
+def test_a_failed_trial_or_sequence_is_found(tmp_path):
+    every = {"ascending": {"RRR": -319}, "descending": {"RRR": -333}, **SEQUENCES}
+    lacking = {**every, "descending": {"RRR": None}}
+    for failed, sequences, verdict in (
+        (0, every, "supported"), (1, every, "not supported"), (0, lacking, "not supported"),
+    ):  # fmt: skip
+        study = Study(planted_results(ensured(failed), tmp_path, sequences))
+        assert verdict_of("corrective-ensures", study).verdict == verdict
+
+
+def test_the_shortest_reach():
+    """Goal 1 of the ascending task lies 1.5 in line with the extended arm: 1.4 to its disc."""
+    task = load_task("ascending")
+    alone = corrective_trial(task, "RRR").configurations
+    found = [
+        shortest_reach(task, q, "right", goal, alone[goal - 1], seed=0)
+        for goal, q in ((1, task.q0), (2, alone[0]))
+    ]
+    assert found[0] == pytest.approx(1.4)
+    # No posture that hits goal 2 is nearer: sampled about the corrective process's.
+    ways = np.random.default_rng(1).normal(0, 0.05, (20_000, task.robot.dof))
+    ways[:, task.robot.joints("left")] = 0.0
+    q = alone[1] + ways
+    hit = (
+        np.linalg.norm(
+            task.robot.forward_kinematics(q, "right") - np.array(task.goals[1]), axis=-1
+        )
+        <= task.radius
+    )
+    assert hit.sum() > 1000
+    least = np.linalg.norm(q[hit] - alone[0], axis=1).min()
+    assert 0.9 * least < found[1] < least
+
+
+def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
+    study = Study(planted_results(seven([9, 10, 11]), tmp_path))
+    assert verdict_of("corrective-near-shortest", study).verdict == "supported"
+    monkeypatch.setattr(general, "CLOSE", 0.01)
+    assert verdict_of("corrective-near-shortest", study).verdict == "not supported"
+
+
+BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
+PLANS = ("path-length", "squared-changes", "acceleration", "jerk")
+
+
+def beside_plans(reward, plan, spent=1_000_000):
+    """The learner near ``reward`` and every plan at ``plan``, on every task."""
+    rows = []
+    for task, condition in BEST:
+        rewards = [reward + k for k in (-1, 0, 1, 0, -1, 1)]
+        rows += learner(task, condition, rewards, forward_kinematics=spent, jacobians=0)
+        rows += [
+            row(
+                f"trajectory-optimisation/{cost}", plan, task=task, trials=0, told="goals",
+                forward_kinematics=50_000, jacobians=50_000,
+            )
+            for cost in PLANS
+        ]  # fmt: skip
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("claim", "rows", "verdict"),
+    [
+        ("beats-inaccurate", beside_plans(-300, -310), "supported"),
+        ("beats-inaccurate", beside_plans(-310, -300), "not supported"),
+        ("beats-inaccurate", beside_plans(-300, -300), "cannot tell"),
+        ("low-computation", beside_plans(-300, -300, 90_000), "supported"),
+        ("low-computation", beside_plans(-300, -300, 2_000_000_000), "not supported"),
+        ("low-computation", beside_plans(-300, -300, 2_000_000), "cannot tell"),
+    ],
+)
+def test_judges_beside_planted_plans(claim, rows, verdict, tmp_path):
+    judged = verdict_of(claim, Study(planted_results(rows, tmp_path)))
+    assert judged.verdict == verdict, judged.evidence
+
+
+def with_paths(results, paths):
+    """A study whose solutions are planted: runs by task and label."""
+    study = Study(results)
+    study.__dict__["trajectories"] = {
+        (task, label): analysis.signatures.cell.Cell(load_task(task), label, "", tuple(runs))
+        for (task, label), runs in paths.items()
+    }
+    return study
+
+
+def at(q):
+    return SimpleNamespace(execution=SimpleNamespace(configurations=q))
+
+
+@pytest.mark.parametrize(
+    ("share", "verdict"), [(0.2, "supported"), (0.7, "not supported"), (1.2, "not supported")]
+)
+def test_resemblance_is_half_the_initial_distance(share, verdict, tmp_path):
+    rows, paths = [], {}
+    for task in ("ascending", "descending"):
+        rows += learner(task, "EC1", [-300] * 9, "RRR")
+        rows.append(row("trajectory-optimisation/squared-changes", -300, task=task, hands="RRR"))
+        initial = corrective_trial(load_task(task), "RRR").configurations
+        planned = initial + 0.1
+        paths[task, "trajectory-optimisation/squared-changes"] = [at(planned)]
+        paths[task, "dual-process/EC1"] = [
+            at(planned + (share + 0.01 * k) * (initial - planned)) for k in range(-4, 5)
+        ]
+    study = with_paths(planted_results(rows, tmp_path), paths)
+    judged = verdict_of("resembles-squared-changes", study)
+    assert judged.verdict == verdict
+    assert judged.evidence.count(f"learned {share:.2f} [") == 2
+
+
+@pytest.mark.parametrize(("hands", "verdict"), [("LRLR", "supported"), ("RRLR", "not supported")])
+def test_hands_that_serve_other_goals(hands, verdict, tmp_path):
+    """From the steeple posture the right hand is quicker at goal 1 of two-armed task 1."""
+    task = load_task(T1)
+    run = trajectory(task, corrective_trial(task, hands).movements)
+    labels = ["EC3", "EC4"]
+    rows = [entry for label in labels for entry in learner(T1, label, MIDDLE, hands)]
+    paths = {(T1, f"dual-process/{label}"): [run] * 8 for label in labels}
+    study = with_paths(planted_results(rows, tmp_path), paths)
+    judged = verdict_of("hand-coarticulation", study)
+    assert judged.verdict == verdict, judged.evidence
+
+
+@pytest.mark.parametrize(("part", "verdict"), [(0.5, "supported"), (-0.5, "not supported")])
+def test_the_other_arm_gets_ready(part, verdict, tmp_path):
+    """At goal 2 the waiting left arm goes part of its way to the posture of goal 3."""
+    task = load_task(T1)
+    alone = corrective_trial(task, "LRLR").configurations
+    left = task.robot.joints("left")
+
+    def run(part):
+        q = alone.copy()
+        q[1, left] += part * (alone[2, left] - alone[1, left])
+        return SimpleNamespace(task=task, hands=("left", "right", "left", "right"), **vars(at(q)))
+
+    spread = 0.01 * np.arange(8)
+    rows = learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH)
+    paths = {
+        (T1, "dual-process/EC3"): [run(s) for s in spread],
+        (T1, "dual-process/EC4"): [run(part + s) for s in spread],
+    }
+    study = with_paths(planted_results(rows, tmp_path), paths)
+    judged = verdict_of("other-arm-coarticulation", study)
+    assert judged.verdict == verdict, judged.evidence
+
+
+def test_the_contrary_of_one_test_is_not_that_of_another():
+    """Runs without spread that are as claimed say nothing against it."""
+
+    def decide(data):
+        data.note(("r",))
+        return Finding(False, "", (
+            bootstrap_test([5.0, 5.0, 5.0], 0.0, seed=0), bootstrap_test([-9, 8, 0.9], 0, seed=0),
+        ))  # fmt: skip
+
+    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "General", "t", decide, "here")])
+    assert judged.verdict == "cannot tell"
+    assert any("no spread" in method for method in judged.methods)
+
+
+def test_no_spread_is_no_certainty():
+    assert interval(mean([-490.0] * 20, seed=0)) == "-490.0 (no spread in 20 runs)"
+    assert interval(mean([-490.0, -480.0], seed=0)) == "-485.0"
+    assert "[" in interval(mean([-490.0, -480.0, -470.0], seed=0))
 
 
 @pytest.fixture(scope="module")
@@ -236,6 +498,10 @@ def folder(tmp_path_factory):
     ]
     cells.append(Cell(load_task("ascending"), known["trajectory-optimisation/squared-changes"]))
     cells.append(Cell(load_task("descending"), known["trajectory-optimisation/squared-changes"]))
+    cells += [
+        Cell(load_task(task), known["corrective-alone/given"])
+        for task in ("ascending", "descending")
+    ]
     return run_and_write(tmp_path_factory.mktemp("claims"), cells, runs=4, trials=10_000)
 
 
@@ -248,12 +514,23 @@ def test_the_register_on_runs(folder):
         assert judged[name].verdict != "not supported"
     sacrificed = judged["first-movement-sacrificed"]
     assert "first movement 141 to" in sacrificed.evidence
-    assert len(sacrificed.run_ids) == 8
+    assert "corrective-alone/given: first +0.0, all +0.0" in sacrificed.evidence
+    assert "one-goal" not in sacrificed.evidence  # not in this folder
+    assert len(sacrificed.run_ids) == 9
     assert set(sacrificed.run_ids) <= set(folder.runs.run_id)
     assert judged["distance-to-optimum"].verdict == "measured"
-    assert "ticks from -292" in judged["distance-to-optimum"].evidence
+    assert judged["distance-to-optimum"].table.rows[0][:3] == ("ascending", "EC1", "-292")
+    signatures = {row[0]: row[1:] for row in judged["shared-signatures"].table.rows}
+    assert set(signatures) == {"learner", "corrective alone"}
+    assert signatures["learner"][0].startswith("yes")
+    assert signatures["corrective alone"][:2] == ("no, 0.00", "no, +0.0, +0.0")
+    spent = {row[0]: row[1:] for row in judged["computation"].table.rows}
+    assert set(spent) >= {"dual-process/EC3", "corrective-alone/given"}
+    assert spent["dual-process/EC3"][:2] == ("–", "–")
+    reached = {row[0]: row[1] for row in judged["reward-by-experience"].table.rows}
+    assert reached["corrective-alone/given"] == "0/1, never (-319.0)"
     # What was not run is not judged.
-    for name in ("less-experience", "resembles-jerk", "shared-signatures"):
+    for name in ("less-experience", "resembles-jerk", "beats-inaccurate", "proposals"):
         assert judged[name].verdict == "cannot tell"
         assert judged[name].evidence.startswith("not in this folder: no runs of")
     assert judged["resembles-squared-changes"].run_ids
@@ -265,10 +542,30 @@ def test_the_register_is_the_same_every_time(folder):
     np.testing.assert_array_equal([j.p for j in first], [j.p for j in second])
 
 
-def test_the_page_names_every_run(folder):
+def test_the_command_writes_page_and_frame(folder):
+    done = CliRunner().invoke(app, ["analyse", str(folder.folder)])
+    assert done.exit_code == 0, done.output
+    frame = pd.read_csv(folder.folder / "claims.csv")
+    assert list(frame.id) == [claim.id for claim in CLAIMS]
+    assert (folder.folder / "claims.md").read_text(encoding="utf-8").startswith("# Claims")
+
+
+def test_page_and_frame_hold_every_claim(folder):
     judged = judge(Study(folder))
-    page = claims_page(folder, judged)
+    page, frame = claims_page(folder, judged), claims_frame(judged)
     assert page.startswith("# Claims")
-    for entry in judged:
-        assert entry.claim.statement.replace("|", "\\|") in page
-        assert all(run[:8] in page for run in entry.run_ids)
+    assert list(frame.id) == [claim.id for claim in CLAIMS]
+    assert frame.id.is_unique
+    for entry, kept in zip(judged, frame.to_dict("records"), strict=True):
+        assert f"### {entry.claim.id}\n\n{entry.claim.statement}" in page
+        assert entry.evidence in page
+        assert kept["verdict"] == entry.verdict
+        assert tuple(kept["runs"].split()) == entry.run_ids
+        assert kept["evidence"].startswith(entry.evidence)
+    assert not any(run in page for run in folder.runs.run_id)
+    paper = [entry for entry in judged if entry.claim.place]
+    independent = [entry for entry in paper if not entry.claim.fitted]
+    supported = sum(entry.verdict == "supported" for entry in independent)
+    assert f"**Independent tests**: {len(independent)} claims, {supported} supported" in page
+    sections = [line[3:] for line in page.splitlines() if line.startswith("## ")]
+    assert sections == ["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
