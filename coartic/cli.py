@@ -295,8 +295,6 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims and the reward-compute frontier of a results folder."""
-    from analysis.signatures.page import signatures_page
-
     from analysis.claims import claims_page, judge
     from analysis.frontier import (
         anytime_frame,
@@ -307,23 +305,27 @@ def analyse(
     )
     from analysis.frontier_page import frontier_page
     from analysis.results import load_results
+    from analysis.signatures.page import signatures_page
     from analysis.study import Study
     from benchmarks.store import write_atomically
 
     results = load_results(folder)
     study = Study(results)
     judged, steps = judge(study), study.steps
+    targets = for_both_arms(targets_frame, results, steps)
+    areas = for_both_arms(area_frame, results, steps)
+    pareto = pareto_frame(results)
     pages = {
         "claims.md": claims_page(results, judged),
-        "frontier.md": frontier_page(study),
+        "frontier.md": frontier_page(results, targets, areas, pareto),
         "signatures.md": signatures_page(study),
     }
     frames = {
         "signatures.csv": study.signatures.drop(columns="label"),
         "anytime.csv": anytime_frame(results, steps),
-        "targets.csv": for_both_arms(targets_frame, results, steps),
-        "areas.csv": for_both_arms(area_frame, results, steps),
-        "pareto.csv": pareto_frame(results),
+        "targets.csv": targets,
+        "areas.csv": areas,
+        "pareto.csv": pareto,
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
     try:
