@@ -8,19 +8,11 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.frontier import (
-    LABELS,
-    OTHER_ARMS,
-    TIME_TOLERANCE,
-    area_frame,
-    for_both_arms,
-    pareto_frame,
-    targets_frame,
-)
+from analysis.frontier import LABELS, OTHER_ARMS, TIME_TOLERANCE
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.progress import SPENDS
+from analysis.results import Results
 from analysis.statistics import CONFIDENCE
-from analysis.study import Study
 from analysis.table import NONE, Table, short
 
 SHOWN = ("trials", "forward_kinematics")
@@ -29,13 +21,14 @@ SURE = CONFIDENCE
 """Share of resamples from which on a method is called on the front; below 1 - SURE, off it."""
 
 
-def frontier_page(study: Study) -> str:
-    """Targets over trials and kinematics, areas and Pareto sets as a Markdown page."""
-    results, steps = study.results, study.steps
+def frontier_page(
+    results: Results, targets: pd.DataFrame, areas: pd.DataFrame, pareto: pd.DataFrame
+) -> str:
+    """Targets over trials and kinematics, areas and Pareto sets as a Markdown page.
+
+    From the frames of :mod:`analysis.frontier`: targets and areas of both optima.
+    """
     parts = ["# Reward and what it costs", *_NOTES]
-    pareto = pareto_frame(results)
-    targets = for_both_arms(targets_frame, results, steps)
-    areas = for_both_arms(area_frame, results, steps)
     for name, task in results.tasks.items():
         parts.append(f"## {name}{' †' if task.reconstructed else ''}")
         arms = OTHER_ARMS if len(task.hands) > 1 else OTHER_ARMS[:1]

@@ -318,10 +318,13 @@ def analyse(
     judged, steps = judge(study), study.steps
     pairs, scores = pairwise_frame(study), combined(scores_frame(results))
     overall = overall_frame(scores)
+    targets = for_both_arms(targets_frame, results, steps)
+    areas = for_both_arms(area_frame, results, steps)
+    pareto = pareto_frame(results)
     pages = {
         "claims.md": claims_page(results, judged),
         "comparisons.md": comparisons_page(study, pairs, overall, scores),
-        "frontier.md": frontier_page(study),
+        "frontier.md": frontier_page(results, targets, areas, pareto),
         "signatures.md": signatures_page(study),
     }
     frames = {
@@ -331,9 +334,9 @@ def analyse(
         "profiles.csv": profiles_frame(scores),
         "signatures.csv": study.signatures.drop(columns="label"),
         "anytime.csv": anytime_frame(results, steps),
-        "targets.csv": for_both_arms(targets_frame, results, steps),
-        "areas.csv": for_both_arms(area_frame, results, steps),
-        "pareto.csv": pareto_frame(results),
+        "targets.csv": targets,
+        "areas.csv": areas,
+        "pareto.csv": pareto,
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
     try:

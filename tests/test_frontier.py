@@ -22,7 +22,6 @@ from analysis.frontier import (
 from analysis.frontier_page import areas_tables, frontier_page, pareto_tables, targets_tables
 from analysis.progress import SPENDS, by_trial, progress
 from analysis.results import Results
-from analysis.study import Study
 from coartic import load_task
 
 BEST = -465  # proven optimum of two-armed 1
@@ -370,9 +369,9 @@ def test_what_the_area_table_shows(tmp_path):
 def test_the_page(tmp_path):
     rows = [run("m", [-600.0, -470.0], number=i) for i in range(3)]
     rows += [run("p", reward=-466), run("none", [-900.0, -900.0])]
-    study = Study(folder(rows, tmp_path))
-    page = frontier_page(study)
-    assert page == frontier_page(Study(study.results))
+    results = folder(rows, tmp_path)
+    frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
+    page = frontier_page(results, *frames, pareto_frame(results))
     for arm in ("free", "still"):
         for what in ("trials to come", "kinematics to come", "area under"):
             assert page.count(f"### two-armed-1: {what}") == 2

@@ -23,9 +23,10 @@ _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 _NOTES = (
     "Means over runs ± half of Student's 95 % interval, shares of runs with Wilson's in "
     "brackets, slopes ± half of the regression's. A number alone is that of a single run, or of "
-    "a quantity without an interval. Methods by mean reward, best first. What each signature "
-    "means, and how its tests and intervals hold: docs/signatures.md; all of them, by goal, hand "
-    "and joint: `signatures.csv`.",
+    "a quantity without an interval; ± 0 says that these runs do not differ, not that others "
+    "would not. Methods by mean reward, best first. What each signature means, and how its tests "
+    "and intervals hold: docs/signatures.md; all of them, by goal, hand and joint: "
+    "`signatures.csv`.",
     "p-values are two-sided for ΔV z and slopes, of permutation tests for contexts, and adjusted "
     "by Holm's method over all tests of their own table. Over several tables nothing is adjusted.",
 )
