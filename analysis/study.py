@@ -44,7 +44,7 @@ class Study:
     @cached_property
     def signatures(self) -> pd.DataFrame:
         """:func:`analysis.signatures.signatures_frame` with a column ``label``."""
-        frame = signatures_frame(self.results, seed=SEED)
+        frame = signatures_frame(self.results, list(self.trajectories.values()), seed=SEED)
         return frame.assign(label=(frame.method + " " + frame.variant).str.strip())
 
     @cached_property

@@ -60,8 +60,10 @@ class Signature:
     why_not: str = ""
 
 
-def signatures_frame(results: Results, *, seed: int = SEED) -> pd.DataFrame:
-    """Every signature of every cell.
+def signatures_frame(
+    results: Results, cells: Sequence[Cell] | None = None, *, seed: int = SEED
+) -> pd.DataFrame:
+    """Every signature of every cell; ``cells`` are those of the results where they are read.
 
     Columns: ``task``, ``method``, ``variant``, ``signature``, ``where`` (goal, other context,
     joint), ``value``, ``low`` and ``high`` (95 % interval), ``p`` (uncorrected), ``n`` (runs
@@ -71,7 +73,7 @@ def signatures_frame(results: Results, *, seed: int = SEED) -> pd.DataFrame:
     stand with the first task of the pair and name the other. ``seed`` is of the permutation
     tests, which draw apart for each row and do not depend on the other rows.
     """
-    cells = cells_of(results)
+    cells = cells_of(results) if cells is None else cells
     groups = families(results.tasks)
     by_key = {(cell.method, cell.variant, cell.task.name): cell for cell in cells}
     pairs = [
