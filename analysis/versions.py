@@ -253,6 +253,9 @@ def _difference(a: pd.DataFrame, b: pd.DataFrame) -> dict[str, Any]:
     margin = MARGIN * abs(float(a.reward.mean()))
     if margin and min(len(before), len(after)) >= FEWEST:
         agreed = bootstrap_equivalence(*samples, margin, seed=SEED)
+        # Where most pairs are equal, resamples without any spread leave it without an end.
+        if not math.isfinite(agreed.low) or not math.isfinite(agreed.high):
+            agreed = replace(agreed, low=interval.low, high=interval.high)
         found |= {"margin": margin, "verdict": agreed.verdict}
     return found
 
@@ -405,7 +408,8 @@ def _notes(first: Results, second: Results) -> list[str]:
         f"seed where at least {FEWEST} seeds are shared (marked ‖), of independent runs "
         "otherwise. p: two-sided bootstrap test, Holm over the cells tested here. Verdict: by "
         f"the studentised bootstrap interval beside ±{MARGIN:.0%} of A's mean "
-        "(docs/statistics.md); a difference can be real (small p) and within the margin.",
+        "(docs/statistics.md), by the BCa interval where so many runs are equal that the former "
+        "has no end; a difference can be real (small p) and within the margin.",
         "Trials, ticks, kinematics, Jacobians and solve time: B's median over A's. Times "
         "compare code only where processor and load were the same.",
         "Cells with a run that has no solution are not compared: a mean of the others would "
