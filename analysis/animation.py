@@ -74,7 +74,7 @@ def animate(
     before the others stands still. Raises CoarticError for an ending that is not in
     :data:`FORMATS`, for MP4 without ffmpeg, and where the file cannot be written.
     """
-    check_format(path)
+    check_output(path)
     ticks = max(panel.trajectory.ticks for panel in panels)
     if not ticks:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
@@ -94,14 +94,19 @@ def animate(
     return timed
 
 
-def check_format(path: Path) -> None:
-    """Raises CoarticError for an ending that is not supported, and for MP4 without ffmpeg."""
+def check_output(path: Path) -> None:
+    """Raises CoarticError for what cannot be written: before anything is drawn.
+
+    An ending that is not supported, MP4 without ffmpeg, a folder that is not there.
+    """
     from matplotlib.animation import FFMpegWriter
 
     if path.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {path}: the name must end in {' or '.join(FORMATS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
+    if not path.parent.is_dir():
+        raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
 
 
 class _Scene:

@@ -482,12 +482,12 @@ def animate(
     width: Annotated[int, typer.Option(min=200, max=3840, help="Width in pixels.")] = 800,
 ) -> None:
     """Show a run's solution tick by tick, alone or beside another one."""
-    from analysis.animation import Panel, check_format
+    from analysis.animation import Panel, check_output
     from analysis.animation import animate as film
     from benchmarks.reproduce import find_record, trajectory_of
     from coartic import corrective_trial, initial_hands, trajectory
 
-    check_format(out)
+    check_output(out)
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run id")
     panels = []
