@@ -28,6 +28,7 @@ RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
 _HIT = "0.55"  # of a goal; not black, which is the right hand
 _MARGIN = 0.4  # length unit around what moves
+_LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
 
 
 @dataclass(frozen=True)
@@ -110,12 +111,12 @@ def check_output(path: Path) -> None:
 
 
 class _Scene:
-    """One panel: what moves in it is updated, never drawn anew."""
+    """What moves in one panel: updated, never drawn anew."""
 
-    def __init__(self, axes: Any, panel: Panel, box: tuple[Array, Array]) -> None:
+    def __init__(self, axes: Any, trajectory: Trajectory) -> None:
         from matplotlib.patches import Circle, Polygon
 
-        self._trajectory = trajectory = panel.trajectory
+        self._trajectory = trajectory
         task = trajectory.task
         self._paths = {hand: trajectory.hand_path(hand) for hand in task.hands}
         self._traces = {
@@ -125,14 +126,12 @@ class _Scene:
         self._base = axes.add_patch(
             Polygon(outline, closed=True, facecolor="0.85", edgecolor="black", linewidth=1)
         )
-        self._goals = []
-        for number, (x, y) in enumerate(task.goals, 1):
-            circle = Circle((x, y), task.radius, facecolor="none", edgecolor="black", zorder=2.5)
-            self._goals.append(axes.add_patch(circle))
-            axes.annotate(
-                str(number), (x, y + task.radius), (0, 3), textcoords="offset points",
-                ha="center", va="bottom", fontsize=9,
-            )  # fmt: skip
+        self._goals = [
+            axes.add_patch(
+                Circle(goal, task.radius, facecolor="none", edgecolor="black", zorder=2.5)
+            )
+            for goal in task.goals
+        ]
         self._arms = {
             hand: axes.plot(
                 [], [], color="black", linewidth=1.4, markeredgecolor="black", **MARKERS[hand]
@@ -142,12 +141,6 @@ class _Scene:
         self._status = axes.text(
             0.0, 1.01, "", transform=axes.transAxes, fontsize=9, va="bottom", parse_math=False
         )
-        axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
-        axes.set_xlim(box[0][0], box[1][0])
-        axes.set_ylim(box[0][1], box[1][1])
-        axes.set_aspect("equal")
-        axes.tick_params(labelsize=8)
-        axes.spines[["top", "right"]].set_visible(False)
 
     def show(self, row: int) -> None:
         """The state at a row of the trajectory, or at its last one."""
@@ -171,30 +164,65 @@ class _Scene:
 
 def _figure(panels: Sequence[Panel], width: int) -> tuple[Any, list[_Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
+    corners = np.array([_box(panel.trajectory) for panel in panels])
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    across, up = high - low
+    inches, count = width / _DPI, len(panels)
+    height = (inches / count - _LEFT) * up / across + _ABOVE + _BELOW
+    size = inches, 2 * round(height * _DPI / 2) / _DPI  # even in pixels, as MP4 wants it
+    share = 1 / count
+    places = [
+        (
+            index * share + _LEFT / inches,
+            _BELOW / size[1],
+            share - (_LEFT + _RIGHT) / inches,
+            1 - (_ABOVE + _BELOW) / size[1],
+        )
+        for index in range(count)
+    ]
+    backdrop, figure = _empty(size, places, low, high), _empty(size, places, low, high)
+    for axes, panel in zip(backdrop.axes, panels, strict=True):
+        _dress(axes, panel)
+    backdrop.canvas.draw()
+    # Axes take most of the time of drawing: they are drawn once, as a picture.
+    figure.figimage(np.asarray(backdrop.canvas.buffer_rgba()), zorder=-1)
+    for axes in figure.axes:
+        axes.set_axis_off()
+    scenes = [
+        _Scene(axes, panel.trajectory) for axes, panel in zip(figure.axes, panels, strict=True)
+    ]
+    return figure, scenes
+
+
+def _empty(
+    size: tuple[float, float],
+    places: Sequence[tuple[float, float, float, float]],
+    low: Array,
+    high: Array,
+) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    corners = np.array([_box(panel.trajectory) for panel in panels])
-    box = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-    across, up = box[1] - box[0]
-    inches = width / _DPI
-    frame = 0.45  # inches beside the axes, for numbers
-    height = (inches / len(panels) - frame) * up / across + 0.8
-    pixels = 2 * round(height * _DPI / 2)  # an even number, as MP4 wants it
-    figure = Figure(figsize=(inches, pixels / _DPI), dpi=_DPI)
+    figure = Figure(figsize=size, dpi=_DPI)
     FigureCanvasAgg(figure)
-    scenes = []
-    for index, panel in enumerate(panels):
-        axes = figure.add_axes(
-            (
-                (index + frame / inches * len(panels)) / len(panels),
-                0.3 * _DPI / pixels,
-                (1 / len(panels)) - (frame + 0.05) / inches,
-                1 - 0.8 * _DPI / pixels,
-            )
-        )
-        scenes.append(_Scene(axes, panel, box))
-    return figure, scenes
+    for place in places:
+        axes = figure.add_axes(place, aspect="equal")
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+    return figure
+
+
+def _dress(axes: Any, panel: Panel) -> None:
+    """What stands still: title, scales, the goals' numbers."""
+    task = panel.trajectory.task
+    for number, (x, y) in enumerate(task.goals, 1):
+        axes.annotate(
+            str(number), (x, y + task.radius), (0, 3), textcoords="offset points",
+            ha="center", va="bottom", fontsize=9,
+        )  # fmt: skip
+    axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
+    axes.tick_params(labelsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _box(trajectory: Trajectory) -> tuple[Array, Array]:
