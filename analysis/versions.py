@@ -47,7 +47,7 @@ _VERDICTS = (
 
 
 @dataclass(frozen=True)
-class Comparison:
+class VersionComparison:
     """What :func:`compare_versions` found, ready for a terminal, Markdown and CSV."""
 
     folders: tuple[Path, Path]
@@ -133,11 +133,11 @@ def load_pair(first: Path, second: Path) -> tuple[Results, Results]:
     return pair
 
 
-def compare_versions(first: Results, second: Results) -> Comparison:
+def compare_versions(first: Results, second: Results) -> VersionComparison:
     """Everything that differs between A (``first``) and B (``second``)."""
     differing, same = _surroundings(first, second)
     here, there = _cells(first), _cells(second)
-    return Comparison(
+    return VersionComparison(
         (first.folder, second.folder),
         differing,
         same,
