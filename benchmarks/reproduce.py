@@ -8,12 +8,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from benchmarks.harness import meter_of, record_of
 from benchmarks.methods import Registry, unknown
 from benchmarks.sandbox import SandboxError, supervise
 from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import RecordError, Store
-from coartic import CoarticError, parse_task
+from coartic import CoarticError, MotionModel, Trajectory, parse_task, trajectory
+from coartic.frames import movements_from
 from coartic.method import Meter
 
 
@@ -31,6 +34,27 @@ def find_record(prefix: str, folder: Path) -> tuple[Store, dict[str, Any]]:
         raise RecordError(f"{prefix!r} is the beginning of {len(ids)} runs: {shown}")
     store = Store(found[0].parent.parent)
     return store, store.read(ids[0])
+
+
+def trajectory_of(record: dict[str, Any]) -> Trajectory:
+    """The solution of a record tick by tick, from nothing but the record.
+
+    Raises CoarticError where the run has no solution.
+    """
+    specification = record["specification"]
+    if record["status"] != "ok":
+        raise CoarticError(
+            f"run {record['run_id']} has no solution to show: {record['status']}, "
+            f"{record['reason']}"
+        )
+    task = parse_task(specification["task"], f"record {record['run_id']}")
+    waypoints = [
+        {"order": row["order"], "waypoint": index, **point}
+        for row in record["solution"]
+        for index, point in enumerate(row.get("waypoints") or ())
+    ]
+    movements = movements_from(task, pd.DataFrame(record["solution"]), pd.DataFrame(waypoints))
+    return trajectory(task, movements, MotionModel(**specification["model"]))
 
 
 def spec_of(record: dict[str, Any], known: Registry, limits: Limits) -> RunSpec:

@@ -452,6 +452,112 @@ def draw(
     print(f"{', '.join(task.name for task in chosen)} drawn in {out}.")
 
 
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="DIR_A", help="Results folder A.")],
+    second: Annotated[Path, typer.Argument(metavar="DIR_B", help="Results folder B.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Page to write (.md), with a table beside it (.csv).")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Table to write (.csv).")] = None,
+) -> None:
+    """Compare two results folders cell by cell: versions, machines, parameters."""
+    from analysis.versions import compare_versions, load_pair
+    from benchmarks.store import write_atomically
+
+    for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
+        if path is not None and path.suffix.lower() != ending:
+            raise CoarticError(f"{option} {path}: the name must end in {ending}")
+    found = compare_versions(*load_pair(first, second))
+    if out is not None and csv is None:
+        csv = out.with_suffix(".csv")
+    texts = {out: found.to_markdown(), csv: found.cells.to_csv(index=False)}
+    written = [path for path in texts if path is not None]
+    for path in written:
+        try:
+            write_atomically(path, texts[path].encode())
+        except OSError as error:
+            raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
+    console = _console()
+    for table in (found.differing, found.table):
+        _print(console, table.title, table.columns, table.rows, wrap=table is found.differing)
+    print("\n".join(found.summary))
+    if written:
+        print(f"In {' and '.join(map(str, written))}.")
+
+
+@app.command()
+def animate(
+    run_id: Annotated[str, typer.Argument(help="Id of a run, or its beginning.")],
+    out: Annotated[Path, typer.Option(help="Film to write: .gif or .mp4 (needs ffmpeg).")],
+    other: Annotated[
+        str | None, typer.Argument(metavar="[OTHER_RUN_ID]", help="A run to show beside it.")
+    ] = None,
+    folder: Records = Path("results"),
+    initial: Annotated[
+        bool, typer.Option("--initial", help="Show the task's initial solution beside it.")
+    ] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(min=0.1, max=10_000, help="Ticks per second; by default some 10 s in all."),
+    ] = None,
+    width: Annotated[int, typer.Option(min=200, max=3840, help="Width in pixels.")] = 800,
+) -> None:
+    """Show a run's solution tick by tick, alone or beside another one."""
+    from analysis.animation import Panel, check_output
+    from analysis.animation import animate as film
+    from benchmarks.reproduce import find_record, trajectory_of
+    from coartic import corrective_trial, initial_hands, trajectory
+
+    check_output(out)
+    if initial and other is not None:
+        raise CoarticError("--initial shows one run beside its initial solution: give one run id")
+    panels = []
+    for name in (run_id, other):
+        if name is not None:
+            _, record = find_record(name, folder)
+            found = trajectory_of(record)
+            method = record["specification"]["method"]
+            panels.append(Panel(f"{found.task.name}: {method}, run {record['run']}", found))
+    if initial:
+        task = panels[0].trajectory.task
+        movements = corrective_trial(task, initial_hands(task)).movements
+        panels.insert(0, Panel(f"{task.name}: initial solution", trajectory(task, movements)))
+    timed = film(panels, out, speed=speed, width=width)
+    print(
+        f"{' beside '.join(panel.title for panel in panels)} in {out}: "
+        f"{len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second."
+    )
+
+
+@app.command()
+def cite(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Results folder; all built-in methods without.")
+    ] = None,
+    style: Annotated[str, typer.Option("--format", help="Only bibtex.")] = "bibtex",
+    analysis: Annotated[
+        bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
+    ] = False,
+) -> None:
+    """Print what to cite: the software, the paper, and the methods of a results folder."""
+    from analysis.citations import MethodSource, bibliography
+    from analysis.results import load_results
+    from benchmarks.methods import BUILT_IN, BUILT_IN_ORIGIN
+
+    if style != "bibtex":
+        raise CoarticError(f"--format {style}: the one format is bibtex")
+    if folder is None:
+        methods = [MethodSource(item.name, item.title, item.citation, True) for item in BUILT_IN]
+    else:
+        declared = load_results(folder).manifest["specification"]["methods"]
+        methods = [
+            MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN_ORIGIN)
+            for name, item in declared.items()
+        ]
+    print(bibliography(methods, analysis=analysis), end="")
+
+
 def _console() -> Console:
     console = Console()
     return console if console.is_terminal else Console(width=PLAIN_WIDTH)

@@ -1,0 +1,245 @@
+"""Movements tick by tick as a GIF or MP4, by the conventions of the paper's figures.
+
+Open squares mark the left arm, closed circles the right one; goals are numbered circles,
+filled from the tick at which they are hit. Thin lines trace both hands.
+"""
+
+from __future__ import annotations
+
+import math
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.drawing import MARKERS
+from coartic import CoarticError, Trajectory
+from coartic.robot import Array
+
+FORMATS = (".gif", ".mp4")
+LASTS_S = 10.0
+"""Seconds that the longest movement takes unless a speed is given."""
+HOLD_S = 2.0
+"""Seconds that the last frame stands."""
+RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
+_DPI = 100
+_HIT = "0.55"  # of a goal; not black, which is the right hand
+_MARGIN = 0.4  # length unit around what moves
+_LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One movement with its title."""
+
+    title: str
+    trajectory: Trajectory
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Which ticks are shown, and for how long."""
+
+    stride: int
+    """Ticks from one frame to the next."""
+    interval_s: float
+    """Seconds that a frame stands; a whole number of hundredths, as GIF has them."""
+    rows: tuple[int, ...]
+    """Row of the longest trajectory that each frame shows, from 0; the last is its end."""
+    held: int
+    """Times that the last frame is repeated."""
+
+
+def timing(ticks: int, speed: float | None = None) -> Timing:
+    """Frames of a movement of ``ticks`` at ``speed`` (ticks per second).
+
+    Without a speed it lasts :data:`LASTS_S`, or less where that would be slower than a tick a
+    frame.
+    """
+    speed = speed or max(ticks / LASTS_S, RATE)
+    stride = max(1, math.ceil(speed / RATE - 1e-9))
+    interval = max(2, round(100 * stride / speed)) / 100
+    rows = tuple(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
+    return Timing(stride, interval, rows, max(1, round(HOLD_S / interval)))
+
+
+def animate(
+    panels: Sequence[Panel], path: Path, *, speed: float | None = None, width: int = 800
+) -> Timing:
+    """Draw movements side by side, all from their first tick, into ``path``; their timing.
+
+    ``speed`` is in ticks per second, ``width`` of the picture in pixels. A movement that ends
+    before the others stands still. Raises CoarticError for an ending that is not in
+    :data:`FORMATS`, for MP4 without ffmpeg, and where the file cannot be written.
+    """
+    check_output(path)
+    ticks = max(panel.trajectory.ticks for panel in panels)
+    if not ticks:
+        raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
+    timed = timing(ticks, speed)
+    figure, scenes = _figure(panels, width)
+    writer = _writer(path, timed)
+    try:
+        with writer.saving(figure, str(path), _DPI):
+            for row in [*timed.rows, *timed.rows[-1:] * timed.held]:
+                for scene in scenes:
+                    scene.show(row)
+                writer.grab_frame()
+    except OSError as error:
+        raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
+    except subprocess.CalledProcessError as error:
+        raise CoarticError(f"cannot write {path}: ffmpeg failed: {error.stderr}") from None
+    return timed
+
+
+def check_output(path: Path) -> None:
+    """Raises CoarticError for what cannot be written: before anything is drawn.
+
+    An ending that is not supported, MP4 without ffmpeg, a folder that is not there.
+    """
+    from matplotlib.animation import FFMpegWriter
+
+    if path.suffix.lower() not in FORMATS:
+        raise CoarticError(f"--out {path}: the name must end in {' or '.join(FORMATS)}")
+    if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
+        raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
+    if not path.parent.is_dir():
+        raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+
+
+class _Scene:
+    """What moves in one panel: updated, never drawn anew."""
+
+    def __init__(self, axes: Any, trajectory: Trajectory) -> None:
+        from matplotlib.patches import Circle, Polygon
+
+        self._trajectory = trajectory
+        task = trajectory.task
+        self._paths = {hand: trajectory.hand_path(hand) for hand in task.hands}
+        self._traces = {
+            hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands
+        }
+        outline = task.robot.base_outline(task.q0)
+        self._base = axes.add_patch(
+            Polygon(outline, closed=True, facecolor="0.85", edgecolor="black", linewidth=1)
+        )
+        self._goals = [
+            axes.add_patch(
+                Circle(goal, task.radius, facecolor="none", edgecolor="black", zorder=2.5)
+            )
+            for goal in task.goals
+        ]
+        self._arms = {
+            hand: axes.plot(
+                [], [], color="black", linewidth=1.4, markeredgecolor="black", **MARKERS[hand]
+            )[0]
+            for hand in task.hands
+        }
+        self._status = axes.text(
+            0.0, 1.01, "", transform=axes.transAxes, fontsize=9, va="bottom", parse_math=False
+        )
+
+    def show(self, row: int) -> None:
+        """The state at a row of the trajectory, or at its last one."""
+        trajectory = self._trajectory
+        row = min(row, trajectory.ticks - 1)
+        q = trajectory.configurations[row]
+        robot = trajectory.task.robot
+        self._base.set_xy(robot.base_outline(q))
+        for hand, arm in self._arms.items():
+            arm.set_data(*robot.joint_positions(q, hand).T)
+            self._traces[hand].set_data(*self._paths[hand][: row + 1].T)
+        hit = trajectory.hits <= row
+        for circle, done in zip(self._goals, hit, strict=True):
+            circle.set_facecolor(_HIT if done else "none")
+        state = "done"
+        if not hit.all():
+            goal = int(np.argmin(hit))
+            state = f"goal {goal + 1} with the {trajectory.hands[goal]} hand"
+        self._status.set_text(f"reward −{row + 1}   {state}")
+
+
+def _figure(panels: Sequence[Panel], width: int) -> tuple[Any, list[_Scene]]:
+    """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
+    corners = np.array([_box(panel.trajectory) for panel in panels])
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    across, up = high - low
+    inches, count = width / _DPI, len(panels)
+    height = (inches / count - _LEFT) * up / across + _ABOVE + _BELOW
+    size = inches, 2 * round(height * _DPI / 2) / _DPI  # even in pixels, as MP4 wants it
+    share = 1 / count
+    places = [
+        (
+            index * share + _LEFT / inches,
+            _BELOW / size[1],
+            share - (_LEFT + _RIGHT) / inches,
+            1 - (_ABOVE + _BELOW) / size[1],
+        )
+        for index in range(count)
+    ]
+    backdrop, figure = _empty(size, places, low, high), _empty(size, places, low, high)
+    for axes, panel in zip(backdrop.axes, panels, strict=True):
+        _dress(axes, panel)
+    backdrop.canvas.draw()
+    # Axes take most of the time of drawing: they are drawn once, as a picture.
+    figure.figimage(np.asarray(backdrop.canvas.buffer_rgba()), zorder=-1)
+    for axes in figure.axes:
+        axes.set_axis_off()
+    scenes = [
+        _Scene(axes, panel.trajectory) for axes, panel in zip(figure.axes, panels, strict=True)
+    ]
+    return figure, scenes
+
+
+def _empty(
+    size: tuple[float, float],
+    places: Sequence[tuple[float, float, float, float]],
+    low: Array,
+    high: Array,
+) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, dpi=_DPI)
+    FigureCanvasAgg(figure)
+    for place in places:
+        axes = figure.add_axes(place, aspect="equal")
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+    return figure
+
+
+def _dress(axes: Any, panel: Panel) -> None:
+    """What stands still: title, scales, the goals' numbers."""
+    task = panel.trajectory.task
+    for number, (x, y) in enumerate(task.goals, 1):
+        axes.annotate(
+            str(number), (x, y + task.radius), (0, 3), textcoords="offset points",
+            ha="center", va="bottom", fontsize=9,
+        )  # fmt: skip
+    axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
+    axes.tick_params(labelsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _box(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Corners of everything that the robot sweeps, with the goals and a margin."""
+    task, q = trajectory.task, trajectory.configurations
+    parts = [task.robot.base_outline(q), task.goal_array]
+    parts += [task.robot.joint_positions(q, hand) for hand in task.hands]
+    cloud = np.concatenate([part.reshape(-1, 2) for part in parts])
+    return cloud.min(axis=0) - _MARGIN, cloud.max(axis=0) + _MARGIN
+
+
+def _writer(path: Path, timed: Timing) -> Any:
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    rate: Any = 1 / timed.interval_s
+    if path.suffix.lower() == ".mp4":
+        return FFMpegWriter(fps=rate, codec="h264")
+    # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
+    rate = 1000 / (1000 * timed.interval_s + 0.5)
+    return PillowWriter(fps=rate)

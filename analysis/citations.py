@@ -1,0 +1,200 @@
+"""What to cite: the software, the paper, and the works behind methods and analysis."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+
+from coartic import CoarticError, __version__
+
+PAPER = "shah2013"
+METHODS: dict[str, tuple[str, ...]] = {
+    "dual-process/": (PAPER,),
+    "dual-process/EC1-nullspace": (PAPER, "liegeois1977"),
+    "dual-process/EC4-nullspace": (PAPER, "liegeois1977"),
+    "dual-process/EC1-biased": (PAPER, "spall2003"),
+    "dual-process/EC4-biased": (PAPER, "spall2003"),
+    "corrective-alone/": ("whitney1969", PAPER),
+    "random-search/pure": ("rastrigin1963",),
+    "random-search/climbing": ("beyer2002",),
+    "cma-es/bandit": ("hansen2016", "auger2005", "auer2002"),
+    "cma-es/every": ("hansen2016", "auger2005", "karnin2013"),
+    "nullspace-qp/": ("nakamura1987", "kanoun2011"),
+    "nullspace-qp/next-goal": (
+        *("nakamura1987", "kanoun2011"),
+        *("rohanimanesh2004", "thibodeau2004"),
+    ),
+    "nullspace-qp/preshaping": (
+        *("nakamura1987", "kanoun2011"),
+        *("rohanimanesh2004", "thibodeau2004"),
+    ),
+    "posture-based/": ("rosenbaum2001",),
+    "trajectory-optimisation/path-length": ("betts1998",),
+    "trajectory-optimisation/squared-changes": ("jordan1992", "jordan1986"),
+    "trajectory-optimisation/acceleration": ("flash1985",),
+    "trajectory-optimisation/jerk": ("flash1985",),
+    "optimum/": (),  # this software's own
+    "optimum/branch-and-bound": ("mccormick1976", "goulart2024"),
+}
+"""Keys of ``references.bib`` by the beginning of a built-in method's id; the longest counts."""
+ANALYSIS: tuple[str, ...] = (
+    *("efron1993", "davison1997", "cliff1993", "agarwal2021", "newcombe2006", "holm1979"),
+    *("chung2013", "schuirmann1987", "dolan2002", "kaplan1958", "brookmeyer1982"),
+    *("clopper1934", "cohen1988", "scholz1999", "verrel2010", "miller1974"),
+    *("balasubramanian2015", "hogan2009", "sussman1991", "engel1997"),
+)
+"""Keys of the works behind signatures and statistics."""
+
+_ENTRY = re.compile(r"@([a-z]+)\{([a-z0-9-]+),\n((?:  [a-z]+ = \{.+\},\n)+)\}")
+_FIELD = re.compile(r"  ([a-z]+) = \{(.+)\},\n")
+_REQUIRED = {
+    "article": {"author", "title", "journal", "year"},
+    "book": {"author", "title", "publisher", "year"},
+    "inproceedings": {"author", "title", "booktitle", "year"},
+    "misc": {"author", "title", "year"},
+    "techreport": {"author", "title", "institution", "year"},
+}
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    **{sign: f"\\{sign}" for sign in "{}%&#_$"},
+}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """One entry of a bibliography."""
+
+    key: str
+    kind: str
+    """``article``, ``book``, ``inproceedings``, ``misc`` or ``techreport``."""
+    fields: Mapping[str, str]
+
+    def to_bibtex(self) -> str:
+        """The entry, one field a line."""
+        lines = [f"  {name} = {{{value}}}," for name, value in self.fields.items()]
+        return "\n".join([f"@{self.kind}{{{self.key},", *lines, "}"])
+
+
+@dataclass(frozen=True)
+class MethodSource:
+    """A method as a manifest or the registry declares it."""
+
+    id: str
+    title: str
+    citation: str
+    """Empty where it is not known."""
+    built_in: bool
+
+
+def parse(text: str, source: str) -> dict[str, Reference]:
+    """Entries by key, of a bibliography in the layout of ``references.bib``.
+
+    Comment lines come first. Raises CoarticError where anything else is in the text, an entry
+    lacks a field that its kind requires, braces do not match, or a key or field comes twice.
+    """
+    body = re.sub(r"\A(?:%.*\n)*\n*", "", text).rstrip("\n")
+    found: dict[str, Reference] = {}
+    for block in body.split("\n\n"):
+        first = block.split("\n", 1)[0]
+        entry = _ENTRY.fullmatch(block)
+        if entry is None:
+            raise CoarticError(f"{source}: {first!r}: not one `  name = {{value}},` a line")
+        kind, key, lines = entry.groups()
+        pairs = _FIELD.findall(lines)
+        fields = dict(pairs)
+        if key in found or len(fields) < len(pairs):
+            raise CoarticError(f"{source}: {key}: the key, or a field of it, is there twice")
+        missing = _REQUIRED.get(kind, {f"a known kind, not @{kind}"}) - fields.keys()
+        if missing:
+            raise CoarticError(f"{source}: {key} lacks {', '.join(sorted(missing))}")
+        for name, value in pairs:
+            if not _balanced(value):
+                raise CoarticError(f"{source}: {key}: braces of {name} do not match")
+        found[key] = Reference(key, kind, fields)
+    return found
+
+
+def references() -> dict[str, Reference]:
+    """Every entry of ``references.bib`` by key."""
+    file = resources.files("analysis") / "references.bib"
+    return parse(file.read_text(encoding="utf-8"), "references.bib")
+
+
+def software() -> Reference:
+    """This software in its present version; the facts are CITATION.cff's."""
+    return Reference(
+        "coartic",
+        "misc",
+        {
+            "author": "{The coartic developers}",
+            "title": "coartic: a comparative benchmark of coarticulation in motor skill "
+            "acquisition",
+            "year": "2026",
+            "howpublished": "Computer software",
+            "note": f"Version {__version__}",
+        },
+    )
+
+
+def keys_of(method: str) -> tuple[str, ...] | None:
+    """Keys of a built-in method, first the most telling; None for one that has no row."""
+    prefixes = [prefix for prefix in METHODS if method.startswith(prefix)]
+    return METHODS[max(prefixes, key=len)] if prefixes else None
+
+
+def bibliography(methods: list[MethodSource], *, analysis: bool = False) -> str:
+    """BibTeX for the software, the paper and the methods, each work once.
+
+    A comment before an entry names the methods that rest on it. Of methods of others there is
+    no more than the citation that they declare: it is printed as a comment and as the note of
+    a ``@misc``. With ``analysis`` the works behind statistics and signatures follow.
+    """
+    known = references()
+    reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
+    others = []
+    for method in methods:
+        keys = keys_of(method.id) if method.built_in else None
+        if keys is None:
+            others.append(_other(method))
+        for key in keys or ():
+            reasons.setdefault(key, []).append(method.id)
+    if analysis:
+        for key in ANALYSIS:
+            reasons.setdefault(key, []).append("the analysis")
+    known["coartic"] = software()
+    entries = [
+        f"% {', '.join(reason)}\n{known[key].to_bibtex()}" for key, reason in reasons.items()
+    ]
+    return "\n\n".join(entries + others) + "\n"
+
+
+def _other(method: MethodSource) -> str:
+    if not method.citation.strip():
+        return f"% {method.id}: it declares no citation; ask its authors what to cite"
+    citation = " ".join(method.citation.split())
+    key = re.sub(r"[^a-z0-9]+", "-", method.id.lower()).strip("-")
+    fields = {
+        "title": _escaped(" ".join(method.title.split()) or method.id),
+        "note": _escaped(citation),
+    }
+    entry = Reference(f"method-{key}", "misc", fields)
+    # BibTeX knows no comments: between entries it skips everything but an @.
+    comment = f"{method.id}, a method of others, cites: {citation}".replace("@", "(at)")
+    return f"% {comment}\n{entry.to_bibtex()}"
+
+
+def _escaped(text: str) -> str:
+    return "".join(_SPECIAL.get(sign, sign) for sign in text)
+
+
+def _balanced(value: str) -> bool:
+    depth = 0
+    for sign in re.sub(r"\\.", "", value):
+        depth += {"{": 1, "}": -1}.get(sign, 0)
+        if depth < 0:
+            return False
+    return depth == 0
