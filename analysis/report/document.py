@@ -73,6 +73,8 @@ class Column:
     digits: int | None = None
     """Decimals shown, of a share those of the percentage. None: integers whole, others
     with three figures."""
+    interval: str = "95 % interval"
+    """Header of the intervals, where values have them."""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -122,6 +124,11 @@ class DataTable:
             if unknown:
                 raise ValueError(f"table {self.id}, row {row.key!r}: no columns {unknown}")
             for column, value in zip(self.columns, row.values, strict=True):
+                if not isinstance(value, float | int | str | Estimate | None):
+                    raise ValueError(
+                        f"table {self.id}, row {row.key!r}: {column.name} is {value!r}, a "
+                        f"{type(value).__name__}; numbers are Python's"
+                    )
                 if value is not None and isinstance(value, str) != (column.kind == "text"):
                     raise ValueError(
                         f"table {self.id}, row {row.key!r}: {column.name} is of kind "
