@@ -152,7 +152,7 @@ def _row(
 ) -> str:
     cells = []
     for place, part in enumerate(shown):
-        text = escape(part.text(row.values[part.index]))
+        text = _words(part.text(row.values[part.index]))
         own = row.cells_by_column.get(part.column.name)
         if own and part.kind == "value":
             title = escape("; ".join(f"{task}, {label}" for task, label in own))
@@ -164,6 +164,11 @@ def _row(
     if sourced:
         cells.append(f'<td class="number">{_links(row.cells, numbers)}</td>')
     return f"<tr>{''.join(cells)}</tr>"
+
+
+def _words(text: str) -> str:
+    """Text of a cell, which may break after a slash, as in names of methods."""
+    return re.sub(r"(?<=\w)/(?=\w)", "/<wbr>", escape(text))
 
 
 def _kind(part: Part) -> str:
@@ -221,7 +226,7 @@ def inlined_svg(figure: FigureBlock) -> str:
 def _player(player: PlayerBlock) -> str:
     # Within a script element only "<" could end it.
     data = player.data.replace("<", "\\u003c")
-    return f"""<figure>
+    return f"""<figure class="plays">
 <div class="player" id="{player.id}">
 <p class="without">The movements are played by JavaScript, which is switched off here.</p>
 </div>

@@ -140,13 +140,8 @@ class Panel {
     this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
     this.svg.style.setProperty("--stroke", size / 260);
     this.svg.replaceChildren();
-    this.goals = goals.map(([x, y], k) => {
-      const circle = element("svg:circle", { class: "goal", cx: x, cy: -y, r: radius }, this.svg);
-      element("svg:text", {
-        x, y: -y - radius - size / 90, class: "number", "font-size": size / 26, text: k + 1,
-      }, this.svg);
-      return circle;
-    });
+    this.goals = goals.map(([x, y]) =>
+      element("svg:circle", { class: "goal", cx: x, cy: -y, r: radius }, this.svg));
     this.marks = {};
     hands.forEach((hand) => {
       this.marks[hand] = { trail: element("svg:polyline", { class: `trail ${hand}` }, this.svg) };
@@ -160,6 +155,9 @@ class Panel {
         : element("svg:circle", { class: "joint right", r: size / 130 }, this.svg));
     });
     this.half = size / 92;
+    goals.forEach(([x, y], k) => element("svg:text", {
+      x, y: -y - radius - size / 90, class: "number", "font-size": size / 26, text: k + 1,
+    }, this.svg));
   }
 
   show(spent) {
@@ -233,12 +231,14 @@ class Player {
     };
     step("◂", "One tick back", -1);
     step("▸", "One tick on", 1);
-    element("label", { for: `${id}-tick`, text: "Tick" }, controls);
-    this.slider = element("input", { type: "range", id: `${id}-tick`, min: 0, step: 1, value: 0 }, controls);
+    const ticks = element("span", { class: "ticks" }, controls);
+    element("label", { for: `${id}-tick`, text: "Tick" }, ticks);
+    this.slider = element("input", { type: "range", id: `${id}-tick`, min: 0, step: 1, value: 0 }, ticks);
     this.slider.addEventListener("input", () => { this.pause(); this.go(Number(this.slider.value)); });
-    this.count = element("span", { class: "count" }, controls);
-    element("label", { for: `${id}-speed`, text: "Speed" }, controls);
-    this.speed = element("select", { id: `${id}-speed` }, controls);
+    this.count = element("span", { class: "count" }, ticks);
+    const speed = element("span", {}, controls);
+    element("label", { for: `${id}-speed`, text: "Speed " }, speed);
+    this.speed = element("select", { id: `${id}-speed` }, speed);
     [15, 30, 60, 120, 240].forEach((rate) => element("option", { value: rate, text: `${rate} ticks/s` }, this.speed));
     this.speed.value = "60";
     this.status = element("p", { class: "unseen", role: "status", "aria-live": "polite" }, root);
