@@ -360,3 +360,15 @@ def test_what_is_no_report_is_not_replaced(tmp_path):
     with pytest.raises(CoarticError, match=r"is no report"):
         write_report(document(), document().figures(), tmp_path, save=save)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
+    with pytest.raises(CoarticError, match=r"is no report"):
+        write_report(document(), [], tmp_path / "thesis.tex", save=save)
+    (tmp_path / "empty").mkdir()
+    assert "report.html" in write(tmp_path / "empty")
+
+
+def test_a_kill_between_two_renames_is_overcome(tmp_path):
+    folder = tmp_path / "report"
+    before = write(folder)
+    folder.rename(tmp_path / ".report.old")
+    assert write(folder) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]

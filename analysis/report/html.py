@@ -133,7 +133,7 @@ def _table(table: DataTable, numbers: Mapping[CellKey, int]) -> str:
     heads = [f'<th scope="col"{_kind(part)}>{escape(part.header)}</th>' for part in shown]
     if sourced:
         heads.append('<th scope="col">Runs</th>')
-    rows = "\n".join(_row(table, row, shown, sourced, numbers) for row in table.rows)
+    rows = "\n".join(_row(row, shown, sourced, numbers) for row in table.rows)
     notes = "".join(f'<p class="notes">{_spans(note)}</p>\n' for note in table.notes)
     return f"""<div class="scroll" role="region" aria-labelledby="{table.id}-caption" tabindex="0">
 <table id="{table.id}">
@@ -147,9 +147,7 @@ def _table(table: DataTable, numbers: Mapping[CellKey, int]) -> str:
 {notes}"""
 
 
-def _row(
-    table: DataTable, row: Row, shown: list[Part], sourced: bool, numbers: Mapping[CellKey, int]
-) -> str:
+def _row(row: Row, shown: list[Part], sourced: bool, numbers: Mapping[CellKey, int]) -> str:
     cells = []
     for place, part in enumerate(shown):
         text = _words(part.text(row.values[part.index]))

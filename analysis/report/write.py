@@ -32,7 +32,7 @@ def write_report(
     figure of the document is not among the plots, CoarticError where the folder is not a
     report or cannot be written.
     """
-    if folder.exists() and not (folder / "report.html").is_file():
+    if not _replaceable(folder):
         raise CoarticError(
             f"{folder} is there and is no report: it has no report.html; move it away"
         )
@@ -40,7 +40,6 @@ def write_report(
     old = folder.with_name(f".{folder.name}.old")
     try:
         shutil.rmtree(part, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
         (part / "tables").mkdir(parents=True)
         (part / "figures").mkdir()
         for plot in plots:
@@ -70,15 +69,22 @@ def _texts(document: Document) -> dict[str, str]:
     return texts
 
 
+def _replaceable(folder: Path) -> bool:
+    """Whether there is nothing, an empty folder or an older report."""
+    if not folder.is_dir():
+        return not folder.exists()
+    return (folder / "report.html").is_file() or not any(folder.iterdir())
+
+
 def _replace(new: Path, folder: Path, old: Path) -> None:
     """Put a folder in another's place; the other stays where that fails."""
-    if not folder.exists():
-        new.rename(folder)
-        return
-    folder.rename(old)
+    if folder.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
     try:
         new.rename(folder)
     except OSError:
-        old.rename(folder)
+        if old.exists():
+            old.rename(folder)
         raise
     shutil.rmtree(old, ignore_errors=True)
