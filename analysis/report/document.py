@@ -1,0 +1,254 @@
+"""What a report consists of: sections of prose, tables, figures and a player.
+
+A document holds content and raw values, no presentation: :mod:`analysis.report.html`,
+``markdown`` and ``latex`` decide how it looks, and CSV files hold the raw values. Every
+number of a table names the cells (task, label) it was computed from, and the document
+knows the run ids of every cell, so each number leads to its runs.
+
+Strings of prose, items, captions and notes have minimal inline markup, read by
+:func:`analysis.report.text.inline`: ``*emphasis*``, ```code```, ``[words](address)``, and a
+backslash before ``*``, a backtick, ``[`` or ``\\`` for the character itself. Titles,
+headers and values are plain text.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+CellKey = tuple[str, str]
+"""Name of a task and label of a method with its variant, as the keys of a Study."""
+
+_ID = re.compile(r"[a-z0-9]+([.-][a-z0-9]+)*")
+
+
+@dataclass(frozen=True)
+class Prose:
+    """Paragraphs, in inline markup."""
+
+    paragraphs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """An unordered list, each item in inline markup."""
+
+    items: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its spread or interval, in the unit of its column."""
+
+    value: float
+    sd: float | None = None
+    low: float | None = None
+    """Lower end of the interval; there are both ends or none."""
+    high: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.low is None) != (self.high is None):
+            raise ValueError(f"{self}: an interval has both ends")
+
+
+Value = float | int | str | Estimate | None
+"""A table's raw value. None, like NaN, means that there is none."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table."""
+
+    name: str
+    """Of the CSV column: a Python identifier, stable."""
+    header: str
+    kind: Literal["text", "number", "share", "p"] = "text"
+    """``share``: a fraction, shown in per cent. ``p``: a p-value, shown as below the
+    last digit shown where it is."""
+    unit: str = ""
+    """Shown with the header; ``share`` needs none."""
+    digits: int | None = None
+    """Decimals shown, of a share those of the percentage. None: integers whole, others
+    with three figures."""
+    interval: str = "95 % interval"
+    """Header of the intervals, where values have them."""
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier():
+            raise ValueError(f"column name {self.name!r} is not an identifier")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table."""
+
+    key: str
+    """Names the row in its table; stable, such as the method's label."""
+    values: tuple[Value, ...]
+    """One per column."""
+    cells: tuple[CellKey, ...] = ()
+    """What the row's values were computed from."""
+    cells_by_column: Mapping[str, tuple[CellKey, ...]] = field(default_factory=dict)
+    """By column name, what a value was computed from where it is something else."""
+
+
+@dataclass(frozen=True)
+class DataTable:
+    """A table of raw values. Its first column names the rows."""
+
+    id: str
+    """Stable, such as ``methods-ascending``; the name of its files."""
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+    """Below the table, in inline markup."""
+
+    def __post_init__(self) -> None:
+        _check_id(self.id)
+        names = [column.name for column in self.columns]
+        if not names or len(set(names)) < len(names):
+            raise ValueError(f"table {self.id}: column names {names} must differ")
+        if len({row.key for row in self.rows}) < len(self.rows):
+            raise ValueError(f"table {self.id}: two rows have the same key")
+        for row in self.rows:
+            if len(row.values) != len(names):
+                raise ValueError(
+                    f"table {self.id}, row {row.key!r}: {len(row.values)} values for "
+                    f"{len(names)} columns"
+                )
+            unknown = set(row.cells_by_column) - set(names)
+            if unknown:
+                raise ValueError(f"table {self.id}, row {row.key!r}: no columns {unknown}")
+            for column, value in zip(self.columns, row.values, strict=True):
+                if not isinstance(value, float | int | str | Estimate | None):
+                    raise ValueError(
+                        f"table {self.id}, row {row.key!r}: {column.name} is {value!r}, a "
+                        f"{type(value).__name__}; numbers are Python's"
+                    )
+                if value is not None and isinstance(value, str) != (column.kind == "text"):
+                    raise ValueError(
+                        f"table {self.id}, row {row.key!r}: {column.name} is of kind "
+                        f"{column.kind}, its value is {value!r}"
+                    )
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A figure as the renderers need it."""
+
+    id: str
+    """Stable; the name of its files in ``figures/``."""
+    title: str
+    caption: str
+    """In inline markup."""
+    alt: str
+    """What the figure shows, in plain text, for who cannot see it."""
+    svg: str
+    """An SVG document."""
+
+    def __post_init__(self) -> None:
+        _check_id(self.id)
+
+
+@dataclass(frozen=True)
+class PlayerBlock:
+    """Movements to be played; only HTML has it."""
+
+    id: str
+    title: str
+    caption: str
+    """In inline markup."""
+    data: str
+    """JSON as :func:`analysis.report.player.player_json` makes it."""
+
+    def __post_init__(self) -> None:
+        _check_id(self.id)
+
+
+Block = Prose | Bullets | DataTable | FigureBlock | PlayerBlock
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section with its blocks, then its subsections."""
+
+    id: str
+    title: str
+    blocks: tuple[Block, ...] = ()
+    sections: tuple[Section, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check_id(self.id)
+
+    def walk(self) -> Iterator[Section]:
+        """This section and all below it, in order."""
+        yield self
+        for section in self.sections:
+            yield from section.walk()
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole report. Raises ValueError where ids are used twice or a cell is unknown."""
+
+    title: str
+    sections: tuple[Section, ...]
+    lead: str = ""
+    """A sentence or two below the title, in inline markup."""
+    runs: Mapping[CellKey, tuple[str, ...]] = field(default_factory=dict)
+    """Run ids of every cell that a table names."""
+
+    def __post_init__(self) -> None:
+        ids = [section.id for section in self.walk()]
+        ids += [
+            block.id
+            for block in self.blocks()
+            if isinstance(block, DataTable | FigureBlock | PlayerBlock)
+        ]
+        twice = {name for name in ids if ids.count(name) > 1}
+        if twice:
+            raise ValueError(f"ids used twice: {', '.join(sorted(twice))}")
+        for table in self.tables():
+            for row in table.rows:
+                for cells in (row.cells, *row.cells_by_column.values()):
+                    unknown = [cell for cell in cells if cell not in self.runs]
+                    if unknown:
+                        raise ValueError(
+                            f"table {table.id}, row {row.key!r}: the document has no run ids "
+                            f"of {unknown}"
+                        )
+
+    def walk(self) -> Iterator[Section]:
+        """All sections and subsections, in order."""
+        for section in self.sections:
+            yield from section.walk()
+
+    def blocks(self) -> Iterator[Block]:
+        """All blocks, in order."""
+        for section in self.walk():
+            yield from section.blocks
+
+    def tables(self) -> list[DataTable]:
+        """All tables, in order."""
+        return [block for block in self.blocks() if isinstance(block, DataTable)]
+
+    def figures(self) -> list[FigureBlock]:
+        """All figures, in order."""
+        return [block for block in self.blocks() if isinstance(block, FigureBlock)]
+
+
+def missing(value: Value) -> bool:
+    """Whether there is no value: None, NaN, or an estimate of NaN."""
+    number = value.value if isinstance(value, Estimate) else value
+    return number is None or (isinstance(number, float) and math.isnan(number))
+
+
+def _check_id(name: str) -> None:
+    if not _ID.fullmatch(name):
+        raise ValueError(f"id {name!r}: small letters and digits, joined by - or .")
+    if name == "runs":
+        raise ValueError("id 'runs' is kept for the list of runs")

@@ -1,0 +1,257 @@
+"""A document as one HTML file that needs nothing else: no network, no other files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+
+from analysis.report.document import (
+    Block,
+    Bullets,
+    CellKey,
+    DataTable,
+    Document,
+    FigureBlock,
+    PlayerBlock,
+    Prose,
+    Row,
+    Section,
+)
+from analysis.report.text import Part, inline, parts
+
+_MAGNIFIED = 1.5
+_MOST_LINKS = 4  # stretches of run lists linked from one row
+
+
+def html(document: Document) -> str:
+    """The document as a page, with its tables linked to the run ids behind them."""
+    numbers = {cell: number for number, cell in enumerate(document.runs, 1)}
+    body = "\n".join(_section(section, 2, numbers) for section in document.sections)
+    players = any(isinstance(block, PlayerBlock) for block in document.blocks())
+    styles = _resource("report.css") + (_resource("player.css") if players else "")
+    script = _resource("report.js")
+    if players:
+        script += f"(() => {{\n{_resource('player.js')}}})();\n"
+    lead = f"<p>{_spans(document.lead)}</p>\n" if document.lead else ""
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="coartic">
+<title>{escape(document.title)}</title>
+<link rel="icon" href="data:,">
+<style>
+{styles}</style>
+</head>
+<body>
+<a class="skip" href="#content">To the content</a>
+<header>
+<div>
+<h1>{escape(document.title)}</h1>
+{lead}</div>
+<button type="button" id="theme" hidden>Dark colours</button>
+</header>
+<div class="columns">
+<nav id="contents" aria-label="Contents">
+<details open>
+<summary>Contents</summary>
+{_contents(document)}
+</details>
+</nav>
+<main id="content" tabindex="-1">
+{body}
+{_runs(document, numbers)}</main>
+</div>
+<script>
+{script}</script>
+</body>
+</html>
+"""
+
+
+def _resource(name: str) -> str:
+    return (files("analysis.report") / name).read_text(encoding="utf-8")
+
+
+def _contents(document: Document) -> str:
+    def items(sections: tuple[Section, ...]) -> str:
+        return "".join(
+            f'<li><a href="#{section.id}">{escape(section.title)}</a>'
+            + (f"<ol>{items(section.sections)}</ol>" if section.sections else "")
+            + "</li>\n"
+            for section in sections
+        )
+
+    runs = '<li><a href="#runs">Runs behind the tables</a></li>\n' if document.runs else ""
+    return f"<ol>\n{items(document.sections)}{runs}</ol>"
+
+
+def _section(section: Section, level: int, numbers: Mapping[CellKey, int]) -> str:
+    heading = min(level, 6)
+    return "\n".join(
+        [
+            f'<section aria-labelledby="{section.id}">',
+            f'<h{heading} id="{section.id}">{escape(section.title)}</h{heading}>',
+            *(_block(block, numbers) for block in section.blocks),
+            *(_section(below, level + 1, numbers) for below in section.sections),
+            "</section>",
+        ]
+    )
+
+
+def _block(block: Block, numbers: Mapping[CellKey, int]) -> str:
+    match block:
+        case Prose():
+            return "\n".join(f"<p>{_spans(text)}</p>" for text in block.paragraphs)
+        case Bullets():
+            items = "\n".join(f"<li>{_spans(item)}</li>" for item in block.items)
+            return f"<ul>\n{items}\n</ul>"
+        case DataTable():
+            return _table(block, numbers)
+        case FigureBlock():
+            return _figure(block)
+        case PlayerBlock():
+            return _player(block)
+
+
+def _spans(text: str) -> str:
+    def mark(style: str, words: str, address: str) -> str:
+        if style == "link":
+            return f'<a href="{escape(address)}">{escape(words)}</a>'
+        tag = {"emphasis": "em", "code": "code"}.get(style)
+        return f"<{tag}>{escape(words)}</{tag}>" if tag else escape(words)
+
+    return "".join(mark(span.style, span.text, span.address) for span in inline(text))
+
+
+def _table(table: DataTable, numbers: Mapping[CellKey, int]) -> str:
+    shown = parts(table)
+    sourced = any(row.cells for row in table.rows)
+    heads = [f'<th scope="col"{_kind(part)}>{escape(part.header)}</th>' for part in shown]
+    if sourced:
+        heads.append('<th scope="col">Runs</th>')
+    rows = "\n".join(_row(row, shown, sourced, numbers) for row in table.rows)
+    notes = "".join(f'<p class="notes">{_spans(note)}</p>\n' for note in table.notes)
+    return f"""<div class="scroll" role="region" aria-labelledby="{table.id}-caption" tabindex="0">
+<table id="{table.id}">
+<caption><span id="{table.id}-caption">{_spans(table.caption)}</span></caption>
+<thead><tr>{"".join(heads)}</tr></thead>
+<tbody>
+{rows}
+</tbody>
+</table>
+</div>
+{notes}"""
+
+
+def _row(row: Row, shown: list[Part], sourced: bool, numbers: Mapping[CellKey, int]) -> str:
+    cells = []
+    for place, part in enumerate(shown):
+        text = _words(part.text(row.values[part.index]))
+        own = row.cells_by_column.get(part.column.name)
+        if own and part.kind == "value":
+            title = escape("; ".join(f"{task}, {label}" for task, label in own))
+            text = f'<a href="#runs-{numbers[own[0]]}" title="Runs: {title}">{text}</a>'
+        if place == 0:
+            cells.append(f'<th scope="row">{text}</th>')
+        else:
+            cells.append(f"<td{_kind(part)}>{text}</td>")
+    if sourced:
+        cells.append(f'<td class="number">{_links(row.cells, numbers)}</td>')
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _words(text: str) -> str:
+    """Text of a cell, which may break after a slash, as in names of methods."""
+    return re.sub(r"(?<=\w)/(?=\w)", "/<wbr>", escape(text))
+
+
+def _kind(part: Part) -> str:
+    return ' class="text"' if part.column.kind == "text" else ' class="number"'
+
+
+def _links(cells: tuple[CellKey, ...], numbers: Mapping[CellKey, int]) -> str:
+    """Links to lists of runs; neighbouring lists are drawn together."""
+    stretches: list[list[int]] = []
+    for number in sorted({numbers[cell] for cell in cells}):
+        if stretches and stretches[-1][1] == number - 1:
+            stretches[-1][1] = number
+        else:
+            stretches.append([number, number])
+    links = [
+        f'<a href="#runs-{first}" aria-label="runs, list {first}'
+        f'{f" to {last}" if last > first else ""}">'
+        f"{first}{f'–{last}' if last > first else ''}</a>"
+        for first, last in stretches[:_MOST_LINKS]
+    ]
+    if len(stretches) > _MOST_LINKS:
+        links.append("…")
+    return ", ".join(links)
+
+
+def _figure(figure: FigureBlock) -> str:
+    # What is not drawn in the page's ink needs a white ground in the dark as well.
+    ground = "" if "currentColor" in figure.svg else ' class="paper"'
+    return f"""<figure id="{figure.id}">
+<div{ground}>{inlined_svg(figure)}</div>
+<figcaption><strong>{escape(figure.title)}.</strong> {_spans(figure.caption)}</figcaption>
+</figure>"""
+
+
+def inlined_svg(figure: FigureBlock) -> str:
+    """A figure's SVG for use inside HTML: named for who cannot see it, its ids its own.
+
+    Prologue and metadata go, and ids get the figure's id before them, since those of
+    several SVGs would meet in one page. It is shown up to half as large again as on paper.
+    Raises ValueError where there is no SVG with a ``viewBox``.
+    """
+    root = re.search(r"<svg\b([^>]*)>", figure.svg)
+    size = root and re.search(r'viewBox="\s*\S+\s+\S+\s+([\d.]+)', root[1])
+    if not root or not size:
+        raise ValueError(f"figure {figure.id}: its svg holds no <svg> element with a viewBox")
+    attributes = re.sub(r'\s(role|aria-label|width|height|style)="[^"]*"', "", root[1])
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", figure.svg[root.end() :], flags=re.S)
+    body = re.sub(r'(\sid="|href="#|url\(#)', rf"\g<1>{figure.id}--", body)
+    return (
+        f'<svg{attributes} role="img" aria-label="{escape(figure.alt)}" '
+        f'style="max-width: {_MAGNIFIED * float(size[1]):.0f}pt">{body.strip()}'
+    )
+
+
+def _player(player: PlayerBlock) -> str:
+    # Within a script element only "<" could end it.
+    data = player.data.replace("<", "\\u003c")
+    return f"""<figure class="plays">
+<div class="player" id="{player.id}">
+<p class="without">The movements are played by JavaScript, which is switched off here.</p>
+</div>
+<script type="application/json" id="{player.id}-data">{data}</script>
+<figcaption><strong>{escape(player.title)}.</strong> {_spans(player.caption)}</figcaption>
+</figure>"""
+
+
+def _runs(document: Document, numbers: Mapping[CellKey, int]) -> str:
+    if not document.runs:
+        return ""
+    lists = "\n".join(
+        _run_list(number, cell, document.runs[cell]) for cell, number in numbers.items()
+    )
+    return f"""<section class="runs" aria-labelledby="runs">
+<h2 id="runs">Runs behind the tables</h2>
+<p>The tables' last columns name these lists. <code>coartic show RUN_ID</code> prints everything
+about a run, <code>coartic reproduce RUN_ID</code> performs it again.</p>
+{lists}
+</section>
+"""
+
+
+def _run_list(number: int, cell: CellKey, runs: tuple[str, ...]) -> str:
+    count = f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
+    ids = " ".join(f"<code>{escape(run)}</code>" for run in runs)
+    return (
+        f'<details id="runs-{number}"><summary>{number}. {escape(", ".join(cell))}: {count}'
+        f"</summary><p>{ids}</p></details>"
+    )

@@ -1,0 +1,319 @@
+"use strict";
+/* Plays movements tick by tick. Data: analysis/report/player.py. */
+
+/* ---- Movements: decoding, interpolation, kinematics ---- */
+
+function decode(movement, unit, dof) {
+  const rows = [];
+  const frames = [];
+  let row = 0;
+  let frame = new Array(dof).fill(0);
+  movement.rows.forEach((step, k) => {
+    row += step;
+    frame = frame.map((value, joint) => value + movement.frames[k * dof + joint]);
+    rows.push(row);
+    frames.push(frame.map((value) => value * unit));
+  });
+  return { ...movement, rows, frames };
+}
+
+function configuration(movement, row) {
+  const { rows, frames } = movement;
+  let k = 1;
+  while (k < rows.length - 1 && rows[k] < row) k += 1;
+  if (rows.length === 1 || row <= rows[0]) return frames[0];
+  const share = Math.min(1, (row - rows[k - 1]) / (rows[k] - rows[k - 1]));
+  return frames[k].map((end, joint) => frames[k - 1][joint] + share * (end - frames[k - 1][joint]));
+}
+
+/* Shoulder, joints and hand; `first` is the index of the arm's first joint. */
+function chain(q, arm, first) {
+  let x = q[0] + arm.shoulder[0];
+  let y = q[1] + arm.shoulder[1];
+  let angle = 0;
+  const points = [[x, y]];
+  arm.links.forEach((length, k) => {
+    angle += q[first + k];
+    x += length * Math.cos(angle);
+    y += length * Math.sin(angle);
+    points.push([x, y]);
+  });
+  return points;
+}
+
+function arms(robot, q) {
+  return {
+    left: chain(q, robot.left, 2),
+    right: chain(q, robot.right, 2 + robot.left.links.length),
+  };
+}
+
+/* After `spent` ticks: the row shown, reward so far, goals hit, hand at work. */
+function moment(movement, spent) {
+  const ticks = Math.min(spent, movement.ticks);
+  const row = Math.max(ticks - 1, 0);
+  const hit = movement.hits.filter((at) => at < ticks).length;
+  const hand = { L: "left", R: "right" }[movement.hands[hit]];
+  return { ticks, row, hit, hand };
+}
+
+function degrees(robot) {
+  return 2 + robot.left.links.length + robot.right.links.length;
+}
+
+/* ---- Drawing ---- */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function element(name, attributes, parent) {
+  const made = name.startsWith("svg:")
+    ? document.createElementNS(SVG, name.slice(4))
+    : document.createElement(name);
+  Object.entries(attributes || {}).forEach(([key, value]) => {
+    if (key === "text") made.textContent = value;
+    else made.setAttribute(key, value);
+  });
+  if (parent) parent.appendChild(made);
+  return made;
+}
+
+function polyline(points) {
+  return points.map(([x, y]) => `${x.toFixed(3)},${(-y).toFixed(3)}`).join(" ");
+}
+
+/* One side: a choice of movement, its picture and what is to be said of it. */
+class Panel {
+  constructor(parent, id, side, changed) {
+    this.side = side;
+    const root = element("div", { class: "panel" }, parent);
+    element("label", { for: `${id}-${side}`, text: `${side === "left" ? "Left" : "Right"} picture` }, root);
+    this.select = element("select", { id: `${id}-${side}` }, root);
+    this.select.addEventListener("change", changed);
+    this.svg = element("svg:svg", { role: "img" }, root);
+    this.facts = element("p", { class: "facts" }, root);
+    this.run = element("p", { class: "run" }, root);
+  }
+
+  offer(task, wanted) {
+    this.select.replaceChildren();
+    const add = (parent, value, text) => element("option", { value, text }, parent);
+    const group = element("optgroup", { label: "Initial: corrective process alone" }, this.select);
+    task.initials.forEach((initial, k) => add(group, `i${k}`, `initial ${initial.hands} (−${initial.ticks})`));
+    if (!task.initials.length) group.remove();
+    const methods = element("optgroup", { label: "Methods" }, this.select);
+    task.movements.forEach((movement, k) => add(methods, `m${k}`, `${movement.label} (−${movement.ticks})`));
+    const same = task.movements.findIndex((movement) => movement.label === wanted);
+    if (same >= 0) this.select.value = `m${same}`;
+    else if (this.side === "left" && task.initials.length) this.select.value = "i0";
+    else this.select.value = "m0";
+  }
+
+  get label() {
+    return this.movement && this.movement.label;
+  }
+
+  load(task) {
+    const list = this.select.value[0] === "i" ? task.initials : task.movements;
+    const dof = degrees(task.robot);
+    this.task = task;
+    this.movement = decode(list[Number(this.select.value.slice(1))], task.unit, dof);
+    this.trails = Object.fromEntries(task.hands.map((hand) => [hand, []]));
+    for (let row = 0; row < this.movement.ticks; row += 1) {
+      const points = arms(task.robot, configuration(this.movement, row));
+      task.hands.forEach((hand) => this.trails[hand].push(points[hand].at(-1)));
+    }
+    this.draw();
+    const { label, run, runs, hands, ticks } = this.movement;
+    this.svg.setAttribute("aria-label",
+      `Robot on ${task.label}: ${label || "initial movement"}, hands ${hands}, reward −${ticks}`);
+    this.run.textContent = "";
+    if (run) {
+      this.run.append(runs > 1 ? `nearest the median of ${runs} runs: ` : "run ");
+      element("code", { text: run }, this.run);
+    } else this.run.append("corrective process alone, no learning");
+  }
+
+  draw() {
+    const { box, goals, radius, hands } = this.task;
+    const [left, bottom, right, top] = box;
+    const size = Math.max(right - left, top - bottom);
+    this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
+    this.svg.style.setProperty("--stroke", size / 260);
+    this.svg.replaceChildren();
+    this.goals = goals.map(([x, y]) =>
+      element("svg:circle", { class: "goal", cx: x, cy: -y, r: radius }, this.svg));
+    this.marks = {};
+    hands.forEach((hand) => {
+      this.marks[hand] = { trail: element("svg:polyline", { class: `trail ${hand}` }, this.svg) };
+    });
+    this.base = element("svg:rect", { class: "base" }, this.svg);
+    hands.forEach((hand) => {
+      const joints = this.task.robot[hand].links.length + 1;
+      this.marks[hand].arm = element("svg:polyline", { class: `arm ${hand}` }, this.svg);
+      this.marks[hand].joints = Array.from({ length: joints }, () => hand === "left"
+        ? element("svg:rect", { class: "joint left", width: size / 46, height: size / 46 }, this.svg)
+        : element("svg:circle", { class: "joint right", r: size / 130 }, this.svg));
+    });
+    this.half = size / 92;
+    goals.forEach(([x, y], k) => element("svg:text", {
+      x, y: -y - radius - size / 90, class: "number", "font-size": size / 26, text: k + 1,
+    }, this.svg));
+  }
+
+  show(spent) {
+    const { robot, goals, hands } = this.task;
+    const now = moment(this.movement, spent);
+    const q = configuration(this.movement, now.row);
+    const points = arms(robot, q);
+    const [width, height] = robot.base;
+    const place = { x: q[0] - width / 2, y: -q[1] - height / 2, width, height };
+    Object.entries(place).forEach(([key, value]) => this.base.setAttribute(key, value));
+    hands.forEach((hand) => {
+      const { trail, arm, joints } = this.marks[hand];
+      trail.setAttribute("points", polyline(this.trails[hand].slice(0, now.row + 1)));
+      arm.setAttribute("points", polyline(points[hand]));
+      arm.classList.toggle("chosen", now.hand === hand);
+      points[hand].forEach(([x, y], k) => {
+        if (hand === "left") {
+          joints[k].setAttribute("x", x - this.half);
+          joints[k].setAttribute("y", -y - this.half);
+        } else {
+          joints[k].setAttribute("cx", x);
+          joints[k].setAttribute("cy", -y);
+        }
+      });
+    });
+    this.goals.forEach((goal, k) => {
+      goal.classList.toggle("hit", k < now.hit);
+      goal.classList.toggle("current", k === now.hit);
+    });
+    this.words = now.hit < goals.length
+      ? `reward ${reward(now.ticks)}, goal ${now.hit + 1} with the ${now.hand} hand`
+      : `reward ${reward(now.ticks)}, all goals hit`;
+    this.facts.replaceChildren();
+    const [figure, ...rest] = this.words.split(", ");
+    element("strong", { text: figure }, this.facts);
+    this.facts.append(`, ${rest.join(", ")}`);
+  }
+}
+
+function reward(ticks) {
+  return ticks ? `−${ticks}` : "0";
+}
+
+/* ---- The player ---- */
+
+class Player {
+  constructor(root, data) {
+    this.data = data;
+    this.spent = 0;
+    this.playing = false;
+    this.calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+    this.build(root, root.id);
+    this.choose();
+  }
+
+  build(root, id) {
+    const first = element("div", { class: "controls" }, root);
+    element("label", { for: `${id}-task`, text: "Task" }, first);
+    this.task = element("select", { id: `${id}-task` }, first);
+    this.data.tasks.forEach((task, k) => element("option", { value: k, text: task.label }, this.task));
+    this.task.addEventListener("change", () => this.choose());
+    const both = element("div", { class: "panels" }, root);
+    const load = () => this.load();
+    this.panels = ["left", "right"].map((side) => new Panel(both, id, side, load));
+    const controls = element("div", { class: "controls" }, root);
+    this.button = element("button", { type: "button", class: "play", text: "Play" }, controls);
+    this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
+    const step = (text, label, by) => {
+      const made = element("button", { type: "button", "aria-label": label, text }, controls);
+      made.addEventListener("click", () => { this.pause(); this.go(this.spent + by); });
+    };
+    step("◂", "One tick back", -1);
+    step("▸", "One tick on", 1);
+    const ticks = element("span", { class: "ticks" }, controls);
+    element("label", { for: `${id}-tick`, text: "Tick" }, ticks);
+    this.slider = element("input", { type: "range", id: `${id}-tick`, min: 0, step: 1, value: 0 }, ticks);
+    this.slider.addEventListener("input", () => { this.pause(); this.go(Number(this.slider.value)); });
+    this.count = element("span", { class: "count" }, ticks);
+    const speed = element("span", {}, controls);
+    element("label", { for: `${id}-speed`, text: "Speed " }, speed);
+    this.speed = element("select", { id: `${id}-speed` }, speed);
+    [15, 30, 60, 120, 240].forEach((rate) => element("option", { value: rate, text: `${rate} ticks/s` }, this.speed));
+    this.speed.value = "60";
+    this.status = element("p", { class: "unseen", role: "status", "aria-live": "polite" }, root);
+  }
+
+  choose() {
+    const task = this.data.tasks[Number(this.task.value)];
+    this.panels.forEach((panel) => panel.offer(task, panel.label));
+    this.load();
+  }
+
+  load() {
+    const task = this.data.tasks[Number(this.task.value)];
+    this.pause();
+    this.panels.forEach((panel) => panel.load(task));
+    this.last = Math.max(...this.panels.map((panel) => panel.movement.ticks));
+    this.slider.max = this.last;
+    this.go(0);
+  }
+
+  /* The state is spoken only while nothing moves. */
+  go(spent) {
+    this.spent = Math.max(0, Math.min(this.last, spent));
+    this.panels.forEach((panel) => panel.show(this.spent));
+    this.slider.value = this.spent;
+    this.count.textContent = `${this.spent} of ${this.last}`;
+    this.slider.setAttribute("aria-valuetext", `tick ${this.spent} of ${this.last}`);
+    if (!this.playing) {
+      this.status.textContent = this.panels.map((panel) => `${panel.side}: ${panel.words}`).join("; ");
+    }
+  }
+
+  play() {
+    if (this.spent >= this.last) this.go(0);
+    this.playing = true;
+    this.button.textContent = "Pause";
+    this.status.textContent = "";
+    const from = this.spent;
+    let start = null;
+    let drawn = -Infinity;
+    const rate = () => Number(this.speed.value);
+    let pace = rate();
+    let base = from;
+    const frame = (time) => {
+      if (!this.playing) return;
+      if (start === null || pace !== rate()) {
+        base = this.spent;
+        pace = rate();
+        start = time;
+      }
+      // Where less motion is asked for, the picture changes twice a second.
+      if (!this.calm.matches || time - drawn >= 500) {
+        drawn = time;
+        this.go(Math.floor(base + ((time - start) / 1000) * pace));
+      }
+      if (this.spent >= this.last) this.pause();
+      else window.requestAnimationFrame(frame);
+    };
+    window.requestAnimationFrame(frame);
+  }
+
+  pause() {
+    const moved = this.playing;
+    this.playing = false;
+    this.button.textContent = "Play";
+    if (moved) this.go(this.spent);
+  }
+}
+
+if (typeof module !== "undefined") {
+  module.exports = { decode, configuration, chain, arms, moment, degrees };
+} else {
+  document.querySelectorAll(".player").forEach((root) => {
+    const data = document.getElementById(`${root.id}-data`);
+    root.querySelectorAll(".without").forEach((note) => note.remove());
+    new Player(root, JSON.parse(data.textContent));
+  });
+}

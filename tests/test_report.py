@@ -1,0 +1,374 @@
+"""The report: what its renderers make of a document, checked by other readers."""
+
+import csv
+import io
+import itertools
+import math
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from analysis.report.document import (
+    Bullets,
+    Column,
+    DataTable,
+    Document,
+    Estimate,
+    FigureBlock,
+    PlayerBlock,
+    Prose,
+    Row,
+    Section,
+)
+from analysis.report.html import html
+from analysis.report.latex import latex_tables, latex_text
+from analysis.report.markdown import markdown
+from analysis.report.tables_csv import runs_csv, table_csv
+from analysis.report.text import Span, inline, number_text, parts, typographic
+from analysis.report.write import write_report
+from coartic import CoarticError
+
+LEARNER, OPTIMUM = ("shelf", "dual-process/EC4 noise_sd=0.1"), ("shelf", "optimum/multistart")
+NASTY = 'a_b & <i>50 %</i> #1 {x} ~ ^ $ \\ "q" -- − – — ± † ΔV ε ≤ [z] *s* `c` | 10⁻³ é 漢'
+SVG = (
+    '<?xml version="1.0"?>\n<svg xmlns="http://www.w3.org/2000/svg" width="9pt" '
+    'viewBox="0 0 90 45"><metadata>http://example.org</metadata><defs><path id="p" d="M0 0L9 9"/>'
+    '</defs><use href="#p" fill="url(#p)"/></svg>'
+)
+TABLE = DataTable(
+    "methods-shelf",
+    "Methods on *shelf*: 100 % of `all_methods`",
+    (
+        Column("method", "method"),
+        Column("reward", "reward", "number", "ticks", digits=1),
+        Column("gap", "ΔV", "share", digits=1),
+        Column("count", "runs & more", "number"),
+        Column("p", "p", "p", digits=3),
+        Column("remark", "remark"),
+    ),
+    (
+        Row(
+            "learner",
+            ("dual-process/EC4", Estimate(-483.25, 5.0, -490.06, -477.0), 0.0385, 20, 1e-6, NASTY),
+            (LEARNER,),
+            {"gap": (LEARNER, OPTIMUM)},
+        ),
+        Row("optimum", ("[optimum]", Estimate(-465.0), 0.0, 1234567, None, None), (OPTIMUM,)),
+        Row("none", ("*none*", None, math.nan, 2.5e-7, 0.25, ""), ()),
+    ),
+    ("A note with 5 % & *stress*.",),
+)
+
+
+def document():
+    figures = [FigureBlock(f"line-{k}", "A line", "It rises.", NASTY, SVG) for k in (1, 2)]
+    player = PlayerBlock("player", "Movements", "Played.", '{"label":"</script><b>"}')
+    return Document(
+        NASTY,
+        (
+            Section("summary", "Summary", (Prose((NASTY,)), Bullets(("*one*", "`two`")))),
+            Section(
+                "all", "All & more", (*figures, player), (Section("below", "Below", (TABLE,)),)
+            ),
+        ),
+        lead="A lead.",
+        runs={LEARNER: ("aa-1", "aa-2"), OPTIMUM: ("bb-1",)},
+    )
+
+
+def test_documents_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="ids used twice: a"):
+        Document("t", (Section("a", "A"), Section("b", "B", sections=(Section("a", "C"),))))
+    with pytest.raises(ValueError, match="no run ids"):
+        Document("t", (Section("a", "A", (TABLE,)),), runs={LEARNER: ("aa-1",)})
+    with pytest.raises(ValueError, match="5 values for 6 columns"):
+        replace(TABLE, rows=(replace(TABLE.rows[0], values=TABLE.rows[0].values[:5]),))
+    with pytest.raises(ValueError, match="same key"):
+        replace(TABLE, rows=(TABLE.rows[0], TABLE.rows[0]))
+    with pytest.raises(ValueError, match="kind text, its value is 3"):
+        DataTable("t", "", (Column("a", "a"),), (Row("r", (3,)),))
+    with pytest.raises(ValueError, match="int64; numbers are Python's"):
+        DataTable("t", "", (Column("a", "a", "number"),), (Row("r", (np.int64(3),)),))
+    for name in ("With Space", "runs", "", "a/b", "../up"):
+        with pytest.raises(ValueError, match="id "):
+            Section(name, "A")
+    with pytest.raises(ValueError, match="both ends"):
+        Estimate(1.0, low=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "spans"),
+    [
+        ("plain", [Span("text", "plain")]),
+        ("a *b c* d", [Span("text", "a "), Span("emphasis", "b c"), Span("text", " d")]),
+        ("`x*y*z`", [Span("code", "x*y*z")]),
+        ("[w](#a)[1]", [Span("link", "w", "#a"), Span("text", "[1]")]),
+        (r"\*a\* \[b](c)", [Span("text", "*a* [b](c)")]),
+        ("2 * 3 * 4", [Span("text", "2 * 3 * 4")]),
+        ("", []),
+    ],
+)
+def test_inline_markup(text, spans):
+    assert inline(text) == spans
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "digits", "ascii_text", "shown"),
+    [
+        (-483.25, "number", 1, "-483.2", "−483.2"),
+        (-0.04, "number", 1, "0.0", "0.0"),
+        (1234567, "number", None, "1234567", "1\u202f234\u202f567"),
+        (9999.6, "number", None, "10000", "10\u202f000"),
+        (0.99951, "number", None, "1.00", "1.00"),
+        (0.0123, "number", None, "0.0123", "0.0123"),
+        (-2.5e-7, "number", None, "-2.5e-7", "−2.5 × 10⁻⁷"),
+        (0.0, "number", None, "0", "0"),
+        (0.0385, "share", 1, "3.9", "3.9"),
+        (0.0004, "p", 3, "<0.001", "<0.001"),
+        (0.0006, "p", 3, "0.001", "0.001"),
+        (-math.inf, "number", 1, "-inf", "−∞"),
+    ],
+)
+def test_numbers(value, kind, digits, ascii_text, shown):
+    found = number_text(value, Column("a", "a", kind, digits=digits))
+    assert found == ascii_text
+    assert typographic(found) == shown
+
+
+class Page(HTMLParser):
+    """A strict reader of the page: elements must nest, and nothing may be asked for."""
+
+    EMPTY = frozenset(("meta", "link", "wbr", "path", "use"))
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.elements, self.texts = [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        assert len(dict(attributes)) == len(attributes), "an attribute given twice"
+        self.elements.append((tag, dict(attributes)))
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        if tag not in self.EMPTY:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append((self.open[-1] if self.open else "", data))
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+def test_html_is_one_accessible_page():
+    page = Page(html(document()))
+    ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    for tag, attributes in page.elements:
+        address = attributes.get("href") or attributes.get("src") or "#content"
+        assert address.startswith("#") or address == "data:,", f"{tag} asks for {address}"
+        if address.startswith("#"):
+            assert address[1:] in ids
+        for name in ("aria-labelledby", "for"):
+            assert attributes.get(name, "content") in ids
+    assert page.all("html") == [{"lang": "en"}]
+    levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+    assert all("scope" in attributes for attributes in page.all("th"))
+    assert [svg["aria-label"] for svg in page.all("svg")] == [NASTY, NASTY]
+    assert all(svg["role"] == "img" for svg in page.all("svg"))
+    assert {"header", "nav", "main", "caption"} <= {tag for tag, _ in page.elements}
+    words = "".join(text for _, text in page.texts)
+    assert "http" not in re.sub(r"http://www\.w3\.org/2000/svg", "", words)
+    assert words.count("<i>50 %</i>") >= 3  # title, prose and table: as text
+    assert not page.all("i")
+
+
+def test_html_numbers_lead_to_their_runs():
+    text = html(document())
+    page = Page(text)
+    links = [a["href"] for a in page.all("a") if a["href"].startswith("#runs-")]
+    # The gap's own cells first, then the rows' lists.
+    assert links == ["#runs-1", "#runs-1", "#runs-2"]
+    for number, runs in ((1, ("aa-1", "aa-2")), (2, ("bb-1",))):
+        listed = re.search(rf'<details id="runs-{number}">.*?</details>', text, re.S)
+        assert re.findall("<code>(.*?)</code>", listed[0]) == list(runs)
+
+
+def test_svgs_of_one_page_keep_their_own_ids():
+    text = html(document())
+    for name in ("line-1", "line-2"):
+        assert f'<path id="{name}--p"' in text
+        assert f'href="#{name}--p" fill="url(#{name}--p)"' in text
+    with pytest.raises(ValueError, match="no <svg> element"):
+        html(Document("t", (Section("a", "A", (FigureBlock("f", "", "", "", "<png>"),)),)))
+
+
+def test_no_data_ends_the_player_early():
+    text = html(document())
+    data = re.search(r'id="player-data">(.*?)</script>', text)[1]
+    assert data == '{"label":"\\u003c/script>\\u003cb>"}'
+
+
+def test_markdown():
+    text = markdown(document())
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    bars = [len(re.findall(r"(?<!\\)\|", row)) for row in rows]
+    assert bars == [len(parts(TABLE)) + 1] * 5
+    assert rows[1].count("---:") == 6  # reward, SD, interval, share, runs, p
+    assert "−483.2 | 5.0 | \\[−490.1, −477.0\\] | 3.9" in rows[2]
+    assert "](figures/line-1.svg)" in text
+    assert [line for line in text.splitlines() if line.startswith("#")][1:] == [
+        "## Summary",
+        "## All & more",
+        "### Below",
+    ]
+
+
+def test_csv_reads_back_as_the_raw_values():
+    rows = list(csv.DictReader(io.StringIO(table_csv(TABLE))))
+    assert (
+        list(rows[0])
+        == (
+            "key method reward reward_sd reward_low reward_high gap count p remark cells gap_cells"
+        ).split()
+    )
+    assert [float(rows[0][name]) for name in ("reward", "reward_sd", "reward_low", "gap")] == [
+        -483.25, 5.0, -490.06, 0.0385,
+    ]  # fmt: skip
+    assert rows[0]["remark"] == NASTY
+    assert rows[0]["cells"] == " ".join(LEARNER)
+    assert rows[0]["gap_cells"] == f"{' '.join(LEARNER)} | {' '.join(OPTIMUM)}"
+    assert rows[1]["count"] == "1234567"
+    assert rows[1]["reward_sd"] == rows[2]["reward"] == rows[2]["gap"] == ""
+    assert list(csv.reader(io.StringIO(runs_csv(document())))) == [
+        ["task", "label", "run_id"],
+        [*LEARNER, "aa-1"],
+        [*LEARNER, "aa-2"],
+        [*OPTIMUM, "bb-1"],
+    ]
+
+
+def test_latex_escapes():
+    assert latex_text("a_b & 5 % #1 {x} $") == r"a\_b \& 5 \% \#1 \{x\} \$"
+    assert latex_text("−1 ± 2 ΔV †") == r"$-$1 $\pm$ 2 $\Delta$V \textdagger{}"
+    assert latex_text("--- [*") == "-{}-{}- {[}{*}"
+    assert latex_text("λΛ漢") == r"$\lambda$$\Lambda$[U+6F22]"
+
+
+def test_latex_columns_are_as_wide_as_their_numbers():
+    text = latex_tables(document())["methods-shelf"]
+    assert (
+        r"\begin{tabular}{lS[table-format=-3.1]S[table-format=1.1]rS[table-format=1.1]"
+        r"S[table-format=7.0]S[table-format=1.3]l}"
+    ) in text
+    assert r"-483.2 & 5.0 & {[\num{-490.1}, \num{-477.0}]} & 3.9 & 20" in text
+
+
+def save(figure, folder):
+    (folder / f"{figure.id}.svg").write_text(figure.svg, encoding="utf-8")
+
+
+def write(folder, shown=None):
+    shown = shown or document()
+    write_report(shown, shown.figures(), folder, save=save)
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_latex_compiles(tmp_path):
+    if not shutil.which("pdflatex"):
+        pytest.skip("pdflatex is not installed")
+    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty"]
+    if subprocess.run(styles, capture_output=True, check=False).returncode:
+        pytest.skip("booktabs and siunitx are not installed")
+    write(tmp_path / "report")
+    (tmp_path / "report" / "paper.tex").write_text(
+        r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}"
+        r"\usepackage{booktabs,siunitx}\begin{document}\input{tables.tex}\end{document}",
+        encoding="utf-8",
+    )
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+    done = subprocess.run(
+        command, cwd=tmp_path / "report", capture_output=True, check=False, timeout=120
+    )
+    log = done.stdout.decode(errors="replace")
+    assert done.returncode == 0, log[-2000:]
+    assert "1 page" in log
+    assert "Missing character" not in log
+
+
+def test_the_folder_is_the_same_for_the_same_document(tmp_path):
+    first, second = write(tmp_path / "a"), write(tmp_path / "b")
+    assert first == second
+    assert sorted(first) == [
+        "figures/line-1.svg",
+        "figures/line-2.svg",
+        "report.html",
+        "report.md",
+        "tables.tex",
+        "tables/methods-shelf.csv",
+        "tables/methods-shelf.tex",
+        "tables/runs.csv",
+    ]
+    for link in re.findall(r"\]\(((?:figures|tables|report)[^)#]*)", first["report.md"].decode()):
+        assert link in first
+
+
+def test_a_report_replaces_the_one_before(tmp_path):
+    folder = tmp_path / "report"
+    write(folder)
+    (folder / "tables" / "gone.csv").write_text("of a table that is no more")
+    written = write(folder, Document("Later", (Section("a", "A"),)))
+    assert set(written) == {"report.html", "report.md", "tables.tex", "tables/runs.csv"}
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_a_report_that_fails_leaves_the_one_before(tmp_path):
+    folder = tmp_path / "report"
+    before = write(folder)
+    with pytest.raises(ValueError, match="figures without a plot: line-2"):
+        write_report(document(), document().figures()[:1], folder, save=save)
+
+    def full(figure, folder):
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(CoarticError, match="No space left on device"):
+        write_report(document(), document().figures(), folder, save=full)
+    after = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*.*")}
+    assert after == before
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_what_is_no_report_is_not_replaced(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(CoarticError, match=r"is no report"):
+        write_report(document(), document().figures(), tmp_path, save=save)
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+    with pytest.raises(CoarticError, match=r"is no report"):
+        write_report(document(), [], tmp_path / "thesis.tex", save=save)
+    (tmp_path / "empty").mkdir()
+    assert "report.html" in write(tmp_path / "empty")
+
+
+def test_a_kill_between_two_renames_is_overcome(tmp_path):
+    folder = tmp_path / "report"
+    before = write(folder)
+    folder.rename(tmp_path / ".report.old")
+    assert write(folder) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
