@@ -93,14 +93,16 @@ def _plot(
         axes.set_axis_off()
     positive = data.budget[data.budget > 0]
     left = 10 ** math.floor(math.log10(positive.min())) if len(positive) else 1.0
+    edge = left if (data.budget > 0).all() else 0.6 * left
     for place, (axes, task) in enumerate(zip(panels, tasks.values(), strict=False)):
         optimum = study.optima.get((task.name, "free"))
         _panel(
-            axes, data[data.task == task.name], present, left, optimum.reward if optimum else None
+            axes, data[data.task == task.name], present, edge, optimum.reward if optimum else None
         )
         axes.set_title(heading(task))
         axes.set_ylabel("" if place % columns else "best reward so far")
         axes.set_xlabel(NAMES[spend] if place + columns >= len(tasks) else "")
+    panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
     letters(panels[: len(tasks)])
     _legend(figure, data, present)
     ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
@@ -111,9 +113,9 @@ def _plot(
         caption=(
             f"Best reward so far against {NAMES[spend]}: mean over runs with its "
             f"{CONFIDENCE:.0%} bootstrap interval, pointwise, from where every run has "
-            "a solution. Single marks: methods that do not learn by trial, at the median spend of a whole "
-            "run, at the left edge where they spend nothing. Ringed: on the Pareto front of mean "
-            "reward and spend of all methods of the folder, shown here or not. Dotted: optimum "
+            "a solution. Single marks: methods that do not learn by trial, at the median spend of "
+            "a whole run, at the left edge where they spend nothing. Ringed: on the Pareto front "
+            "of mean reward and spend of all methods of the folder, shown here or not. Dotted: optimum "
             "with all joints free. Rewards far below are cut off, marks there stand at the "
             f"lower edge.{dagger(tasks.values())}"
         ),
@@ -124,11 +126,10 @@ def _plot(
 
 
 def _panel(
-    axes: Axes, data: pd.DataFrame, labels: Sequence[str], left: float, optimum: float | None
+    axes: Axes, data: pd.DataFrame, labels: Sequence[str], edge: float, optimum: float | None
 ) -> None:
     style = looks(labels)
     log_axis(axes)
-    edge = left if (data.budget > 0).all() else 0.6 * left
     ends = data.groupby("method", sort=False)["mean"].last()
     top = max(data["mean"].max(), optimum if optimum is not None else -math.inf)
     # The worst quarter of the methods does not decide the scale.
@@ -159,7 +160,6 @@ def _panel(
             )  # fmt: skip
     if optimum is not None:
         axes.axhline(optimum, color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)))
-    axes.set_xlim(left=edge)
 
 
 def _legend(figure: Figure, data: pd.DataFrame, labels: Sequence[str]) -> None:

@@ -122,7 +122,9 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
                 continue
             shade = float(cells.standardised[label, name]) / (2 * LIMIT) + 0.5
             color = to_hex(colors(min(max(shade, 0.0), 1.0)))
-            axes.add_patch(Rectangle((x, y), 1, 1, facecolor=color, edgecolor="none"))
+            axes.add_patch(
+                Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3)
+            )
             axes.text(
                 x + 0.5, y + 0.52, _figures(value), ha="center", va="center", fontsize=6,
                 color=on(color),
@@ -137,15 +139,6 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
     )  # fmt: skip
     axes.tick_params(length=0, pad=2)
     axes.spines[:].set_visible(False)
-    named = "; ".join(
-        f"{short(label)}: "
-        + ", ".join(
-            f"{SIGNATURES[name]} {_figures(float(cells.value[label, name]))}"
-            for name in columns
-            if not math.isnan(cells.value[label, name])
-        )
-        for label in labels
-    )
     return Plot(
         id=f"signatures-{task.name.lower()}",
         title=f"Signatures of coarticulation: {task.label}",
@@ -157,7 +150,10 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
             "First subtask and total: ticks more than in the initial solution. Hatched: does not "
             f"apply, or there are too few runs.{dagger([task])}"
         ),
-        alt=f"Matrix of signatures by method. {named}.",
+        alt=(
+            f"Matrix of {len(labels)} methods ({', '.join(map(short, labels))}) by "
+            f"{len(columns)} signatures on {task.label}; its numbers are in the table."
+        ),
         figure=figure,
         data=shown,
     )
