@@ -81,7 +81,8 @@ def published(
             "reward. Filled circles: interval within the margin (equivalent); open squares: it "
             "crosses it (undecided); diamonds: outside (different); crosses: no verdict. ↳: "
             "runs with one hand sequence, number of our runs of all our runs in brackets, then the"
-            " published one; means pooled from several printed sequences are marked * and have no verdict."
+            " published one; means pooled from several printed sequences are marked * and have no "
+            "verdict."
             f"{dagger(shown.values())}"
         ),
         alt=f"Differences of mean reward to the published ones, with intervals. {words}.",
