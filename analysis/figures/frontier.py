@@ -116,8 +116,8 @@ def _plot(
             "a solution. Single marks: methods that do not learn by trial, at the median spend of "
             "a whole run, at the left edge where they spend nothing. Ringed: on the Pareto front "
             "of mean reward and spend of all methods of the folder, shown here or not. Dotted: "
-            "optimum with all joints free. Rewards far below are cut off, marks there stand at the "
-            f"lower edge.{dagger(tasks.values())}"
+            "optimum with all joints free. Rewards far below are cut off, marks there stand at "
+            f"the lower edge.{dagger(tasks.values())}"
         ),
         alt=f"Curves of reward against {NAMES[spend]}. Last means: {words}.",
         figure=figure,
