@@ -61,11 +61,12 @@ def test_every_figure_of_the_papers_cells(figures):
     assert set(figures.skipped) == {"published"}
     assert "10000 trials" in figures.skipped["published"]
     for plot in figures.plots:
-        assert re.fullmatch(r"[a-z0-9.-]+", plot.id)
+        assert re.fullmatch(r"[a-z0-9-]+", plot.id)
         assert len(plot.alt) > 30
         assert len(plot.caption) > 60
         assert len(plot.data)
         assert plot.figure.get_size_inches()[0] * 25.4 <= 178.001
+        assert plot.figure.get_size_inches()[1] * 25.4 <= 240
 
 
 def test_a_folder_without_the_learner(alone):
@@ -198,6 +199,8 @@ def test_context_parts_are_the_signatures(study):
     assert (row.task, row.method, row.runs) == ("ascending", "dual-process/EC1", 8)
     assert row.equivalent == frame["motor-equivalent part"]
     assert row.other == frame["non-motor-equivalent part"]
+    with pytest.raises(CoarticError, match="no method has solved runs on two tasks"):
+        context(study, tasks=["ascending"])
 
 
 def test_signature_matrices(study):

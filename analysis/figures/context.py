@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from analysis.figures.bars import stars
 from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, missing
+from analysis.figures.selection import chosen, known_tasks, missing
 from analysis.figures.style import (
     BLUE,
     GREY,
@@ -21,6 +21,7 @@ from analysis.figures.style import (
     ONE,
     PAPER,
     SMALL,
+    TALLEST,
     VERMILLION,
     letters,
     short,
@@ -30,18 +31,25 @@ from analysis.signatures.frame import CONTEXT
 from analysis.statistics import holm
 from analysis.study import Study
 
+MOST = 6
 _PARTS = {CONTEXT[2]: "equivalent", CONTEXT[3]: "other"}
 
 
 @styled
-def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+def context(
+    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
+) -> Plot:
     """Motor-equivalent and non-motor-equivalent part of the difference between contexts.
 
-    One panel for each goal that two tasks of the folder share before they differ. Raises
-    CoarticError where no method has runs on two such tasks.
+    One panel for each goal that two tasks of the folder share before they differ, both
+    among ``tasks`` where these are named. Raises CoarticError where no method has runs on two
+    such tasks, or there are more than :data:`MOST` panels.
     """
+    names = set(known_tasks(study, tasks))
     frame = study.signatures
     frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
+    other_task = frame["where"].str.split("against ").str[-1]
+    frame = frame[frame.task.isin(names) & other_task.isin(names)]
     labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
     frame = frame[frame.label.isin(labels)]
     if not len(frame):
@@ -63,14 +71,19 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         kind="stable",
     ).reset_index(drop=True)  # fmt: skip
     places = list(data.groupby(["task", "where"], sort=False))
+    if len(places) > MOST:
+        raise missing(
+            study, f"{len(places)} pairs of tasks share a goal, more than {MOST}: name some tasks"
+        )
     rows = sum(len(group) + 3 for _, group in places)
-    figure = Figure(figsize=(ONE * 1.2, 0.5 + 0.16 * rows), layout="constrained")
+    figure = Figure(figsize=(ONE * 1.2, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
     panels = figure.subplots(
         len(places), 1, squeeze=False, sharex=True,
         height_ratios=[len(group) + 1 for _, group in places],
     )[:, 0]  # fmt: skip
     for axes, ((task, where), group) in zip(panels, places, strict=True):
         _panel(axes, group)
+        axes.set_xlim(0, 1.12 * data[["equivalent", "other"]].max().max())
         axes.set_title(f"{task}: {where}")
     panels[-1].set_xlabel("difference per root of dimension (length unit, rad)")
     if len(places) > 1:
@@ -111,7 +124,6 @@ def _panel(axes: Axes, data: pd.DataFrame) -> None:
             )  # fmt: skip
     axes.set_yticks([-place for place in range(len(data))], [short(m) for m in data.method])
     axes.set_ylim(-len(data) + 0.4, 0.6)
-    axes.set_xlim(0, 1.12 * data[["equivalent", "other"]].max().max())
     axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.4)
     axes.tick_params(axis="y", length=0)
 

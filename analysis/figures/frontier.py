@@ -17,6 +17,7 @@ from analysis.figures.style import (
     SMALL,
     TWO,
     dagger,
+    grid,
     heading,
     letters,
     log_axis,
@@ -62,7 +63,7 @@ def frontier(
     frame = anytime_frame(study.results, study.steps)
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
     pareto = pareto_frame(study.results)
-    front = pareto[pareto.front][["task", "method", "spend"]]
+    front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]
     plots = []
     for spend in spends:
         rows = frame[frame.spend == spend]
@@ -84,10 +85,9 @@ def _plot(
     study: Study, spend: str, data: pd.DataFrame, tasks: dict[str, Task], labels: Sequence[str]
 ) -> Plot:
     present = [label for label in labels if label in set(data.method)]
-    columns = min(2, len(tasks))
-    rows = math.ceil(len(tasks) / columns)
     legend = 0.15 * math.ceil((len(present) + 2) / 4)
-    figure = Figure(figsize=(TWO, 2.1 * rows + 0.25 + legend), layout="constrained")
+    rows, columns, height = grid(len(tasks), 2.1, 0.25 + legend)
+    figure = Figure(figsize=(TWO, height), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +19,7 @@ from analysis.figures.style import (
     SMALL,
     TWO,
     dagger,
+    grid,
     heading,
     letters,
     log_axis,
@@ -70,9 +70,8 @@ def learning_curves(
     shown = {name: found[name] for name in data.task.unique()}
     asked = list(methods or _DEFAULT)
     labels = sorted(data.method.unique(), key=asked.index)
-    columns = min(2, len(shown))
-    rows = math.ceil(len(shown) / columns)
-    figure = Figure(figsize=(TWO, 2.15 * rows + 0.45), layout="constrained")
+    rows, columns, height = grid(len(shown), 2.15, 0.45)
+    figure = Figure(figsize=(TWO, height), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in panels[len(shown) :]:
         axes.set_axis_off()

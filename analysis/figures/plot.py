@@ -30,7 +30,7 @@ class Plot:
     """A figure for a paper, with its words and numbers."""
 
     id: str
-    """Name of its files: lower case, digits and dashes."""
+    """Name of its files: letters, digits, dashes, dots, underscores."""
     title: str
     caption: str
     alt: str

@@ -34,7 +34,8 @@ _FAMILIES = {label.partition("/")[0] for label in HEADLINES}
 def headline(study: Study, tasks: Iterable[str]) -> list[str]:
     """Labels of the default methods that have solved runs on one of the tasks.
 
-    Those of :data:`HEADLINES`, then methods that are not the project's own.
+    Those of :data:`HEADLINES`, then methods that are not the project's own; all where there
+    is neither.
     """
     tasks = set(tasks)
     found = {
@@ -45,7 +46,7 @@ def headline(study: Study, tasks: Iterable[str]) -> list[str]:
     others = [
         label for label, method in found.items() if method.partition("/")[0] not in _FAMILIES
     ]
-    return [label for label in HEADLINES if label in found] + others
+    return [label for label in HEADLINES if label in found] + others or list(found)
 
 
 def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) -> list[str]:

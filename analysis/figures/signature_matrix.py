@@ -96,7 +96,8 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
     columns = [name for name in SIGNATURES if values[name].notna().any()]
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
-    left, above, right, tall = 1.36, 1.12, 0.55, 0.19  # inches
+    left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
+    above, right, tall = 1.12, 0.55, 0.19  # inches
     side = min((TWO - left - right) / len(columns), 0.6)
     width, height = left + side * len(columns) + right, above + tall * len(labels) + 0.06
     figure = Figure(figsize=(width, height))
@@ -140,7 +141,7 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
     axes.tick_params(length=0, pad=2)
     axes.spines[:].set_visible(False)
     return Plot(
-        id=f"signatures-{task.name.lower()}",
+        id=f"signatures-{task.name}",
         title=f"Signatures of coarticulation: {task.label}",
         caption=(
             f"{task.label}: signatures (docs/signatures.md), each the mean over its goals or "

@@ -176,7 +176,9 @@ def short(label: str) -> str:
 
 def heading(task: Task) -> str:
     """A task's name above a panel, with a dagger where it is reconstructed."""
-    return f"{task.label} †" if task.reconstructed else task.label
+    # Variants of a task share its title, but not its name.
+    name = task.label if task.label.lower().replace(" ", "-") == task.name else task.name
+    return f"{name} †" if task.reconstructed else name
 
 
 def dagger(tasks: Iterable[Task]) -> str:
@@ -189,6 +191,13 @@ def dagger(tasks: Iterable[Task]) -> str:
 def number(value: float, digits: int = 0) -> str:
     """A number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")
+
+
+def grid(panels: int, tall: float, legend: float) -> tuple[int, int, float]:
+    """Rows, columns and height in inches of panels that are ``tall`` where the page allows."""
+    columns = min(2 if panels <= 6 else 3, panels)
+    rows = -(-panels // columns)
+    return rows, columns, min(tall * rows + legend, TALLEST)
 
 
 def on(color: str) -> str:

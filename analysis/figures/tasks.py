@@ -24,7 +24,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         raise ValueError("no task to draw")
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
-    columns = min(2, len(tasks))
+    columns = min(2 if len(tasks) <= 6 else 3, len(tasks))
     rows = math.ceil(len(tasks) / columns)
     above, around = 0.62, 0.55  # inches of a panel for title and axes
     scale = min(
