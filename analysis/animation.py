@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.drawing import MARKERS
+from analysis.figures.robot import MARKERS
 from coartic import CoarticError, Trajectory
 from coartic.robot import Array
 

@@ -8,11 +8,9 @@ once.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -414,52 +412,3 @@ def _times(runs: Sequence[Progress], spend: str, target: float) -> tuple[Array, 
     ]
     ends = [run.total[spend] for run in runs if run.stopped and run.solved]
     return np.array(times), min(ends, default=math.inf)
-
-
-_DASHES = ("-", "--", ":")  # after every ten colours
-
-
-def draw_anytime(
-    results: Results,
-    task: str,
-    path: Path,
-    *,
-    spend: str = "trials",
-    methods: Sequence[str] | None = None,
-) -> None:
-    """Mean reward so far against a spend, with its interval, to ``path`` (png, svg, pdf).
-
-    ``methods`` are labels of cells, all that learn by trial if None. Planners are a point
-    at what they spend, or a line where they spend nothing. The optimum is dashed. Raises
-    ValueError where there is nothing to draw.
-    """
-    from matplotlib.figure import Figure
-
-    frame = anytime_frame(results)
-    frame = frame[(frame.task == task) & (frame.spend == spend)]
-    frame = frame[frame.kind == "curve" if methods is None else frame.method.isin(methods)]
-    if not len(frame):
-        raise ValueError(f"no curve of task {task!r} over {spend!r}")
-    figure = Figure(figsize=(10, 5.5), layout="constrained")
-    axes = figure.subplots()
-    dashes = itertools.chain.from_iterable([style] * 10 for style in itertools.cycle(_DASHES))
-    for (method, rows), style in zip(frame.groupby("method", sort=False), dashes, strict=False):
-        budget, mean = rows.budget.to_numpy(), rows["mean"].to_numpy()
-        if len(rows) == 1 and budget[0] == 0:
-            axes.axhline(mean[0], linestyle=":", linewidth=1, label=str(method), color="0.5")
-            continue
-        (line,) = axes.step(
-            budget, mean, style if len(rows) > 1 else "o", where="post", label=str(method)
-        )
-        axes.fill_between(
-            budget, rows.low, rows.high, step="post", alpha=0.2, color=line.get_color()
-        )
-    optimum = optima(results).get((task, "free"))
-    if optimum is not None:
-        axes.axhline(optimum.reward, linestyle="--", linewidth=1, color="black", label="optimum")
-    axes.set_xscale("log")
-    axes.set_xlabel(LABELS[spend])
-    axes.set_ylabel("best reward so far")
-    axes.set_title(task, loc="left", parse_math=False)
-    figure.legend(fontsize=7, frameon=False, loc="outside right upper")
-    figure.savefig(path, dpi=150)

@@ -435,7 +435,8 @@ def draw(
     ] = None,
 ) -> None:
     """Draw start configuration and goals of tasks."""
-    from analysis.drawing import FORMATS, draw_tasks
+    from analysis.figures.plot import FORMATS, write
+    from analysis.figures.tasks import tasks_plot
 
     if out.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}")
@@ -446,7 +447,7 @@ def draw(
         load_task(path) for path in task_file or []
     ]
     try:
-        draw_tasks(chosen, out)
+        write(tasks_plot(chosen), out)
     except OSError as error:
         raise CoarticError(f"cannot write {out}: {error.strerror or error}") from None
     print(f"{', '.join(task.name for task in chosen)} drawn in {out}.")

@@ -14,7 +14,6 @@ from analysis.frontier import (
     anytime_frame,
     area_frame,
     dominated,
-    draw_anytime,
     for_both_arms,
     pareto_frame,
     targets_frame,
@@ -511,13 +510,3 @@ def test_an_empty_folder_gives_empty_frames(tmp_path):
     for frame in (anytime_frame(results), area_frame(results), targets_frame(results)):
         assert not len(frame)
         assert {"task", "method", "spend"} <= set(frame.columns)
-
-
-def test_a_drawing_of_curves(tmp_path):
-    rows = [run("m", [-600.0, -500.0, -480.0], number=i) for i in range(3)]
-    results = folder([*rows, run("p", reward=-470)], tmp_path)
-    draw_anytime(results, "two-armed-1", tmp_path / "curves.svg", methods=["m", "p"])
-    text = (tmp_path / "curves.svg").read_text()
-    assert all(f"<!-- {label} -->" in text for label in ("m", "p", "optimum", "trials"))
-    with pytest.raises(ValueError, match="no curve of task 'ascending'"):
-        draw_anytime(results, "ascending", tmp_path / "none.png")

@@ -1,0 +1,57 @@
+"""Figures for a paper, each a function of a :class:`~analysis.study.Study`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from analysis.figures.bars import bars
+from analysis.figures.configurations import paper_configurations
+from analysis.figures.context import context
+from analysis.figures.frontier import frontier
+from analysis.figures.learning_curves import learning_curves
+from analysis.figures.plot import Plot
+from analysis.figures.profiles import profiles
+from analysis.figures.published import published
+from analysis.figures.recruitment import recruitment
+from analysis.figures.signature_matrix import signature_matrix
+from analysis.figures.tasks import tasks_plot
+from analysis.study import Study
+from coartic import CoarticError
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The figures that a folder's runs allow, in the paper's order, and the others."""
+
+    plots: tuple[Plot, ...]
+    skipped: dict[str, str]
+    """Why there is none, by what would have been drawn."""
+
+
+def all_figures(study: Study) -> Figures:
+    """Every figure with its default methods; what lacks runs is skipped with the reason."""
+    plots = [tasks_plot(list(study.results.tasks.values()))]
+    drawn, skipped = paper_configurations(study)
+    plots += drawn
+    makers: dict[str, Callable[[Study], Plot | list[Plot]]] = {
+        "learned-reward": bars,
+        "published": published,
+        "learning-curves": learning_curves,
+        "recruitment": recruitment,
+        "context": context,
+        "signatures": signature_matrix,
+        "frontier": frontier,
+        "profiles": profiles,
+    }
+    for name, maker in makers.items():
+        try:
+            found = maker(study)
+        except CoarticError as error:
+            skipped[name] = str(error)
+        else:
+            plots += found if isinstance(found, list) else [found]
+    return Figures(tuple(plots), skipped)
+
+
+__all__ = ["Figures", "Plot", "all_figures"]

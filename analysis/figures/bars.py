@@ -1,0 +1,229 @@
+"""Learned reward by exploration condition (paper, Figure 8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy import stats
+
+from analysis.figures.configurations import initial_solution
+from analysis.figures.plot import Plot
+from analysis.figures.selection import CONDITIONS, has, known_tasks, missing, rewards_of, solved
+from analysis.figures.style import (
+    GREY,
+    INK,
+    PAPER,
+    SMALL,
+    TWO,
+    dagger,
+    heading,
+    letters,
+    looks,
+    short,
+    styled,
+)
+from analysis.published import Summary, published_cell, published_initial
+from analysis.statistics import CONFIDENCE, RESAMPLES, bootstrap_test, holm, mean
+from analysis.study import SEED, Study
+
+STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
+
+
+@styled
+def bars(
+    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
+) -> Plot:
+    """Mean learned reward of each method, as a bar from the initial solution up.
+
+    By default the paper's conditions on the tasks where the folder has more than one of
+    them. Each method is tested against the one to its left, the first against the initial
+    solution: one-tailed bootstrap tests, adjusted over the figure by Holm. Raises
+    CoarticError where a task or all of a task's methods are missing.
+    """
+    found = known_tasks(study, tasks)
+    labels = {
+        name: [label for label in (methods or _conditions(name)) if has(study, name, label)]
+        for name in found
+    }
+    if tasks is None:
+        labels = {name: own for name, own in labels.items() if len(own) > (methods is None)}
+    empty = [name for name, own in labels.items() if not own]
+    if empty or not labels:
+        raise missing(
+            study,
+            f"no solved runs of {', '.join(methods or CONDITIONS)} on "
+            f"{', '.join(empty) or 'one task, more than one of them'}",
+        )
+    data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
+    adjusted = holm(data.p.tolist())
+    data = data.assign(p_holm=adjusted).reset_index(drop=True)
+    # One row of panels, as wide as their bars.
+    counts = [len(own) + 1.2 for own in labels.values()]
+    figure = Figure(figsize=(min(TWO, 0.5 + 0.58 * sum(counts)), 2.6), layout="constrained")
+    panels = figure.subplots(1, len(labels), width_ratios=counts, squeeze=False)[0]
+    for axes, name in zip(panels, labels, strict=True):
+        runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
+        _panel(axes, data[data.task == name], runs)
+        axes.set_title(heading(found[name]))
+        axes.set_ylabel("learned reward" if axes is panels[0] else "")
+    letters(panels)
+    values = "; ".join(
+        f"{row['task']}, {short(row['method'])}: {row['reward']:.1f}"
+        for row in data.to_dict("records")
+    )
+    return Plot(
+        id="learned-reward",
+        title="Learned reward by condition",
+        caption=(
+            "Mean learned reward (−1 a control tick) as a bar that rises from the initial "
+            f"solution, with its {CONFIDENCE:.0%} BCa interval over runs; grey dots: runs. Open "
+            "diamonds: published mean with its 95 % interval where an SD is printed (of all runs, "
+            "pooled where the paper reports hand sequences apart). Brackets: one-tailed bootstrap "
+            "test that the mean is higher than what stands to the left "
+            f"({RESAMPLES} resamples, seed {SEED}), Holm-adjusted over the figure: "
+            "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
+            f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(found[name] for name in labels)}"
+        ),
+        alt=f"Bars of mean learned reward with intervals. {values}.",
+        figure=figure,
+        data=data,
+    )
+
+
+def _conditions(task: str) -> list[str]:
+    """The paper's conditions on a task, or all of them on other tasks."""
+    printed = [label for label in CONDITIONS if _paper(task, label) is not None]
+    return printed or list(CONDITIONS)
+
+
+def _paper(task: str, label: str) -> Any:
+    return published_cell(task, label.removeprefix("dual-process/"))
+
+
+def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
+    """The initial solution, then the methods, each tested against the row before."""
+    initial = -initial_solution(study, task).execution.ticks
+    printed = published_initial(task)
+    rows: list[dict[str, Any]] = [
+        {
+            "task": task,
+            "method": "initial",
+            "reward": float(initial),
+            "published": float(printed[1]) if printed else math.nan,
+        }
+    ]
+    before: Any = float(initial)
+    for label in labels:
+        rewards = rewards_of(solved(study, task, label))
+        found = mean(rewards, seed=SEED)
+        cell = _paper(task, label) if label in CONDITIONS else None
+        summary = cell.summary if cell else None
+        half = _half(summary)
+        centre = summary.mean if summary else math.nan
+        rows.append(
+            {
+                "task": task,
+                "method": label,
+                "runs": len(rewards),
+                "reward": found.estimate,
+                "low": found.low,
+                "high": found.high,
+                "published": centre,
+                "published_low": centre - half,
+                "published_high": centre + half,
+                "p": bootstrap_test(rewards, before, seed=SEED).p,
+            }
+        )
+        before = rewards
+    columns = "task method runs reward low high published published_low published_high p"
+    return pd.DataFrame(rows, columns=columns.split())
+
+
+def _half(summary: Summary | None) -> float:
+    """Half of Student's interval of a printed mean; NaN where no SD is printed."""
+    if summary is None or summary.sd is None or summary.runs < 2:
+        return math.nan
+    quantile = float(stats.t.ppf(0.5 + CONFIDENCE / 2, summary.runs - 1))
+    return quantile * summary.sd / math.sqrt(summary.runs)
+
+
+def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
+    initial = float(rows.reward.iloc[0])
+    style = looks(rows.method[1:])
+    axes.axhline(initial, color=INK, linewidth=0.7, zorder=1)
+    for place, row in enumerate(rows.to_dict("records")):
+        if place:
+            label = row["method"]
+            axes.bar(
+                place, row["reward"] - initial, 0.62, bottom=initial, color=style[label].color,
+                edgecolor=INK, linewidth=0.5, zorder=1,
+            )  # fmt: skip
+            _interval(axes, place - 0.16, row["reward"], row["low"], row["high"])
+            rewards = np.sort(runs[label])
+            offsets = 0.06 + 0.05 * (np.arange(len(rewards)) % 5)
+            axes.plot(
+                place + offsets, rewards, "o", markersize=1.6, color=INK, alpha=0.55,
+                markeredgewidth=0, zorder=3,
+            )  # fmt: skip
+        if not math.isnan(row["published"]):
+            x = place + (0.42 if place else 0.0)
+            _interval(axes, x, row["published"], row["published_low"], row["published_high"])
+            axes.plot(
+                x, row["published"], "D", markersize=3.4, markerfacecolor=PAPER,
+                markeredgecolor=INK, zorder=4,
+            )  # fmt: skip
+    _brackets(axes, rows, runs)
+    names = ["initial", *(short(label) for label in rows.method[1:])]
+    axes.set_xticks(range(len(rows)), names)
+    axes.set_xlim(-0.45, len(rows) - 0.4)
+    axes.tick_params(axis="x", length=0)
+    if len(rows) > 5 or max(map(len, names)) > 9:
+        axes.tick_params(axis="x", labelrotation=40)
+        for text in axes.get_xticklabels():
+            text.set_horizontalalignment("right")
+            text.set_rotation_mode("anchor")
+
+
+def _interval(axes: Axes, x: float, value: float, low: float, high: float) -> None:
+    if math.isnan(low):
+        return
+    axes.errorbar(
+        x, value, [[value - low], [high - value]], color=INK, linewidth=0.8, capsize=1.8,
+        capthick=0.8, zorder=3,
+    )  # fmt: skip
+
+
+def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
+    """One between neighbours, above all that the two show."""
+    shown = rows[["reward", "high", "published", "published_high"]].max(axis=1).tolist()
+    tops = [
+        max([top, *runs.get(label, ())]) for top, label in zip(shown, rows.method, strict=True)
+    ]
+    bottom = min(rows[["reward", "published"]].min().min(), *(min(r) for r in runs.values()))
+    step = 0.055 * (max(tops) - bottom)
+    level = -math.inf
+    for place, p in enumerate(rows.p_holm.tolist()[1:], 1):
+        level = max(tops[place - 1], tops[place], level) + 1.6 * step
+        axes.plot(
+            [place - 0.95, place - 0.95, place - 0.05, place - 0.05],
+            [level - 0.4 * step, level, level, level - 0.4 * step],
+            color=INK, linewidth=0.7,
+        )  # fmt: skip
+        axes.text(
+            place - 0.5, level, stars(p), ha="center", va="bottom", fontsize=SMALL,
+            color=INK if stars(p).startswith("*") else GREY,
+        )  # fmt: skip
+    axes.set_ylim(bottom - 1.2 * step, level + 2.2 * step)
+
+
+def stars(p: float) -> str:
+    """Significance as the paper's readers are used to it; a dash where there is no test."""
+    if math.isnan(p):
+        return "–"
+    return next((mark for level, mark in STARS if p < level), "n.s.")

@@ -1,0 +1,259 @@
+"""Configurations at each goal, initial and learned (paper, Figures 5 to 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.plot import Plot
+from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
+from analysis.figures.selection import missing, solved
+from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, short, styled
+from analysis.signatures.cell import Cell
+from analysis.study import Study
+from coartic import CoarticError, Execution, Task, execute
+from coartic.frames import movements_from
+from coartic.robot import Array
+from coartic.task import hands_of
+
+Rows = Sequence[tuple[str, Sequence[str]]]
+PAPER: dict[str, tuple[str, Rows]] = {
+    "configurations-one-armed": (
+        "5",
+        (("ascending", ("dual-process/EC1",)), ("descending", ("dual-process/EC1",))),
+    ),
+    "configurations-two-armed-1": (
+        "6",
+        (("two-armed-1", ("dual-process/EC2", "dual-process/EC3", "dual-process/EC4")),),
+    ),
+    "configurations-two-armed-2": (
+        "7",
+        (("two-armed-2", ("dual-process/EC3", "dual-process/EC4")),),
+    ),
+}
+"""Figures of the paper: number, and methods by task."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """One row of panels."""
+
+    task: Task
+    method: str
+    """Label; empty for the initial solution."""
+    run_id: str
+    execution: Execution
+
+    @property
+    def name(self) -> str:
+        """As the row is headed."""
+        name = short(self.method) if self.method else "initial solution"
+        return f"{name}, {self.execution.hands}"
+
+
+def initial_solution(study: Study, task: str) -> Solution:
+    """The corrective process alone with the task's initial hands.
+
+    Raises CoarticError where that does not complete the task.
+    """
+    execution = Cell(study.results.tasks[task], "", "", ()).initial
+    if execution is None:
+        raise missing(study, f"the corrective process alone does not complete {task}")
+    return Solution(study.results.tasks[task], "", "", execution)
+
+
+def typical_run(study: Study, task: str, label: str) -> str:
+    """Id of the run that stands for a cell.
+
+    Of the runs with the commonest hand sequence (the first of them in the alphabet where
+    several are as common) that whose reward is nearest to the median reward of the cell.
+    """
+    good = solved(study, task, label).good
+    counts = good.hands.value_counts()
+    hands = min(counts.index[counts == counts.max()])
+    candidates = good[good.hands == hands]
+    median = float(np.median(good.reward.to_numpy(dtype=np.float64)))
+    off = np.abs(candidates.reward.to_numpy(dtype=np.float64) - median)
+    return str(candidates.run_id.iloc[int(off.argmin())])
+
+
+def learned_solution(study: Study, task: str, label: str, run_id: str | None = None) -> Solution:
+    """A stored run's solution, executed again; the typical run's where none is named.
+
+    Raises CoarticError for a run that is not a solved one of the cell.
+    """
+    good = solved(study, task, label).good
+    run_id = typical_run(study, task, label) if run_id is None else run_id
+    if run_id not in set(good.run_id):
+        raise missing(study, f"{run_id} is no solved run of {label} on {task}")
+    solutions, paths = study.results.solutions(), study.results.paths()
+    own = study.results.tasks[task]
+    movements = movements_from(
+        own, solutions[solutions.run_id == run_id], paths[paths.run_id == run_id]
+    )
+    return Solution(own, label, run_id, execute(own, movements))
+
+
+@styled
+def configurations(
+    study: Study,
+    rows: Rows,
+    *,
+    id: str = "configurations",  # noqa: A002
+    runs: Mapping[tuple[str, str], str] | None = None,
+    like: str = "Figures 5 to 7",
+) -> Plot:
+    """One panel a goal, one row a solution: the initial one, then each method's.
+
+    ``rows`` names the methods of each task. ``runs`` names runs by task and method instead
+    of the typical ones (:func:`typical_run`). Raises CoarticError for what the folder lacks.
+    """
+    unknown = [task for task, _ in rows if task not in study.results.tasks]
+    if unknown:
+        raise missing(study, f"no task {', '.join(unknown)}")
+    shown: list[Solution] = []
+    for task, methods in rows:
+        shown.append(initial_solution(study, task))
+        shown += [
+            learned_solution(study, task, label, (runs or {}).get((task, label)))
+            for label in methods
+        ]
+    figure = _draw(shown)
+    tasks = {solution.task.name: solution.task for solution in shown}
+    named = "; ".join(
+        f"{solution.task.name}, {short(solution.method)}: run {solution.run_id}"
+        for solution in shown
+        if solution.method
+    )
+    totals = "; ".join(
+        f"{s.task.label}, {s.name}, total {number(-s.execution.ticks)}" for s in shown
+    )
+    return Plot(
+        id=id,
+        title="Configurations at each goal: " + ", ".join(t.label for t in tasks.values()),
+        caption=(
+            "Configuration when each goal was hit (black; joints of the chosen arm marked: "
+            "open squares left, closed circles right) and the one before (grey). Above each "
+            "panel goal, chosen hand and reward of the movement (−1 a control tick), at the "
+            "row's end the total. Of each method the run with the commonest hand sequence "
+            f"whose reward is nearest to the method's median, unless another was asked for: "
+            f"{named}. After {like} of Shah, Barto & Fagg (2013).{dagger(tasks.values())}"
+        ),
+        alt=f"Robot configurations at every goal. {totals}.",
+        figure=figure,
+        data=_data(shown),
+    )
+
+
+def paper_configurations(study: Study) -> tuple[list[Plot], dict[str, str]]:
+    """The paper's Figures 5 to 7 as far as the folder allows, and why one is missing.
+
+    Methods that the folder lacks are left out where another one of the task remains.
+    """
+    plots, skipped = [], {}
+    for name, (figure, rows) in PAPER.items():
+        kept = [
+            (task, [label for label in methods if (task, label) in study.cells])
+            for task, methods in rows
+        ]
+        kept = [(task, methods) for task, methods in kept if methods]
+        if not kept:
+            wanted = " or ".join(f"{', '.join(methods)} on {task}" for task, methods in rows)
+            skipped[name] = f"no runs of {wanted}"
+            continue
+        try:
+            plots.append(configurations(study, kept, id=name, like=f"Figure {figure}"))
+        except CoarticError as error:
+            skipped[name] = str(error)
+    return plots, skipped
+
+
+def _draw(shown: Sequence[Solution]) -> Figure:
+    columns = max(len(solution.task.goals) for solution in shown)
+    end, gap, head, foot = 0.46, 0.08, 0.34, 0.3  # inches
+    wide = (TWO - end) / columns
+    corners = {}
+    for solution in shown:
+        own = [s for s in shown if s.task.name == solution.task.name]
+        corners[solution.task.name] = box(
+            solution.task,
+            [solution.task.q0, *(q for s in own for q in s.execution.configurations)],
+        )
+    extents = {name: high - low for name, (low, high) in corners.items()}
+    scale = (wide - gap) / max(extent[0] for extent in extents.values())
+    heights = [scale * extents[solution.task.name][1] for solution in shown]
+    height = sum(heights) + head * len(shown) + foot
+    figure = Figure(figsize=(TWO, height))
+    top = height
+    several = len(extents) > 1
+    for solution, tall in zip(shown, heights, strict=True):
+        task = solution.task
+        title = f"{task.label}: {solution.name}" if several else solution.name
+        figure.text(0.004, (top - 0.03) / height, title, va="top", fontsize=NORMAL, weight="bold")
+        top -= head + tall
+        before: Array = task.q0
+        spent = solution.execution.ticks_by_goal()
+        hands = hands_of(solution.execution.hands)
+        width = scale * extents[task.name][0]
+        for index, q in enumerate(solution.execution.configurations):
+            axes = figure.add_axes(
+                ((index * wide + gap / 2) / TWO, top / height, width / TWO, tall / height)
+            )
+            axes.set_axis_off()
+            axes.set_xlim(corners[task.name][0][0], corners[task.name][1][0])
+            axes.set_ylim(corners[task.name][0][1], corners[task.name][1][1])
+            draw_robot(axes, task, before, color=GREY)
+            draw_goals(axes, task, current=index + 1)
+            draw_robot(axes, task, q, marked=(hands[index],))
+            axes.set_title(
+                f"goal {index + 1}: {hands[index]}, {number(-spent[index])}",
+                fontsize=SMALL,
+                pad=1,
+            )
+            before = q
+        figure.text(
+            1 - 0.02 / TWO,
+            (top + tall / 2) / height,
+            f"total\n{number(-solution.execution.ticks)}",
+            ha="right", va="center", fontsize=NORMAL,
+        )  # fmt: skip
+    before_entry = Line2D([], [], color=GREY, linewidth=0.9, label="before")
+    hands_shown = dict.fromkeys(hand for solution in shown for hand in solution.task.hands)
+    figure.legend(
+        handles=[*legend_entries(hands_shown), before_entry],
+        loc="lower center", ncols=4, fontsize=SMALL, borderaxespad=0.2,
+    )  # fmt: skip
+    bar = np.array([0.08, 0.08 + scale]) / TWO
+    figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=INK, linewidth=1.2))
+    figure.text(bar[1] + 0.04 / TWO, 0.13 / height, "1 length unit", va="center", fontsize=SMALL)
+    return figure
+
+
+def _data(shown: Sequence[Solution]) -> pd.DataFrame:
+    """One row a goal and one for the start (goal 0), with the configuration."""
+    rows = []
+    for solution in shown:
+        task, execution = solution.task, solution.execution
+        spent = (0, *execution.ticks_by_goal())
+        postures = [task.q0, *execution.configurations]
+        hands = ("", *hands_of(execution.hands))
+        for goal, (q, hand, ticks) in enumerate(zip(postures, hands, spent, strict=True)):
+            rows.append(
+                {
+                    "task": task.name,
+                    "method": solution.method or "initial",
+                    "run_id": solution.run_id,
+                    "hands": execution.hands,
+                    "total": -execution.ticks,
+                    "goal": goal,
+                    "hand": hand,
+                    "reward": -ticks,
+                    **dict(zip(task.robot.joint_names, q.tolist(), strict=True)),
+                }
+            )
+    return pd.DataFrame(rows)

@@ -1,0 +1,138 @@
+"""How the posture at a shared goal depends on what follows, and whether the hand feels it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.bars import stars
+from analysis.figures.plot import Plot
+from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    ONE,
+    PAPER,
+    SMALL,
+    TALLEST,
+    VERMILLION,
+    letters,
+    short,
+    styled,
+)
+from analysis.signatures.frame import CONTEXT
+from analysis.statistics import holm
+from analysis.study import Study
+
+MOST = 6
+_PARTS = {CONTEXT[2]: "equivalent", CONTEXT[3]: "other"}
+
+
+@styled
+def context(
+    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
+) -> Plot:
+    """Motor-equivalent and non-motor-equivalent part of the difference between contexts.
+
+    One panel for each goal that two tasks of the folder share before they differ, both
+    among ``tasks`` where these are named. Raises CoarticError where no method has runs on two
+    such tasks, or there are more than :data:`MOST` panels.
+    """
+    names = set(known_tasks(study, tasks))
+    frame = study.signatures
+    frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
+    other_task = frame["where"].str.split("against ").str[-1]
+    frame = frame[frame.task.isin(names) & other_task.isin(names)]
+    labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
+    frame = frame[frame.label.isin(labels)]
+    if not len(frame):
+        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+    keys = ["task", "where", "label", "n"]
+    equivalent, other = (
+        frame[frame.signature == name]
+        .set_index(keys)[["value", "p"]]
+        .rename(columns={"value": part, "p": f"p_{part}"})
+        for name, part in _PARTS.items()
+    )
+    data = equivalent.join(other).reset_index().rename(columns={"label": "method", "n": "runs"})
+    together = data[["p_equivalent", "p_other"]].to_numpy(dtype=float)
+    adjusted = np.reshape(holm(together.ravel().tolist()), together.shape)
+    data = data.assign(holm_equivalent=adjusted[:, 0], holm_other=adjusted[:, 1])
+    order = {label: place for place, label in enumerate(labels)}
+    data = data.sort_values(
+        ["task", "where", "method"], key=lambda c: c.map(order) if c.name == "method" else c,
+        kind="stable",
+    ).reset_index(drop=True)  # fmt: skip
+    places = list(data.groupby(["task", "where"], sort=False))
+    if len(places) > MOST:
+        raise missing(
+            study, f"{len(places)} pairs of tasks share a goal, more than {MOST}: name some tasks"
+        )
+    rows = sum(len(group) + 3 for _, group in places)
+    figure = Figure(figsize=(ONE * 1.2, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
+    panels = figure.subplots(
+        len(places), 1, squeeze=False, sharex=True,
+        height_ratios=[len(group) + 1 for _, group in places],
+    )[:, 0]  # fmt: skip
+    for axes, ((task, where), group) in zip(panels, places, strict=True):
+        _panel(axes, group)
+        axes.set_xlim(0, 1.12 * data[["equivalent", "other"]].max().max())
+        axes.set_title(f"{task}: {where}")
+    panels[-1].set_xlabel("difference per root of dimension (length unit, rad)")
+    if len(places) > 1:
+        letters(panels)
+    figure.legend(handles=_handles(), loc="outside lower center", ncols=2, fontsize=SMALL)
+    words = "; ".join(
+        f"{short(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
+        for row in data.to_dict("records")
+    )
+    return Plot(
+        id="context",
+        title="Context dependence at the shared goal",
+        caption=(
+            "Difference between the mean configurations at the same goal before different "
+            "successors, divided into the part that leaves the hand in place (motor-equivalent) "
+            "and the part that moves it, each per root of the dimension of its space. A hit "
+            "confines the hand to the goal's disc, so the second part is bounded. Stars: "
+            "permutation test over runs, Holm-adjusted over the figure (*** p < 0.001, "
+            "** p < 0.01, * p < 0.05, n.s. not significant), of the motor-equivalent part; "
+            "methods that are run once have none."
+        ),
+        alt=f"Motor-equivalent and non-motor-equivalent part by method: {words}.",
+        figure=figure,
+        data=data,
+    )
+
+
+def _panel(axes: Axes, data: pd.DataFrame) -> None:
+    for place, row in enumerate(data.to_dict("records")):
+        values = [row["other"], row["equivalent"]]
+        axes.plot(values, [-place, -place], color=GREY, linewidth=0.8, zorder=1)
+        axes.plot(row["other"], -place, "s", color=VERMILLION, markerfacecolor=PAPER, markersize=4)
+        axes.plot(row["equivalent"], -place, "o", color=BLUE, markersize=4)
+        if not math.isnan(row["p_equivalent"]):
+            axes.annotate(
+                stars(row["holm_equivalent"]), (max(values), -place), (5, -0.5),
+                textcoords="offset points", va="center", fontsize=SMALL, color=INK,
+            )  # fmt: skip
+    axes.set_yticks([-place for place in range(len(data))], [short(m) for m in data.method])
+    axes.set_ylim(-len(data) + 0.4, 0.6)
+    axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.4)
+    axes.tick_params(axis="y", length=0)
+
+
+def _handles() -> list[Line2D]:
+    return [
+        Line2D([], [], linestyle="", marker="o", color=BLUE, label="motor-equivalent"),
+        Line2D(
+            [], [], linestyle="", marker="s", color=VERMILLION, markerfacecolor=PAPER,
+            label="moves the hand",
+        ),
+    ]  # fmt: skip

@@ -1,0 +1,184 @@
+"""Reward against what it costs: anytime curves with their intervals, and Pareto points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.plot import Plot
+from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.style import (
+    INK,
+    SMALL,
+    TWO,
+    dagger,
+    grid,
+    heading,
+    letters,
+    log_axis,
+    looks,
+    short,
+    styled,
+)
+from analysis.frontier import anytime_frame, pareto_frame
+from analysis.optimum import METHODS as OPTIMUM
+from analysis.progress import SPENDS
+from analysis.statistics import CONFIDENCE
+from analysis.study import Study
+from coartic import Task
+
+NAMES = {
+    "trials": "physical trials",
+    "movement_ticks": "control ticks of all trials",
+    "forward_kinematics": "forward-kinematics evaluations",
+    "solve_s": "solve time (s)",
+}
+
+
+@styled
+def frontier(
+    study: Study,
+    *,
+    spends: Sequence[str] = SPENDS,
+    methods: Sequence[str] | None = None,
+    tasks: Sequence[str] | None = None,
+) -> list[Plot]:
+    """Best reward so far against each spend, one figure a spend, one panel a task.
+
+    Methods that plan are a point at all that they spend; those that spend nothing of a kind
+    stand at the left edge. Raises CoarticError where there is nothing to draw and ValueError
+    for a spend that is not one of :data:`analysis.progress.SPENDS`.
+    """
+    unknown = [spend for spend in spends if spend not in SPENDS]
+    if unknown:
+        raise ValueError(f"unknown spends {unknown}; known: {list(SPENDS)}")
+    found = known_tasks(study, tasks)
+    labels = [
+        label for label in chosen(study, list(found), methods) if not label.startswith(OPTIMUM)
+    ]
+    frame = anytime_frame(study.results, study.steps)
+    frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
+    pareto = pareto_frame(study.results)
+    front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]
+    plots = []
+    for spend in spends:
+        rows = frame[frame.spend == spend]
+        if not len(rows):
+            continue
+        ends = front[front.spend == spend]
+        on_front = set(zip(ends.task, ends.method, strict=True))
+        data = rows.assign(
+            front=[pair in on_front for pair in zip(rows.task, rows.method, strict=True)]
+        ).reset_index(drop=True)
+        shown = {name: task for name, task in found.items() if name in set(data.task)}
+        plots.append(_plot(study, spend, data, shown, labels))
+    if not plots:
+        raise missing(study, "no run of the methods has a solution and a known spend")
+    return plots
+
+
+def _plot(
+    study: Study, spend: str, data: pd.DataFrame, tasks: dict[str, Task], labels: Sequence[str]
+) -> Plot:
+    present = [label for label in labels if label in set(data.method)]
+    legend = 0.15 * math.ceil((len(present) + 2) / 4)
+    rows, columns, height = grid(len(tasks), 2.1, 0.25 + legend)
+    figure = Figure(figsize=(TWO, height), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+    for axes in panels[len(tasks) :]:
+        axes.set_axis_off()
+    positive = data.budget[data.budget > 0]
+    left = 10 ** math.floor(math.log10(positive.min())) if len(positive) else 1.0
+    edge = left if (data.budget > 0).all() else 0.6 * left
+    for place, (axes, task) in enumerate(zip(panels, tasks.values(), strict=False)):
+        optimum = study.optima.get((task.name, "free"))
+        _panel(
+            axes, data[data.task == task.name], present, edge, optimum.reward if optimum else None
+        )
+        axes.set_title(heading(task))
+        axes.set_ylabel("" if place % columns else "best reward so far")
+        axes.set_xlabel(NAMES[spend] if place + columns >= len(tasks) else "")
+    panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
+    letters(panels[: len(tasks)])
+    _legend(figure, data, present)
+    ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
+    words = "; ".join(f"{row['task']}, {short(row['method'])}: {row['mean']:.0f}" for row in ends)
+    return Plot(
+        id=f"frontier-{spend.replace('_', '-')}",
+        title=f"Reward against {NAMES[spend]}",
+        caption=(
+            f"Best reward so far against {NAMES[spend]}: mean over runs with its "
+            f"{CONFIDENCE:.0%} bootstrap interval, pointwise, from where every run has "
+            "a solution. Single marks: methods that do not learn by trial, at the median spend of "
+            "a whole run, at the left edge where they spend nothing. Ringed: on the Pareto front "
+            "of mean reward and spend of all methods of the folder, shown here or not. Dotted: "
+            "optimum with all joints free. Rewards far below are cut off, marks there stand at "
+            f"the lower edge.{dagger(tasks.values())}"
+        ),
+        alt=f"Curves of reward against {NAMES[spend]}. Last means: {words}.",
+        figure=figure,
+        data=data,
+    )
+
+
+def _panel(
+    axes: Axes, data: pd.DataFrame, labels: Sequence[str], edge: float, optimum: float | None
+) -> None:
+    style = looks(labels)
+    log_axis(axes)
+    ends = data.groupby("method", sort=False)["mean"].last()
+    top = max(data["mean"].max(), optimum if optimum is not None else -math.inf)
+    # The worst quarter of the methods does not decide the scale.
+    low = float(ends.quantile(0.25)) if len(ends) > 3 else float(ends.min())
+    low = min(low, float(ends.max()) - 1)
+    low -= 0.5 * (top - low)
+    axes.set_ylim(low, top + 0.08 * (top - low))
+    for label, rows in data.groupby("method", sort=False):
+        look = style[str(label)]
+        if rows.kind.iloc[0] == "curve":
+            axes.step(
+                rows.budget, rows["mean"], where="post", color=look.color, linestyle=look.dash
+            )
+            axes.fill_between(
+                rows.budget, rows.low, rows.high, step="post", color=look.color, alpha=0.2,
+                linewidth=0,
+            )  # fmt: skip
+        last = rows.iloc[-1]
+        x, y = max(last.budget, edge), max(last["mean"], low)
+        axes.plot(
+            x, y, look.marker, color=look.color, markersize=4, clip_on=False, zorder=4,
+            markeredgewidth=0.4, markeredgecolor=INK,
+        )  # fmt: skip
+        if last.front:
+            axes.plot(
+                x, y, "o", markersize=8, markerfacecolor="none", color=INK, clip_on=False,
+                markeredgewidth=0.7, zorder=5,
+            )  # fmt: skip
+    if optimum is not None:
+        axes.axhline(optimum, color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)))
+
+
+def _legend(figure: Figure, data: pd.DataFrame, labels: Sequence[str]) -> None:
+    style = looks(labels)
+    curves = set(data[data.kind == "curve"].method)
+    handles = [
+        Line2D(
+            [], [], color=style[label].color, marker=style[label].marker, markersize=4,
+            linestyle=style[label].dash if label in curves else "", markeredgecolor=INK,
+            markeredgewidth=0.4, label=short(label),
+        )
+        for label in labels
+    ]  # fmt: skip
+    ring = Line2D(
+        [], [], color=INK, linestyle="", marker="o", markersize=7, markerfacecolor="none",
+        label="Pareto front",
+    )  # fmt: skip
+    line = Line2D([], [], color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)), label="optimum")
+    figure.legend(
+        handles=[*handles, ring, line], loc="outside lower center", ncols=4, fontsize=SMALL
+    )

@@ -1,0 +1,170 @@
+"""Methods over all tasks: score profiles and performance profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.across_tasks import by_task, profile, scores_frame
+from analysis.figures.plot import Plot
+from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, missing
+from analysis.figures.style import SMALL, TWO, Look, letters, looks, short, styled
+from analysis.statistics import CONFIDENCE
+from analysis.study import SEED, Study
+from coartic import CoarticError
+from coartic.robot import Array
+
+LEARNER = "learner"
+"""The paper's learner on all tasks: EC1 where there is one hand, EC4 where there are two."""
+POINTS = 81
+_SHOWN = {
+    "corrective-alone/every",
+    "random-search/climbing",
+    "cma-es/bandit",
+    "nullspace-qp/next-goal",
+    "posture-based/two-goals",
+    "trajectory-optimisation/path-length",
+    "trajectory-optimisation/jerk",
+}
+FARTHEST = 0.16  # gap to the optimum at the right end of the performance profile
+
+
+@styled
+def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """Share of runs, each task counting the same, by normalised score and by gap.
+
+    Methods with runs on every task of the folder whose optimum is known; :data:`LEARNER`
+    joins the paper's conditions. Raises CoarticError where there is none.
+    """
+    scores = scores_frame(study.results)
+    tasks = list(scores.task.unique())
+    known = study.results.tasks
+    learners = {
+        name: CONDITIONS[0] if len(known[name].hands) == 1 else CONDITIONS[3] for name in tasks
+    }
+    joined = scores[scores.method == scores.task.map(learners)].assign(method=LEARNER)
+    scores = pd.concat([joined, scores], ignore_index=True)
+    if methods is None:
+        labels = (
+            [
+                label
+                for label in chosen(study, tasks, None)
+                if label in _SHOWN or label not in HEADLINES
+            ]
+            if tasks
+            else []
+        )
+        labels = [LEARNER, *labels]
+    else:
+        chosen(study, tasks, [label for label in methods if label != LEARNER])
+        labels = list(methods)
+    everywhere = [label for label in labels if set(by_task(scores, label)) == set(tasks)]
+    if not tasks or not everywhere or (methods and len(everywhere) < len(labels)):
+        raise _incomplete(study, tasks, [label for label in labels if label not in everywhere])
+    data = pd.concat([_profiles(scores, label) for label in everywhere], ignore_index=True)
+    names = ", ".join(tasks)
+    ends = data[(data.kind == "gap") & (data.threshold.round(6) == 0.05)]
+    words = "; ".join(
+        f"{_name(row['method'])}: {row['share']:.0%}" for row in ends.to_dict("records")
+    )
+    return Plot(
+        id="profiles",
+        title="Profiles over all tasks",
+        caption=(
+            f"Tasks {names}, each counting the same. a: share of runs with a normalised score "
+            "above the threshold, 0 the initial solution, 1 the optimum with all joints free "
+            "(score profile, Agarwal et al. 2021). b: share of runs whose gap to that optimum is "
+            "at most the threshold (after the performance profiles of Dolan & Moré 2002, the "
+            f"optimum in the place of the best solver). Bands: {CONFIDENCE:.0%} intervals, "
+            f"pointwise, runs resampled within tasks (seed {SEED}). Learner: EC1 on tasks with "
+            "one hand, EC4 on those with two."
+        ),
+        alt=f"Profiles over tasks. Share of runs within 5 % of the optimum: {words}.",
+        figure=_draw(data, everywhere),
+        data=data,
+    )
+
+
+def _incomplete(study: Study, tasks: Sequence[str], labels: Sequence[str]) -> CoarticError:
+    if not tasks:
+        return missing(study, "no task with a known optimum and an initial solution below it")
+    return missing(
+        study, f"no runs on every one of {', '.join(tasks)}: {', '.join(labels) or 'any method'}"
+    )
+
+
+def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
+    parts = []
+    thresholds: dict[str, Array] = {
+        "score": np.linspace(0.0, 1.0, POINTS),
+        "gap": np.linspace(0.0, FARTHEST, POINTS),
+    }
+    for kind, levels in thresholds.items():
+        found = profile(
+            by_task(scores, label, kind),
+            levels,
+            "above" if kind == "score" else "at most",
+            seed=SEED,
+        )
+        parts.append(
+            pd.DataFrame(
+                {
+                    "method": label,
+                    "kind": kind,
+                    "threshold": levels,
+                    "share": found.share,
+                    "low": found.low,
+                    "high": found.high,
+                    "runs": sum(found.n),
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)
+
+
+def _name(label: str) -> str:
+    return "learner (EC1, EC4)" if label == LEARNER else short(label)
+
+
+def _looks(labels: Sequence[str]) -> dict[str, Look]:
+    """The learner looks as its fourth condition does."""
+    found = looks([CONDITIONS[3], *(label for label in labels if label != LEARNER)])
+    return {LEARNER: found.pop(CONDITIONS[3]), **found}
+
+
+def _draw(data: pd.DataFrame, labels: Sequence[str]) -> Figure:
+    style = _looks(labels)
+    rows = -(-len(labels) // 3)
+    figure = Figure(figsize=(TWO, 2.35 + 0.15 * rows), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, (kind, curves) in zip(panels, data.groupby("kind", sort=False), strict=True):
+        for label, own in curves.groupby("method", sort=False):
+            look = style[str(label)]
+            width = 1.6 if label == LEARNER else 0.9
+            axes.plot(
+                own.threshold, own.share, color=look.color, linestyle=look.dash, linewidth=width
+            )
+            if (own.low < own.high).any():
+                axes.fill_between(
+                    own.threshold, own.low, own.high, color=look.color, alpha=0.15, linewidth=0
+                )
+        axes.set_xlim(0, 1 if kind == "score" else FARTHEST)
+        axes.set_ylim(-0.02, 1.02)
+        axes.set_xlabel(
+            "normalised score above" if kind == "score" else "gap to the optimum at most"
+        )
+        axes.set_title("Score" if kind == "score" else "Gap")
+    panels[0].set_ylabel("share of runs")
+    panels[1].set_xticks([0, 0.05, 0.1, 0.15], ["0", "5 %", "10 %", "15 %"])
+    letters(panels)
+    handles = [
+        Line2D([], [], color=style[label].color, linestyle=style[label].dash,
+               linewidth=1.6 if label == LEARNER else 0.9, label=_name(label))
+        for label in labels
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL)
+    return figure

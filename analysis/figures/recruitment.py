@@ -1,0 +1,141 @@
+"""Which hand hits which goal: shares of hand sequences, published beside ours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from analysis.figures.plot import Plot
+from analysis.figures.selection import CONDITIONS, chosen, has, known_tasks, missing, solved
+from analysis.figures.style import (
+    GREY,
+    INK,
+    PALETTE,
+    SMALL,
+    TWO,
+    dagger,
+    heading,
+    letters,
+    on,
+    short,
+    styled,
+)
+from analysis.published import RUNS, published_cell
+from analysis.study import Study
+from coartic import Task
+
+MOST = len(PALETTE)
+"""Sequences of a task that have a colour; the rarer ones share grey."""
+OTHERS = "others"
+
+
+@styled
+def recruitment(
+    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
+) -> Plot:
+    """Shares of hand sequences of each method, one panel a task with two hands.
+
+    Where the paper prints the number of runs of each sequence, its shares stand below ours.
+    Raises CoarticError where no method was run on a task with two hands.
+    """
+    found = {name: task for name, task in known_tasks(study, tasks).items() if len(task.hands) > 1}
+    if not found:
+        raise missing(study, "no task with two hands")
+    labels = chosen(study, list(found), methods)
+    data = pd.concat([_shares(study, name, labels) for name in found], ignore_index=True)
+    found = {name: task for name, task in found.items() if name in set(data.task)}
+    shares = data[data.source == "ours"].groupby("hands").share.sum()
+    printed = data[data.source == "published"].hands
+    common = shares.sort_values(ascending=False, kind="stable").index
+    order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
+    bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
+    figure = Figure(figsize=(TWO, 0.75 + 0.155 * max(bars)), layout="constrained")
+    panels = figure.subplots(1, len(found), squeeze=False)[0]
+    for axes, task in zip(panels, found.values(), strict=True):
+        _panel(axes, task, data[data.task == task.name], order)
+    letters(panels)
+    _legend(figure, order)
+    words = "; ".join(
+        f"{task}, {short(str(label))}{'' if source == 'ours' else ', published'}: "
+        + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
+        for (task, label, source), rows in data.groupby(["task", "method", "source"], sort=False)
+    )
+    return Plot(
+        id="recruitment",
+        title="Hand sequences",
+        caption=(
+            "Share of runs by hand sequence (L left, R right, goal by goal); the number is that "
+            f"of runs. Hatched: published. Rare sequences are grey."
+            f"{dagger(found.values())}"
+        ),
+        alt=f"Stacked bars of hand sequences. {words}.",
+        figure=figure,
+        data=data,
+    )
+
+
+def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
+    """One row a method, source and sequence, the commonest first."""
+    rows = []
+    for label in labels:
+        if not has(study, task, label):
+            continue
+        counts = solved(study, task, label).good.hands.value_counts()
+        rows += [(task, label, "ours", str(hands), int(n)) for hands, n in counts.items()]
+        paper = None
+        if label in CONDITIONS:
+            paper = published_cell(task, label.removeprefix("dual-process/"))
+        printed = [(s.hands, s.runs) for s in paper.sequences if s.runs] if paper else []
+        if sum(runs for _, runs in printed) == RUNS:
+            rows += [(task, label, "published", hands, runs) for hands, runs in printed]
+    frame = pd.DataFrame(rows, columns=["task", "method", "source", "hands", "runs"])
+    totals = frame.groupby(["method", "source"]).runs.transform("sum")
+    return frame.assign(share=frame.runs / totals)
+
+
+def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None:
+    colors = _colors(order)
+    names = []
+    groups = data.groupby(["method", "source"], sort=False)
+    for place, ((label, source), rows) in enumerate(groups):
+        left = 0.0
+        for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["hands"])):
+            axes.barh(
+                -place, row["share"], 0.78, left=left, color=colors.get(row["hands"], GREY),
+                edgecolor=INK, linewidth=0.4, hatch="" if source == "ours" else "//////",
+            )  # fmt: skip
+            if row["share"] >= 0.08 and source == "ours":
+                axes.text(
+                    left + row["share"] / 2, -place, str(row["runs"]), ha="center", va="center",
+                    fontsize=6, color=on(colors.get(row["hands"], GREY)),
+                )  # fmt: skip
+            left += row["share"]
+        name = short(str(label))
+        names.append(name if source == "ours" else "published")
+    axes.set_yticks([-place for place in range(len(names))], names)
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(-len(names) + 0.5, 0.5)
+    axes.set_xlim(0, 1)
+    axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
+    axes.spines["left"].set_visible(False)
+    axes.set_title(heading(task))
+
+
+def _colors(order: Sequence[str]) -> dict[str, str]:
+    return dict(zip(order[:MOST], PALETTE, strict=False))
+
+
+def _legend(figure: Figure, order: Sequence[str]) -> None:
+    colors = _colors(order) | ({OTHERS: GREY} if len(order) > MOST else {})
+    handles = [
+        Patch(facecolor=color, edgecolor=INK, linewidth=0.4, label=hands)
+        for hands, color in colors.items()
+    ]
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=len(handles), fontsize=SMALL,
+        handlelength=1.0, columnspacing=1.2,
+    )  # fmt: skip

@@ -1,0 +1,96 @@
+"""The robot and its goals, by the conventions of the paper's figures.
+
+Open squares mark the left arm, closed circles the right one, open circles the goals
+with their number above (paper, Figures 1, 4 and 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Polygon
+
+from analysis.figures.style import GREY, INK, PAPER, SMALL
+from coartic import Hand, Task
+from coartic.robot import Array
+
+MARKERS: dict[Hand, dict[str, Any]] = {
+    # Squares are larger than circles, so that hands at one place show both.
+    "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": PAPER},
+    "right": {"marker": "o", "markersize": 2.6},
+}
+MARGIN = 0.45  # length unit around what is drawn
+
+
+def draw_robot(
+    axes: Axes, task: Task, q: Array, *, marked: Iterable[Hand] = (), color: str = INK
+) -> None:
+    """Draw base and arms in configuration ``q`` (dof,), joints of ``marked`` arms marked."""
+    marked = tuple(marked)
+    outline = task.robot.base_outline(q)
+    axes.add_patch(
+        Polygon(outline, closed=True, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5)
+    )
+    axes.add_patch(
+        Polygon(outline, closed=True, fill=False, edgecolor=color, linewidth=0.6, zorder=1.6)
+    )
+    for hand in task.hands:
+        style = MARKERS[hand] if hand in marked else {}
+        axes.plot(
+            *task.robot.joint_positions(q, hand).T,
+            color=color,
+            linewidth=0.9,
+            markeredgecolor=color,
+            markeredgewidth=0.7,
+            **style,
+        )
+
+
+def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
+    """Draw every goal as an open circle of its radius with its number above.
+
+    With ``current``, a goal's number from 1, the others are grey.
+    """
+    for index, (x, y) in enumerate(task.goals, 1):
+        color = INK if current in (None, index) else GREY
+        axes.add_patch(
+            Circle((x, y), task.radius, fill=False, edgecolor=color, linewidth=0.7, zorder=3)
+        )
+        axes.annotate(
+            str(index), (x, y + task.radius), (0, 1.5), textcoords="offset points",
+            ha="center", va="bottom", fontsize=SMALL, color=color,
+        )  # fmt: skip
+
+
+def legend_entries(hands: Iterable[Hand]) -> list[Line2D]:
+    """Handles for the arms of ``hands`` and a goal."""
+    hands = set(hands)
+    entries = [
+        Line2D(
+            [],
+            [],
+            color=INK,
+            linewidth=0.9,
+            markeredgecolor=INK,
+            label=f"{hand} arm",
+            **MARKERS[hand],
+        )
+        for hand in MARKERS
+        if hand in hands
+    ]
+    goal: dict[str, Any] = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
+    return [*entries, Line2D([], [], linestyle="", markeredgecolor=INK, label="goal", **goal)]
+
+
+def box(task: Task, postures: Iterable[Array]) -> tuple[Array, Array]:
+    """Corners of what shows a task with the robot in all these configurations, with a margin."""
+    points = [task.goal_array + np.array([0, 2 * task.radius])]
+    for q in postures:
+        points.append(task.robot.base_outline(q))
+        points += [task.robot.joint_positions(q, hand) for hand in task.hands]
+    cloud = np.concatenate(points)
+    return cloud.min(axis=0) - MARGIN, cloud.max(axis=0) + MARGIN

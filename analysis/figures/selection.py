@@ -1,0 +1,97 @@
+"""Which methods and tasks a figure shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from analysis.results import CellRuns
+from analysis.study import Study
+from coartic import CoarticError, Task
+from coartic.robot import Array
+
+CONDITIONS = tuple(f"dual-process/EC{number}" for number in range(1, 5))
+HEADLINES = (
+    *CONDITIONS,
+    "corrective-alone/given",
+    "corrective-alone/every",
+    "random-search/pure",
+    "random-search/climbing",
+    "cma-es/bandit",
+    "nullspace-qp/none",
+    "nullspace-qp/next-goal",
+    "posture-based/one-goal",
+    "posture-based/two-goals",
+    "trajectory-optimisation/path-length",
+    "trajectory-optimisation/squared-changes",
+    "trajectory-optimisation/acceleration",
+    "trajectory-optimisation/jerk",
+    "optimum/branch-and-bound",
+)
+"""Methods that stand for their families where none are named, in the order of figures."""
+_FAMILIES = {label.partition("/")[0] for label in HEADLINES}
+
+
+def headline(study: Study, tasks: Iterable[str]) -> list[str]:
+    """Labels of the default methods that have solved runs on one of the tasks.
+
+    Those of :data:`HEADLINES`, then methods that are not the project's own; all where there
+    is neither.
+    """
+    tasks = set(tasks)
+    found = {
+        label: cell.method
+        for (task, label), cell in study.cells.items()
+        if task in tasks and len(cell.good)
+    }
+    others = [
+        label for label, method in found.items() if method.partition("/")[0] not in _FAMILIES
+    ]
+    return [label for label in HEADLINES if label in found] + others or list(found)
+
+
+def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) -> list[str]:
+    """``methods``, or the default ones; CoarticError where one has no solved run there."""
+    if methods is None:
+        labels = headline(study, tasks)
+        if not labels:
+            raise missing(study, f"no method has a solved run on {', '.join(tasks) or 'any task'}")
+        return labels
+    for label in methods:
+        if not any(has(study, task, label) for task in tasks):
+            known = sorted({own for _, own in study.cells})
+            raise missing(
+                study, f"no solved run of {label} on {', '.join(tasks)}; methods: {known}"
+            )
+    return list(methods)
+
+
+def known_tasks(study: Study, tasks: Sequence[str] | None) -> dict[str, Task]:
+    """The tasks of a folder, or those named; CoarticError for one that it does not have."""
+    found = study.results.tasks
+    for name in tasks or ():
+        if name not in found:
+            raise missing(study, f"no task {name!r}; it has {', '.join(found)}")
+    return {name: found[name] for name in (found if tasks is None else tasks)}
+
+
+def has(study: Study, task: str, label: str) -> bool:
+    """Whether a method has a solved run on a task."""
+    cell = study.cells.get((task, label))
+    return cell is not None and len(cell.good) > 0
+
+
+def solved(study: Study, task: str, label: str) -> CellRuns:
+    """A cell with at least one solved run; CoarticError where there is none."""
+    if not has(study, task, label):
+        raise missing(study, f"no solved run of {label} on {task}")
+    return study.cells[task, label]
+
+
+def rewards_of(cell: CellRuns) -> Array:
+    """Rewards of the solved runs, shape ``(runs,)``."""
+    return cell.good.reward.to_numpy(dtype="float64")
+
+
+def missing(study: Study, what: str) -> CoarticError:
+    """The error of a figure that the folder's runs do not allow."""
+    return CoarticError(f"{study.results.folder}: {what}")

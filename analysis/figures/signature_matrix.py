@@ -1,0 +1,168 @@
+"""Methods by signatures of coarticulation, as a matrix of values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from analysis.figures.plot import Plot
+from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.style import GREY, TWO, dagger, number, on, short, styled
+from analysis.study import Study
+from coartic import Task
+
+SIGNATURES = {
+    "first subtask against initial": "first subtask",
+    "total against initial": "total",
+    "subtask against isolated reach": "against isolated reach",
+    "hand entropy": "hand entropy",
+    "hand as in isolation": "hand as in isolation",
+    "preshaping of the other arm": "preshaping",
+    "travel of the other arm": "other arm's travel",
+    "base reversals": "base reversals",
+    "turning angle": "turning angle",
+    "hand path SPARC": "SPARC",
+    "hand path log dimensionless jerk": "log jerk",
+    "ΔV z": "ΔV z",
+    "context distance": "context distance",
+    "context dependence": "context dependence",
+    "motor-equivalent part": "motor-equivalent",
+    "non-motor-equivalent part": "moves the hand",
+}
+"""Signatures of a column each, and the column's heading."""
+LIMIT = 2.0  # standard deviations at which colours saturate
+_MAP = "PuOr_r"
+
+
+@styled
+def signature_matrix(
+    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
+) -> list[Plot]:
+    """One matrix a task: a row a method, a column a signature that some method has there.
+
+    The value of a cell is the mean over the places (goals, coordinates) of the signature.
+    Raises CoarticError where no method has a signature on any of the tasks.
+    """
+    plots = []
+    for name, task in known_tasks(study, tasks).items():
+        frame = study.signatures
+        labels = chosen(study, [name], methods) if (frame.task == name).any() else []
+        data = _values(frame[(frame.task == name) & frame.label.isin(labels)], labels)
+        if data.value.notna().any():
+            plots.append(_plot(task, data))
+    if not plots:
+        raise missing(study, "no solved run on any of the tasks: there are no signatures")
+    return plots
+
+
+def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
+    """One row a method and signature: value, standardised value, or why there is none."""
+    rows = []
+    for label in labels:
+        own = frame[frame.label == label]
+        for name in SIGNATURES:
+            part = own[own.signature == name]
+            known = part.value.dropna()
+            why = next((text for text in part.why_not if text), "")
+            rows.append(
+                {
+                    "method": label,
+                    "signature": name,
+                    "value": float(known.mean()) if len(known) else math.nan,
+                    "places": len(known),
+                    "unit": next((unit for unit in part.unit if unit), ""),
+                    "why_not": "" if len(known) else why,
+                }
+            )
+    columns = "method signature value places unit why_not"
+    data = pd.DataFrame(rows, columns=columns.split())
+    by_name = data.groupby("signature").value
+    spread = by_name.transform("std").replace(0.0, math.nan)
+    standard = (data.value - by_name.transform("mean")) / spread
+    return data.assign(standardised=standard.where(data.value.isna(), standard.fillna(0.0)))
+
+
+def _plot(task: Task, data: pd.DataFrame) -> Plot:
+    values = data.pivot_table(
+        index="method", columns="signature", values="value", sort=False, dropna=False
+    )
+    columns = [name for name in SIGNATURES if values[name].notna().any()]
+    labels = list(data.method.unique())
+    shown = data[data.signature.isin(columns)].reset_index(drop=True)
+    left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
+    above, right, tall = 1.12, 0.55, 0.19  # inches
+    side = min((TWO - left - right) / len(columns), 0.6)
+    width, height = left + side * len(columns) + right, above + tall * len(labels) + 0.06
+    figure = Figure(figsize=(width, height))
+    axes = figure.add_axes(
+        (
+            left / width,
+            0.06 / height,
+            side * len(columns) / width,
+            tall * len(labels) / height,
+        )
+    )
+    colors = colormaps[_MAP]
+    cells = shown.set_index(["method", "signature"])
+    for y, label in enumerate(labels):
+        for x, name in enumerate(columns):
+            value = float(cells.value[label, name])
+            if math.isnan(value):
+                axes.add_patch(
+                    Rectangle(
+                        (x, y), 1, 1, facecolor="none", edgecolor=GREY, hatch="/////", linewidth=0
+                    )
+                )
+                continue
+            shade = float(cells.standardised[label, name]) / (2 * LIMIT) + 0.5
+            color = to_hex(colors(min(max(shade, 0.0), 1.0)))
+            axes.add_patch(
+                Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3)
+            )
+            axes.text(
+                x + 0.5, y + 0.52, _figures(value), ha="center", va="center", fontsize=6,
+                color=on(color),
+            )  # fmt: skip
+    axes.set_xlim(0, len(columns))
+    axes.set_ylim(len(labels), 0)
+    axes.set_yticks(np.arange(len(labels)) + 0.5, [short(label) for label in labels])
+    axes.xaxis.tick_top()
+    axes.set_xticks(
+        np.arange(len(columns)) + 0.5, [SIGNATURES[name] for name in columns],
+        rotation=50, ha="left", rotation_mode="anchor",
+    )  # fmt: skip
+    axes.tick_params(length=0, pad=2)
+    axes.spines[:].set_visible(False)
+    return Plot(
+        id=f"signatures-{task.name}",
+        title=f"Signatures of coarticulation: {task.label}",
+        caption=(
+            f"{task.label}: signatures (docs/signatures.md), each the mean over its goals or "
+            "coordinates and over runs. Colour: the value standardised over the methods shown, "
+            f"signature by signature, purple low, orange high, from −{LIMIT:.0f} to "
+            f"+{LIMIT:.0f} SD; neither is good in itself. "
+            "First subtask and total: ticks more than in the initial solution. Hatched: does not "
+            f"apply, or there are too few runs.{dagger([task])}"
+        ),
+        alt=(
+            f"Matrix of {len(labels)} methods ({', '.join(map(short, labels))}) by "
+            f"{len(columns)} signatures on {task.label}; its numbers are in the table."
+        ),
+        figure=figure,
+        data=shown,
+    )
+
+
+def _figures(value: float) -> str:
+    """Three figures at most."""
+    size = abs(value)
+    digits = 0 if size >= 99.5 else 1 if size >= 9.95 else 2 if size >= 0.0995 or not size else 3
+    text = number(value, digits)
+    return text.lstrip("−") if float(f"{value:.{digits}f}") == 0 else text

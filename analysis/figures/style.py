@@ -1,0 +1,228 @@
+"""One style for all figures: sizes, colours, marks and short names.
+
+Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on
+white. All are legible on white and on #111; marks and dashes tell what colours tell.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Any, NamedTuple, ParamSpec, TypeVar
+
+from matplotlib import style
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from coartic import Task
+
+INCH = 25.4  # mm
+ONE = 85 / INCH
+"""Width of one journal column, inches."""
+TWO = 178 / INCH
+"""Width of two."""
+TALLEST = 225 / INCH
+"""Height of a page that leaves room for a caption."""
+SMALL, NORMAL = 7.0, 8.0  # pt
+INK, PAPER = "#000000", "#ffffff"
+GREY = "#8a8a8a"
+BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
+    "#0072b2",
+    "#56b4e9",
+    "#009e73",
+    "#e69f00",
+    "#d55e00",
+    "#cc79a7",
+)
+PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
+MARKERS = "osD^vPXd"
+DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.2, 1, 1.2)))
+RC: Any = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": SMALL,
+    "axes.titlesize": NORMAL,
+    "axes.titlelocation": "left",
+    "axes.labelsize": SMALL,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.use_mathtext": False,
+    "axes.unicode_minus": True,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "xtick.minor.size": 1.5,
+    "ytick.minor.size": 1.5,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.5,
+    "lines.markeredgewidth": 0.8,
+    "hatch.linewidth": 0.4,
+    "legend.fontsize": SMALL,
+    "legend.frameon": False,
+    "legend.handlelength": 2.4,
+    "pdf.fonttype": 42,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "coartic",
+    "text.parse_math": False,
+}
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def styled(function: Callable[P, T]) -> Callable[P, T]:
+    """Draw with this style and matplotlib's defaults, whatever the user has set."""
+
+    @wraps(function)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> T:
+        with style.context(["default", RC]):
+            return function(*args, **kwargs)
+
+    return inside
+
+
+class Look(NamedTuple):
+    """How a method is drawn."""
+
+    color: str
+    dash: Any
+    marker: str
+
+
+_KNOWN = {
+    "dual-process/EC1": Look(BLUE, DASHES[0], "o"),
+    "dual-process/EC2": Look(SKY, DASHES[0], "s"),
+    "dual-process/EC3": Look(GREEN, DASHES[0], "D"),
+    "dual-process/EC4": Look(VERMILLION, DASHES[0], "^"),
+    "corrective-alone/given": Look(GREY, DASHES[3], "v"),
+    "corrective-alone/every": Look(GREY, DASHES[1], "P"),
+    "random-search/pure": Look(ORANGE, DASHES[2], "X"),
+    "random-search/climbing": Look(ORANGE, DASHES[1], "s"),
+    "cma-es/bandit": Look(PURPLE, DASHES[1], "D"),
+    "cma-es/every": Look(PURPLE, DASHES[2], "d"),
+    "nullspace-qp/none": Look(BLUE, DASHES[2], "<"),
+    "nullspace-qp/next-goal": Look(BLUE, DASHES[3], "p"),
+    "posture-based/one-goal": Look(GREEN, DASHES[2], "v"),
+    "posture-based/two-goals": Look(GREEN, DASHES[1], "^"),
+    "trajectory-optimisation/path-length": Look(INK, DASHES[0], "*"),
+    "trajectory-optimisation/squared-changes": Look(INK, DASHES[1], "h"),
+    "trajectory-optimisation/acceleration": Look(INK, DASHES[3], "X"),
+    "trajectory-optimisation/jerk": Look(INK, DASHES[2], "d"),
+}
+
+
+def looks(labels: Iterable[str]) -> dict[str, Look]:
+    """Colour, dash and mark of each method: the project's own look the same in all figures."""
+    free = itertools.cycle(
+        Look(color, dash, marker)
+        for (dash, color), marker in zip(
+            itertools.product((*DASHES[1:], DASHES[0]), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)),
+            itertools.cycle(MARKERS),
+            strict=False,
+        )
+    )
+    return {label: _KNOWN.get(label) or next(free) for label in dict.fromkeys(labels)}
+
+
+_SHORT = {
+    "corrective-alone/given": "corrective alone",
+    "corrective-alone/every": "corrective, best hands",
+    "random-search/pure": "random search",
+    "random-search/climbing": "hill climbing",
+    "trajectory-optimisation/path-length": "plan: path length",
+    "trajectory-optimisation/squared-changes": "plan: squared changes",
+    "optimum/dynamic-programming": "optimum, DP",
+    "optimum/branch-and-bound": "optimum, proof",
+    "optimum/multistart": "optimum, multistart",
+}
+_FAMILIES = {
+    "dual-process/": "",
+    "cma-es/": "CMA-ES, ",
+    "nullspace-qp/": "QP: ",
+    "posture-based/": "postures: ",
+    "trajectory-optimisation/": "plan: ",
+}
+_VARIANTS = {
+    "other_arm=": "other arm ",
+    "noise_sd=": "σ ",
+    "epsilon=": "ε ",
+    "hands=": "hands ",
+    "timing=fixed": "fixed times",
+}
+
+
+def short(label: str) -> str:
+    """The name of a method with its variant as figures show it."""
+    method, _, variant = label.partition(" ")
+    name = _SHORT.get(method)
+    if name is None:
+        name = method
+        for family, instead in _FAMILIES.items():
+            if method.startswith(family):
+                name = (instead + method.removeprefix(family)).replace("-", " ")
+                name = name.replace("CMA ES", "CMA-ES")
+    for key, words in _VARIANTS.items():
+        variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
+    return f"{name} ({variant.replace('_', ' ')})" if variant else name
+
+
+def heading(task: Task) -> str:
+    """A task's name above a panel, with a dagger where it is reconstructed."""
+    # Variants of a task share its title, but not its name.
+    name = task.label if task.label.lower().replace(" ", "-") == task.name else task.name
+    return f"{name} †" if task.reconstructed else name
+
+
+def dagger(tasks: Iterable[Task]) -> str:
+    """What the dagger means, for a caption; empty where no task is reconstructed."""
+    if not any(task.reconstructed for task in tasks):
+        return ""
+    return " † Reconstructed: what the paper does not print of this task was inferred."
+
+
+def number(value: float, digits: int = 0) -> str:
+    """A number with a true minus sign."""
+    return f"{value:.{digits}f}".replace("-", "−")
+
+
+def grid(panels: int, tall: float, legend: float) -> tuple[int, int, float]:
+    """Rows, columns and height in inches of panels that are ``tall`` where the page allows."""
+    columns = min(2 if panels <= 6 else 3, panels)
+    rows = -(-panels // columns)
+    return rows, columns, min(tall * rows + legend, TALLEST)
+
+
+def on(color: str) -> str:
+    """Colour of text on a filled area; neither is the ink, which changes with the page."""
+    red, green, blue = (int(color[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return "#111111" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.42 else "#fdfdfd"
+
+
+def amount(value: float, _: object = None) -> str:
+    """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
+    if not value:
+        return "0"
+    sizes = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+    size, unit = next(((s, u) for s, u in sizes if abs(value) >= 0.999 * s), sizes[-1])
+    return f"{value / size:.3g}{unit}"
+
+
+def log_axis(axes: Axes) -> None:
+    """A logarithmic x axis with plain numbers at whole decades."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(FuncFormatter(amount))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def letters(panels: Iterable[Axes]) -> None:
+    """Name panels a, b, ... before their titles."""
+    for letter, axes in zip("abcdefghijklmnop", panels, strict=False):
+        axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left")

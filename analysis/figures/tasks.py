@@ -1,0 +1,89 @@
+"""The tasks: start configurations and goals (paper, Figure 4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.figures.plot import Plot
+from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
+from analysis.figures.style import NORMAL, SMALL, TALLEST, TWO, styled
+from coartic import Task
+
+
+@styled
+def tasks_plot(tasks: Sequence[Task]) -> Plot:
+    """Start configuration and goals of each task in one panel each.
+
+    Raises ValueError without a task.
+    """
+    if not tasks:
+        raise ValueError("no task to draw")
+    boxes = [box(task, [task.q0]) for task in tasks]
+    width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
+    columns = min(2 if len(tasks) <= 6 else 3, len(tasks))
+    rows = math.ceil(len(tasks) / columns)
+    above, around = 0.62, 0.55  # inches of a panel for title and axes
+    scale = min(
+        (TWO / columns - around) / width, (TALLEST - 0.3 - rows * above) / rows / height, 0.42
+    )
+    size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
+    figure = Figure(figsize=(max(size[0], 2.2), size[1]), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes, task, corners in zip(panels, tasks, boxes, strict=False):
+        draw_robot(axes, task, task.q0, marked=task.hands)
+        draw_goals(axes, task)
+        axes.set_title(_title(task), fontsize=NORMAL, wrap=True)
+        x, y = (corners[0] + corners[1]) / 2
+        axes.set_xlim(x - width / 2, x + width / 2)
+        axes.set_ylim(y - height / 2, y + height / 2)
+        axes.set_aspect("equal")
+        axes.set_xlabel("x (length unit)")
+        axes.set_ylabel("y (length unit)")
+    for axes in panels[len(tasks) :]:
+        axes.set_axis_off()
+    figure.legend(
+        handles=legend_entries(hand for task in tasks for hand in task.hands),
+        loc="outside lower center",
+        ncols=3,
+        fontsize=SMALL,
+    )
+    names = ", ".join(task.name for task in tasks)
+    return Plot(
+        id="tasks",
+        title="Tasks",
+        caption=(
+            "Start configuration and goals of each task. Open squares: left arm; closed "
+            "circles: right arm; open circles, to scale: goals, hit in the order of their "
+            "numbers. After Figure 4 of Shah, Barto & Fagg (2013)."
+        ),
+        alt=f"Schematics of the tasks {names}: robot in its start configuration, goals.",
+        figure=figure,
+        data=_data(tasks),
+    )
+
+
+def _title(task: Task) -> str:
+    """Name, what is reconstructed, and what is locked; two lines where there is more."""
+    remarks = []
+    if task.reconstructed:
+        remarks.append(f"{' and '.join(task.reconstructed)} reconstructed")
+    if task.locked_base:
+        remarks.append(f"base locked in {' and '.join(task.locked_base)}")
+    return "\n".join([task.label, "; ".join(remarks)]).strip()
+
+
+def _data(tasks: Sequence[Task]) -> pd.DataFrame:
+    """One row a goal, after one for the start with its configuration."""
+    rows: list[dict[str, object]] = []
+    for task in tasks:
+        start = dict(zip(task.robot.joint_names, task.q0.tolist(), strict=True))
+        rows.append({"task": task.name, "goal": 0, **start})
+        rows += [
+            {"task": task.name, "goal": index, "x": x, "y": y, "radius": task.radius}
+            for index, (x, y) in enumerate(task.goals, 1)
+        ]
+    return pd.DataFrame(rows)

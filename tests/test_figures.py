@@ -1,0 +1,334 @@
+"""Figures: what they show is what the runs say; files are the same every time."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.figures import all_figures
+from analysis.figures.bars import bars, stars
+from analysis.figures.configurations import configurations, paper_configurations, typical_run
+from analysis.figures.context import context
+from analysis.figures.frontier import frontier
+from analysis.figures.learning_curves import learning_curves
+from analysis.figures.plot import FORMATS, save, svg_text, write
+from analysis.figures.profiles import profiles
+from analysis.figures.published import published
+from analysis.figures.recruitment import recruitment
+from analysis.figures.signature_matrix import signature_matrix
+from analysis.figures.style import _KNOWN, amount, looks, number, on, short
+from analysis.figures.tasks import tasks_plot
+from analysis.study import Study
+from benchmarks.suites import load_suite, select_cells
+from coartic import CoarticError, corrective_trial, execute, load_task
+from coartic.frames import movements_from
+
+from .test_harness import KNOWN, run_and_write
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return Study(run_and_write(tmp_path_factory.mktemp("figures"), runs=4, trials=120))
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """A folder without the learner, one task."""
+    cells = select_cells(
+        load_suite("comparison"), KNOWN, tasks=["descending"], methods=["corrective-alone/given"]
+    )
+    return Study(run_and_write(tmp_path_factory.mktemp("alone"), cells=cells, runs=1))
+
+
+@pytest.fixture(scope="module")
+def figures(study):
+    return all_figures(study)
+
+
+def test_every_figure_of_the_papers_cells(figures):
+    ids = [plot.id for plot in figures.plots]
+    assert ids[:5] == [
+        "tasks",
+        "configurations-one-armed",
+        "configurations-two-armed-1",
+        "configurations-two-armed-2",
+        "learned-reward",
+    ]
+    assert len(set(ids)) == len(ids)
+    # Published means are of 10 000 trials, these runs of 120.
+    assert set(figures.skipped) == {"published"}
+    assert "10000 trials" in figures.skipped["published"]
+    for plot in figures.plots:
+        assert re.fullmatch(r"[a-z0-9-]+", plot.id)
+        assert len(plot.alt) > 30
+        assert len(plot.caption) > 60
+        assert len(plot.data)
+        assert plot.figure.get_size_inches()[0] * 25.4 <= 178.001
+        assert plot.figure.get_size_inches()[1] * 25.4 <= 240
+
+
+def test_a_folder_without_the_learner(alone):
+    figures = all_figures(alone)
+    assert {"learned-reward", "published", "recruitment", "context"} <= set(figures.skipped)
+    assert any(name.startswith("configurations") for name in figures.skipped)
+    assert all(figures.skipped.values())
+    assert figures.plots[0].id == "tasks"
+    with pytest.raises(CoarticError, match=r"no solved run of dual-process/EC1 on descending"):
+        configurations(alone, [("descending", ["dual-process/EC1"])])
+    with pytest.raises(CoarticError, match=r"no task ascending"):
+        configurations(alone, [("ascending", [])])
+    with pytest.raises(CoarticError, match=r"no task 'nope'; it has descending"):
+        bars(alone, tasks=["nope"])
+    with pytest.raises(CoarticError, match=r"no solved run of cma-es/bandit on descending"):
+        frontier(alone, methods=["cma-es/bandit"])
+    with pytest.raises(CoarticError, match="no task with two hands"):
+        recruitment(alone)
+
+
+def test_bars_are_means_of_the_runs(study):
+    runs = study.results.runs
+    data = bars(study).data
+    assert len(data) == 7  # three conditions and two, each task with its initial solution
+    for row in data[data.method != "initial"].itertuples():
+        own = runs[(runs.task == row.task) & (runs.method == row.method)].reward
+        assert row.reward == pytest.approx(own.astype(float).mean())
+        assert row.low <= row.reward <= row.high
+        assert np.isnan(row.p) or row.p <= row.p_holm <= 1
+    first = data[data.method == "initial"].set_index("task")
+    for name in ("two-armed-1", "two-armed-2"):
+        assert first.reward[name] == corrective_trial(load_task(name), "RRRR").reward
+    assert first.published.to_dict() == {"two-armed-1": -675, "two-armed-2": -357}
+    # The bars themselves: from the initial solution to the mean.
+    panel = bars(study).figure.axes[0]
+    shown = [(bar.get_y(), bar.get_y() + bar.get_height()) for bar in panel.patches]
+    expected = data[(data.task == "two-armed-1") & (data.method != "initial")].reward
+    assert [bottom for bottom, _ in shown] == [first.reward["two-armed-1"]] * 3
+    assert [top for _, top in shown] == pytest.approx(expected.tolist())
+
+
+def test_stars():
+    assert [stars(p) for p in (0.0009, 0.001, 0.04, 0.05, float("nan"))] == [
+        "***", "**", "*", "n.s.", "–",
+    ]  # fmt: skip
+
+
+def test_configurations_are_those_of_the_stored_run(study):
+    plots, skipped = paper_configurations(study)
+    assert not skipped
+    solutions, paths = study.results.solutions(), study.results.paths()
+    for plot in plots:
+        for (name, run_id), rows in plot.data.groupby(["task", "run_id"]):
+            task = load_task(name)
+            if run_id:
+                own = solutions[solutions.run_id == run_id]
+                execution = execute(task, movements_from(task, own, paths))
+                assert f"run {run_id}" in plot.caption
+            else:
+                execution = corrective_trial(task, "R" * len(task.goals))
+            q = rows[list(task.robot.joint_names)].to_numpy()
+            np.testing.assert_array_equal(q, [task.q0, *execution.configurations])
+            assert rows.reward.sum() == execution.reward == rows.total.iloc[0]
+            assert rows.goal.tolist() == list(range(len(task.goals) + 1))
+    # The chosen hand touches the goal's disc in what is drawn.
+    axes = plots[0].figure.axes[0]
+    marked = [line for line in axes.lines if line.get_marker() == "o"]
+    tip = np.array(marked[-1].get_xydata()[-1])
+    assert np.linalg.norm(tip - load_task("ascending").goals[0]) <= 0.1
+
+
+def test_the_typical_run(study):
+    cell = study.cells["two-armed-1", "dual-process/EC3"].good
+    run_id = typical_run(study, "two-armed-1", "dual-process/EC3")
+    row = cell[cell.run_id == run_id].iloc[0]
+    counts = cell.hands.value_counts()
+    assert counts[row.hands] == counts.max()
+    same = cell[cell.hands == row.hands].reward.astype(float)
+    median = cell.reward.astype(float).median()
+    assert abs(row.reward - median) == (same - median).abs().min()
+    other = next(name for name in cell.run_id if name != run_id)
+    plot = configurations(
+        study,
+        [("two-armed-1", ["dual-process/EC3"])],
+        runs={("two-armed-1", "dual-process/EC3"): other},
+    )
+    assert set(plot.data.run_id) == {"", other}
+    with pytest.raises(CoarticError, match="0000 is no solved run of dual-process/EC3"):
+        configurations(
+            study,
+            [("two-armed-1", ["dual-process/EC3"])],
+            runs={("two-armed-1", "dual-process/EC3"): "0000"},
+        )
+
+
+def test_learning_curves_against_a_loop(study):
+    window = 7
+    data = learning_curves(study, window=window).data
+    learning = study.results.learning()
+    ids = study.cells["two-armed-2", "dual-process/EC4"].good.run_id
+    runs = [
+        learning[learning.run_id == run].reward.to_numpy(dtype=float, na_value=np.nan)
+        for run in ids
+    ]
+    rows = data[(data.task == "two-armed-2") & (data.method == "dual-process/EC4")]
+    assert rows.trial.iloc[[0, -1]].tolist() == [1, 120]
+    for row in rows.itertuples():
+        best = [np.nanmax(run[: row.trial]) for run in runs]
+        assert row.best == pytest.approx(np.mean(best))
+        assert (row.best_low, row.best_high) == pytest.approx(np.quantile(best, [0.25, 0.75]))
+        last = np.concatenate([run[max(row.trial - window, 0) : row.trial] for run in runs])
+        assert row.trials == pytest.approx(np.nanmean(last))
+    assert learning_curves(study, log=False).figure.axes[0].get_xscale() == "linear"
+
+
+def test_shares_of_hand_sequences(study):
+    data = recruitment(study).data
+    ours = data[data.source == "ours"]
+    for (task, label), rows in ours.groupby(["task", "method"]):
+        counts = study.cells[task, label].good.hands.value_counts()
+        assert dict(zip(rows.hands, rows.runs, strict=True)) == counts.to_dict()
+    assert data.groupby(["task", "method", "source"]).share.sum().to_numpy() == pytest.approx(1)
+    paper = data[(data.source == "published") & (data.method == "dual-process/EC2")]
+    assert dict(zip(paper.hands, paper.runs, strict=True)) == {"RRLR": 11, "RRRR": 9}
+
+
+def test_context_parts_are_the_signatures(study):
+    (row,) = context(study).data.itertuples()
+    frame = study.signatures.dropna(subset="value").set_index("signature").value
+    assert (row.task, row.method, row.runs) == ("ascending", "dual-process/EC1", 8)
+    assert row.equivalent == frame["motor-equivalent part"]
+    assert row.other == frame["non-motor-equivalent part"]
+    with pytest.raises(CoarticError, match="no method has solved runs on two tasks"):
+        context(study, tasks=["ascending"])
+
+
+def test_signature_matrices(study):
+    plots = {plot.id: plot.data for plot in signature_matrix(study)}
+    data = plots["signatures-two-armed-1"]
+    own = data[data.signature == "hand entropy"]
+    frame = study.signatures
+    for row in own.itertuples():
+        found = frame[
+            (frame.task == "two-armed-1")
+            & (frame.label == row.method)
+            & (frame.signature == "hand entropy")
+        ]
+        assert row.value == found.value.iloc[0]
+    known = data[data.groupby("signature").value.transform("std") > 0]
+    scores = known.groupby("signature").standardised
+    assert scores.mean().to_numpy() == pytest.approx(0, abs=1e-9)
+    assert scores.std().to_numpy() == pytest.approx(1)
+    one = plots["signatures-ascending"]  # one method: nothing to standardise by
+    assert set(one.standardised.dropna()) == {0.0}
+
+
+def test_frontier_and_profiles(study):
+    plots = {plot.id: plot.data for plot in frontier(study, spends=("trials",))}
+    last = plots["frontier-trials"].groupby(["task", "method"]).last()
+    runs = study.results.runs
+    for (task, method), row in last.iterrows():
+        own = runs[(runs.task == task) & (runs.method == method)].reward
+        assert row["mean"] == pytest.approx(own.astype(float).mean())
+        assert row.budget == 120
+    with pytest.raises(ValueError, match="unknown spends"):
+        frontier(study, spends=("money",))
+    data = profiles(study).data
+    assert set(data.method) == {"learner"}
+    learner = {
+        "ascending": "EC1", "descending": "EC1", "two-armed-1": "EC4", "two-armed-2": "EC4",
+    }  # fmt: skip
+    shares = []
+    for task, condition in learner.items():
+        own = runs[(runs.task == task) & (runs.method == f"dual-process/{condition}")]
+        top = study.optima[task, "free"].reward
+        shares.append(((top - own.reward.astype(float)) / -top <= 0.1).mean())
+    at = data[(data.kind == "gap") & np.isclose(data.threshold, 0.1)]
+    assert at.share.iloc[0] == pytest.approx(np.mean(shares))
+    with pytest.raises(CoarticError, match="no runs on every one of"):
+        profiles(study, methods=["dual-process/EC2"])
+
+
+def test_published_differences(tmp_path):
+    cells = select_cells(
+        load_suite("paper"), KNOWN, tasks=["two-armed-1"], methods=["dual-process/EC2"]
+    )
+    results = run_and_write(tmp_path, cells=cells, runs=3, trials=60)
+    results.runs["trials"] = 10_000  # planted: the table asks for the paper's length
+    results.runs["hands"] = ["RRRR", "RRRR", "LRLR"]
+    results.runs["reward"] = [-610, -606, -500]
+    data = published(Study(results)).data.set_index("hands")
+    assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
+    assert data.verdict[""] == ""  # a mean over sequences that are reported apart
+    assert data.difference["RRRR"] == pytest.approx(1.0)
+    assert np.isnan(data.difference["RRLR"])
+    assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2}
+
+
+def test_files_are_the_same_every_time(study, tmp_path):
+    def make(folder):
+        drawn = [bars(study), recruitment(study), tasks_plot([load_task("two-armed-1")])]
+        return [path for plot in drawn for path in save(plot, folder)]
+
+    first, second = make(tmp_path / "a"), make(tmp_path / "b" / "deep")
+    assert {path.suffix for path in first} == {*FORMATS, ".csv"}
+    for one, two in zip(first, second, strict=True):
+        assert one.read_bytes() == two.read_bytes(), one.name
+        if one.suffix in (".pdf", ".svg"):
+            assert not re.search(rb"CreationDate|dc:date", one.read_bytes())
+    assert b"/FontFile2" in first[2].read_bytes()  # TrueType, embedded
+    table = pd.read_csv(first[3])
+    assert table.reward.tolist() == pytest.approx(bars(study).data.reward.tolist())
+
+
+def test_files_that_cannot_be_written(study, tmp_path):
+    plot = tasks_plot([load_task("ascending")])
+    with pytest.raises(CoarticError, match=r"x\.bmp: the name of a figure must end in"):
+        write(plot, tmp_path / "x.bmp")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CoarticError, match="cannot write to"):
+        save(plot, tmp_path / "file")
+
+
+def test_svg_for_a_page(figures):
+    """All figures together: every id once, every reference has its id, ink is the page's."""
+    ids, references = [], []
+    for plot in figures.plots:
+        text = svg_text(plot)
+        root = ElementTree.fromstring(text)
+        assert root.tag.endswith("svg")
+        assert root.get("viewBox")
+        assert root.get("width") is None
+        assert root.get("height") is None
+        assert root.get("aria-label") == plot.alt
+        assert root.get("fill") == "currentColor"
+        assert not re.search(r"<\?xml|<!DOCTYPE|<metadata|#000000|#ffffff|#fff\b|http://(?!www.w3)",
+                             text)  # fmt: skip
+        own = [element.get("id") for element in root.iter() if element.get("id")]
+        assert all(name.startswith(f"{plot.id}-") for name in own)
+        ids += own
+        references += re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)
+        assert len(text) < 400_000
+    assert svg_text(figures.plots[0]) == svg_text(figures.plots[0])
+    assert len(ids) == len(set(ids))
+    assert {a or b for a, b in references} == set(ids)
+
+
+def test_short_names_and_looks_tell_methods_apart():
+    labels = list(KNOWN)
+    assert len({short(label) for label in labels}) == len(labels)
+    assert set(_KNOWN) <= set(labels)
+    assert len(set(looks(_KNOWN).values())) == len(_KNOWN)
+    own = looks(f"own-{k}" for k in range(20))
+    assert len(set(own.values())) == 20
+    assert looks(["mine", "dual-process/EC4"])["dual-process/EC4"] == _KNOWN["dual-process/EC4"]
+    assert short("dual-process/EC4 noise_sd=0.02") == "EC4 (σ 0.02)"
+    assert short("cma-es/every other_arm=still") == "CMA-ES, every (other arm still)"
+
+
+def test_numbers():
+    assert [amount(v) for v in (1e-4, 0.1, 1, 1000, 2.5e6, 0)] == [
+        "100µ", "100m", "1", "1k", "2.5M", "0",
+    ]  # fmt: skip
+    assert number(-3.25, 1) == "−3.2"
+    assert (on("#0072b2"), on("#e69f00")) == ("#fdfdfd", "#111111")
