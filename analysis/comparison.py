@@ -72,7 +72,7 @@ def _cells_table(results: Results) -> Table:
     tasks = results.tasks
     rows = []
     for cell in results.cells:
-        paper, good = _published(cell), cell.good
+        paper, good = published_of(cell), cell.good
         if paper is None:
             continue
         rewards = good.reward.to_numpy(dtype=np.float64)
@@ -106,7 +106,7 @@ def _sequences_table(cells: Iterable[CellRuns]) -> Table:
     """Rewards by hand sequence, where the paper tells them apart."""
     rows = []
     for cell in cells:
-        paper, good = _published(cell), cell.good
+        paper, good = published_of(cell), cell.good
         if paper is None:
             continue
         printed = {s.hands: s for s in paper.sequences}
@@ -203,7 +203,7 @@ def _notes(results: Results) -> list[str]:
             f"The runs were made at {commits} commits; the code behind each method's results "
             "is the same in all of them."
         )
-    if any(_published(cell) and (cell.good.trials != TRIALS).any() for cell in results.cells):
+    if any(published_of(cell) and (cell.good.trials != TRIALS).any() for cell in results.cells):
         notes.append(
             f"The published runs have {TRIALS} trials; learned rewards of runs with another "
             "number are not comparable, so those get no verdict."
@@ -227,7 +227,7 @@ def _notes(results: Results) -> list[str]:
     return notes
 
 
-def _published(cell: CellRuns) -> PublishedCell | None:
+def published_of(cell: CellRuns) -> PublishedCell | None:
     """What the paper prints about a cell: about its own learner as it stands."""
     family, _, condition = cell.method.partition("/")
     if family != "dual-process" or cell.variant:
@@ -236,7 +236,7 @@ def _published(cell: CellRuns) -> PublishedCell | None:
 
 
 def _starred(cell: CellRuns) -> bool:
-    paper, initial = _published(cell), published_initial(cell.task)
+    paper, initial = published_of(cell), published_initial(cell.task)
     return bool((paper and paper.summary and paper.summary.derived) or (initial and initial[2]))
 
 

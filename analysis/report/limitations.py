@@ -1,0 +1,181 @@
+"""What a results folder cannot show, said from its own facts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from analysis.published import RUNS, TRIALS
+from analysis.sample_size import POWER, smallest_difference
+from analysis.study import Study
+
+_LEARNER = "dual-process/"
+
+
+def limitations(study: Study) -> tuple[str, ...]:
+    """One limitation an item, in the report's inline markup, the gravest first."""
+    return tuple(
+        [
+            *_reconstructed(study),
+            *_failures(study),
+            *_versions(study),
+            *_numbers_of_runs(study),
+            *_optima(study),
+            *_timing(study),
+            *_model(study),
+        ]
+    )
+
+
+def _reconstructed(study: Study) -> Iterator[str]:
+    for name, task in study.results.tasks.items():
+        inferred = {
+            key: entry for key, entry in task.provenance.items() if entry.status == "inferred"
+        }
+        if inferred:
+            what = "; ".join(f"{key} ({entry.source.rstrip('.')})" for key, entry in inferred.items())
+            yield (
+                f"*Reconstructed.* {name}: not printed in the paper but inferred from what is: "
+                f"{_escape(what)}. Rewards on it, and claims that entered the choice (marked †), "
+                "depend on that."
+            )
+        chosen = sorted(key for key, entry in task.provenance.items() if entry.status == "chosen")
+        if chosen:
+            yield f"*Not the paper's.* {name}: {', '.join(chosen)} chosen by the task's author."
+
+
+def _failures(study: Study) -> Iterator[str]:
+    runs = study.results.runs
+    failed = runs[runs.status != "ok"]
+    if not len(failed):
+        yield f"*Failures.* None: all {len(runs)} runs have a solution that was executed and scored."
+    groups = failed.groupby(["task", "method", "variant", "status"], sort=False)
+    for (task, method, variant, status), own in groups:
+        label = f"{method} {variant}".strip()
+        total = len(study.cells[task, label].runs)
+        yield (
+            f"*Failures.* {task}, `{_code(label)}`: {len(own)} of {total} runs are {status} "
+            f"({_escape(str(own.reason.iloc[0]))}). Means are over the others."
+        )
+    for (task, label), cell in study.cells.items():
+        lost, made = int(cell.runs.failed_trials.sum()), int(cell.runs.trials.sum())
+        if lost and lost >= 0.01 * made:
+            yield (
+                f"*Failed trials.* {task}, `{_code(label)}`: {lost} of {made} trials "
+                f"({lost / made:.0%}) did not hit every goal and taught nothing."
+            )
+
+
+def _versions(study: Study) -> Iterator[str]:
+    runs = study.results.runs
+    commits = sorted(set(runs.commit.astype(str)))
+    changed = [commit for commit in commits if commit.endswith("+")]
+    if len(commits) > 1:
+        yield (
+            f"*Mixed versions.* Runs were made at {len(commits)} commits "
+            f"({', '.join(f'`{commit[:12]}`' for commit in commits)}); the code behind each "
+            "method's results is the same in all of them."
+        )
+    if changed:
+        yield (
+            "*Uncommitted changes.* The checkout was changed when runs were made at "
+            + ", ".join(f"`{commit.rstrip('+')[:12]}`" for commit in changed)
+            + "; each run names the hash of the code behind it."
+        )
+    packages = runs.packages.nunique()
+    if packages > 1:
+        yield f"*Mixed versions.* Runs were made with {packages} sets of library versions."
+    codes = runs.groupby("method").code.nunique()
+    for method in codes[codes > 1].index:
+        yield f"*Mixed code.* Runs of `{_code(str(method))}` were made by {codes[method]} codes."
+
+
+def _numbers_of_runs(study: Study) -> Iterator[str]:
+    specification = study.results.manifest["specification"]
+    learner = {key: cell for key, cell in study.cells.items() if key[1].startswith(_LEARNER)}
+    if any((cell.runs.trials != TRIALS).any() for cell in learner.values()):
+        yield (
+            f"*Trials.* The paper's runs have {TRIALS} trials; runs with another number are "
+            "not comparable with them, and no claim is judged on them."
+        )
+    found = []
+    for (task, label), cell in learner.items():
+        best = study.optima.get((task, "free"))
+        rewards = cell.good.reward.to_numpy(dtype=np.float64)
+        if len(rewards) < 2 or best is None or not best.reward or cell.variant:
+            continue
+        sd = float(np.std(rewards, ddof=1))
+        if sd == 0 or label.removeprefix(_LEARNER) not in ("EC1", "EC2", "EC3", "EC4"):
+            continue
+        ticks = smallest_difference(sd, sd, len(rewards))
+        found.append(
+            f"{task} {label.removeprefix(_LEARNER)} {ticks:.1f} ticks "
+            f"({ticks / -best.reward:.1%}, n = {len(rewards)})"
+        )
+    if found:
+        yield (
+            f"*Number of runs.* Between two samples like these a one-tailed t-test at 5 % finds, "
+            f"with probability {POWER:.0%}, a difference of: {'; '.join(found)}. Smaller ones may "
+            "be missed."
+        )
+    few = sorted({len(cell.runs) for cell in learner.values() if len(cell.runs) < RUNS})
+    if few:
+        yield (
+            f"*Number of runs.* The paper has {RUNS} runs a cell; here are {few[0]}"
+            f"{'' if len(few) == 1 else f' to {few[-1]}'}."
+        )
+    yield (
+        f"*One seed.* All runs derive from seed {specification['seed']}; methods that draw "
+        "nothing at random were run once and have no spread. 95 % BCa intervals of 20 such runs "
+        "cover 91 to 95 % (simulated; docs/statistics.md), of fewer runs less."
+    )
+
+
+def _optima(study: Study) -> Iterator[str]:
+    for task in study.results.tasks:
+        known = {arm: study.optima.get((task, arm)) for arm in ("free", "still")}
+        if known["free"] is None:
+            yield f"*No optimum.* None is known of {task}: it has no gaps, targets or scores."
+        for arm, best in known.items():
+            if best is not None and not best.proven:
+                bound = "" if best.bound is None else f"; none above {best.bound} is proven"
+                yield (
+                    f"*Optimum not proven.* {task}, other arm {arm}: {best.reward} is the best of "
+                    f"the searches{bound}."
+                )
+
+
+def _timing(study: Study) -> Iterator[str]:
+    runs, environment = study.results.runs, study.results.manifest["environment"]
+    cold = runs[~runs.warm.astype(bool)]
+    share = len(cold) / len(runs) if len(runs) else math.nan
+    yield (
+        f"*Times.* Taken on {environment['processor'] or 'an unnamed processor'} with "
+        f"{environment['cores']} cores, several runs at a time, one thread each; {share:.0%} of "
+        "the runs were the first of their method in their process and hold its warming up. "
+        "Times compare within a folder; counts of evaluations compare between machines."
+    )
+
+
+def _model(study: Study) -> Iterator[str]:
+    yield (
+        "*Model.* A kinematic robot: no masses, no noise of sensors or muscles, one tick per "
+        "control step of constant length in joint space. What is said of movements is said of it."
+    )
+    if any(len(task.hands) > 1 for task in study.results.tasks.values()):
+        yield (
+            "*Arms.* They do not collide with each other, the base or the goals (nor do the "
+            "paper's, which mentions no collisions)."
+        )
+
+
+def _escape(text: str) -> str:
+    for mark in "\\*`[":
+        text = text.replace(mark, "\\" + mark)
+    return text
+
+
+def _code(text: str) -> str:
+    return text.replace("`", "'")
