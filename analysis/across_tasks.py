@@ -40,7 +40,8 @@ PROFILE_RESAMPLES = 1_999
 def scores_frame(results: Results) -> pd.DataFrame:
     """One row a run of every task whose optimum and initial solution are known.
 
-    Columns ``task``, ``method`` (with its variant), ``run``, ``seed``, ``reward``;
+    Columns ``task``, ``method`` (with its variant), ``label`` (the cell's, whatever becomes
+    of ``method``), ``run``, ``seed``, ``reward``;
     ``score`` (:func:`normalised`) and ``gap`` (:func:`gap_share`), both against the optimum
     with all joints free and the corrective process alone with the task's initial hands. A
     run without a solution has NaN for all three.
@@ -62,6 +63,7 @@ def scores_frame(results: Results) -> pd.DataFrame:
                 {
                     "task": cell.task,
                     "method": cell.label,
+                    "label": cell.label,
                     "run": cell.runs.run.to_numpy(),
                     "seed": cell.runs.seed.to_numpy(),
                     "reward": values,
@@ -70,7 +72,7 @@ def scores_frame(results: Results) -> pd.DataFrame:
                 }
             )
         )
-    columns = ["task", "method", "run", "seed", "reward", "score", "gap"]
+    columns = ["task", "method", "label", "run", "seed", "reward", "score", "gap"]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
 
 

@@ -454,6 +454,47 @@ def draw(
 
 
 @app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; DIR/report by default.")
+    ] = None,
+) -> None:
+    """Write a report: page with player, tables, figures, numbers for LaTeX, traces."""
+    from analysis.report.build import build, write
+    from analysis.results import load_results
+    from analysis.study import Study
+
+    started = time.monotonic()
+    study = Study(load_results(folder))
+    out = folder / "report" if out is None else out
+    made = build(study)
+    write(made, study, out)
+    print(
+        f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
+        f"it: report.md, {len(made.document.tables())} tables (tables/, CSV and LaTeX), "
+        f"{len(made.plots)} figures (figures/, PDF, SVG, PNG and their data), numbers.tex."
+    )
+
+
+@app.command()
+def trace(
+    name: Annotated[str, typer.Argument(help="Macro of numbers.tex, or id of a table.")],
+    row: Annotated[str | None, typer.Argument(help="Row of the table: its first cell.")] = None,
+    column: Annotated[str | None, typer.Argument(help="Column of the table's CSV.")] = None,
+    folder: Annotated[
+        Path, typer.Option("--in", help="Report, its results folder, or a folder above.")
+    ] = Path("results"),
+) -> None:
+    """Say which runs, code and command are behind a number of a report."""
+    from analysis.report.trace import find_report, trace_text
+    from analysis.report.trace import trace as find
+
+    where = [part for part in (row, column) if part is not None]
+    print(trace_text(find(find_report(folder), name, where)))
+
+
+@app.command()
 def compare(
     first: Annotated[Path, typer.Argument(metavar="DIR_A", help="Results folder A.")],
     second: Annotated[Path, typer.Argument(metavar="DIR_B", help="Results folder B.")],

@@ -5,11 +5,11 @@ import os
 
 import numpy as np
 import pytest
-from analysis.figures.robot import MARKERS
 from matplotlib import rc_context
 from PIL import Image
 
 from analysis.animation import Panel, _figure, animate, timing
+from analysis.figures.robot import MARKERS
 from benchmarks.methods import registry
 from benchmarks.reproduce import trajectory_of
 from benchmarks.store import Store

@@ -75,6 +75,8 @@ class Column:
     with three figures."""
     interval: str = "95 % interval"
     """Header of the intervals, where values have them."""
+    printed: bool = True
+    """Whether the LaTeX table has it, which has to fit on a page of paper."""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():

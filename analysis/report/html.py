@@ -24,6 +24,9 @@ from analysis.report.text import Part, inline, parts
 _MAGNIFIED = 1.5
 _MOST_LINKS = 4  # stretches of run lists linked from one row
 
+MOST_LISTED = 12
+"""Subsections of one section that the contents show."""
+
 
 def html(document: Document) -> str:
     """The document as a page, with its tables linked to the run ids behind them."""
@@ -80,13 +83,18 @@ def _contents(document: Document) -> str:
     def items(sections: tuple[Section, ...]) -> str:
         return "".join(
             f'<li><a href="#{section.id}">{escape(section.title)}</a>'
-            + (f"<ol>{items(section.sections)}</ol>" if section.sections else "")
+            + (f"<ol>{items(section.sections)}</ol>" if _listed(section) else "")
             + "</li>\n"
             for section in sections
         )
 
     runs = '<li><a href="#runs">Runs behind the tables</a></li>\n' if document.runs else ""
     return f"<ol>\n{items(document.sections)}{runs}</ol>"
+
+
+def _listed(section: Section) -> bool:
+    """Whether the contents show a section's subsections: not where they are very many."""
+    return 0 < len(section.sections) <= MOST_LISTED
 
 
 def _section(section: Section, level: int, numbers: Mapping[CellKey, int]) -> str:

@@ -78,7 +78,7 @@ def latex_inputs(document: Document) -> str:
 
 def latex_table(table: DataTable) -> str:
     """One table: numbers in S columns as wide as they need, text and intervals beside them."""
-    shown = parts(table)
+    shown = [part for part in parts(table) if part.column.printed]
     kinds = [_kind(part, table) for part in shown]
     head = " & ".join(f"{{{latex_text(part.header)}}}" for part in shown)
     rows = "\n".join(

@@ -16,16 +16,14 @@ _LEARNER = "dual-process/"
 
 def limitations(study: Study) -> tuple[str, ...]:
     """One limitation an item, in the report's inline markup, the gravest first."""
-    return tuple(
-        [
-            *_reconstructed(study),
-            *_failures(study),
-            *_versions(study),
-            *_numbers_of_runs(study),
-            *_optima(study),
-            *_timing(study),
-            *_model(study),
-        ]
+    return (
+        *_reconstructed(study),
+        *_failures(study),
+        *_versions(study),
+        *_numbers_of_runs(study),
+        *_optima(study),
+        *_timing(study),
+        *_model(study),
     )
 
 
@@ -35,7 +33,9 @@ def _reconstructed(study: Study) -> Iterator[str]:
             key: entry for key, entry in task.provenance.items() if entry.status == "inferred"
         }
         if inferred:
-            what = "; ".join(f"{key} ({entry.source.rstrip('.')})" for key, entry in inferred.items())
+            what = "; ".join(
+                f"{key} ({entry.source.rstrip('.')})" for key, entry in inferred.items()
+            )
             yield (
                 f"*Reconstructed.* {name}: not printed in the paper but inferred from what is: "
                 f"{_escape(what)}. Rewards on it, and claims that entered the choice (marked †), "
@@ -50,9 +50,10 @@ def _failures(study: Study) -> Iterator[str]:
     runs = study.results.runs
     failed = runs[runs.status != "ok"]
     if not len(failed):
-        yield f"*Failures.* None: all {len(runs)} runs have a solution that was executed and scored."
+        yield f"*Failures.* None: all {len(runs)} runs have a solution, executed and scored."
     groups = failed.groupby(["task", "method", "variant", "status"], sort=False)
-    for (task, method, variant, status), own in groups:
+    for key, own in groups:
+        task, method, variant, status = map(str, key)
         label = f"{method} {variant}".strip()
         total = len(study.cells[task, label].runs)
         yield (
@@ -166,8 +167,8 @@ def _model(study: Study) -> Iterator[str]:
     )
     if any(len(task.hands) > 1 for task in study.results.tasks.values()):
         yield (
-            "*Arms.* They do not collide with each other, the base or the goals (nor do the "
-            "paper's, which mentions no collisions)."
+            "*Arms.* No collisions, of the arms with each other or with anything else, are "
+            "modelled; the paper mentions none."
         )
 
 

@@ -93,7 +93,9 @@ def headline_numbers(study: Study) -> list[Number]:
         *_signatures(study),
     ]
     names = [name for number in found for name, _ in number.macros()]
-    twice = {name for name in names if names.count(name) > 1} if len(set(names)) < len(names) else ()
+    twice = (
+        {name for name in names if names.count(name) > 1} if len(set(names)) < len(names) else ()
+    )
     if twice:
         raise ValueError(f"macros with the same name: {', '.join(sorted(twice))}")
     return found

@@ -6,14 +6,15 @@ import difflib
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.report.document import CellKey, Document
+from analysis.report.document import CellKey, DataTable, Document, Row
 from analysis.report.numbers import Number
-from analysis.report.text import value_text
+from analysis.report.text import parts
 from analysis.results import Results
+from analysis.table import NONE
 from coartic import CoarticError
 
 FILE = "trace.json"
@@ -79,10 +80,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
                 "columns": [column.name for column in table.columns],
                 "rows": {
                     row.key: {
-                        "text": [
-                            value_text(value, column)
-                            for value, column in zip(row.values, table.columns, strict=True)
-                        ],
+                        "text": _texts(table, row),
                         "cells": [_join(key) for key in row.cells],
                         "cells_by_column": {
                             name: [_join(key) for key in keys]
@@ -104,19 +102,32 @@ def specification_hash(results: Results) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def trace(folder: Path, name: str, where: Sequence[str] = ()) -> Trace:
+def find_report(folder: Path) -> Path:
+    """The one report in a folder or below it. Raises CoarticError for none or several."""
+    for home in (folder, folder / "report"):
+        if (home / FILE).is_file():
+            return home
+    found = sorted(path.parent for path in folder.glob(f"**/{FILE}"))
+    if not found:
+        raise CoarticError(
+            f"no report in {folder}; make one with `coartic report DIR`, or name another folder "
+            "with --in"
+        )
+    if len(found) > 1:
+        raise CoarticError(
+            f"{len(found)} reports below {folder}: {', '.join(map(str, found))}; choose with --in"
+        )
+    return found[0]
+
+
+def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
     """What is behind a macro, or behind the cell of a table (``where``: row and column).
 
-    ``folder`` is a results folder or its report. Raises CoarticError where there is no
-    report, or nothing of that name in it.
+    ``home`` is the report's folder. Raises CoarticError where it cannot be read, or has
+    nothing of that name.
     """
-    home = folder if (folder / FILE).is_file() else folder / "report"
     try:
         content = json.loads((home / FILE).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise CoarticError(
-            f"{folder} has no report to trace; make one with `coartic report {folder}`"
-        ) from None
     except (OSError, ValueError) as error:
         raise CoarticError(f"{home / FILE} cannot be read: {error}") from None
     if content.get("format") != FORMAT:
@@ -173,11 +184,6 @@ def trace_text(found: Trace) -> str:
     return "\n".join(lines)
 
 
-def trace_data(found: Trace) -> dict[str, Any]:
-    """A trace as plain data."""
-    return asdict(found) | {"folder": str(found.folder)}
-
-
 def _table_cell(
     table: dict[str, Any], name: str, where: Sequence[str]
 ) -> tuple[str, str, str, str, list[str]]:
@@ -209,9 +215,7 @@ def _source(content: dict[str, Any], key: str, folder: Path) -> Source:
         command.insert(-2, f"--trials {suite['trials']}")
     if len(cell["runs"]) == 1:
         command = [f"coartic reproduce {cell['runs'][0]} --in {folder}"]
-    return Source(
-        task, label, tuple(cell["runs"]), tuple(cell["commits"]), " ".join(command)
-    )
+    return Source(task, label, tuple(cell["runs"]), tuple(cell["commits"]), " ".join(command))
 
 
 def _suite(results: Results) -> dict[str, Any]:
@@ -220,6 +224,16 @@ def _suite(results: Results) -> dict[str, Any]:
         "name": specification["suite"],
         **{name: specification[name] for name in ("runs", "trials", "seed")},
     }
+
+
+def _texts(table: DataTable, row: Row) -> list[str]:
+    """What each column shows: value, SD and interval together."""
+    shown: list[list[str]] = [[] for _ in table.columns]
+    for part in parts(table):
+        text = part.text(row.values[part.index])
+        if part.kind == "value" or text != NONE:
+            shown[part.index].append(f"± {text}" if part.kind == "sd" else text)
+    return [" ".join(texts) for texts in shown]
 
 
 def _join(key: CellKey) -> str:

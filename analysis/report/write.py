@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,16 +21,17 @@ def write_report(
     document: Document,
     plots: Iterable[Plot],
     folder: Path,
+    extra: Mapping[str, str] | None = None,
     *,
     save: Callable[[Plot, Path], object],
 ) -> None:
     """Write ``folder`` anew: what it held is replaced when all of the new report is there.
 
     ``report.html`` stands alone; ``report.md`` links to ``figures/``, where ``save`` puts
-    each plot, at least as ``ID.svg``; ``tables/`` holds CSV and LaTeX, ``tables.tex``
-    inputs the latter. The same document gives the same bytes. Raises ValueError where a
-    figure of the document is not among the plots, CoarticError where the folder is not a
-    report or cannot be written.
+    each plot, at least as ``ID.svg``; ``tables/`` holds CSV and LaTeX, ``tables.tex`` inputs
+    the latter; ``extra`` are further text files by name. The same document gives the same
+    bytes. Raises ValueError where a figure of the document is not among the plots,
+    CoarticError where the folder is not a report or cannot be written.
     """
     if not _replaceable(folder):
         raise CoarticError(
@@ -47,7 +48,7 @@ def write_report(
         lost = [f.id for f in document.figures() if not (part / f"figures/{f.id}.svg").is_file()]
         if lost:
             raise ValueError(f"figures without a plot: {', '.join(lost)}")
-        for name, text in _texts(document).items():
+        for name, text in {**_texts(document), **(extra or {})}.items():
             (part / name).write_text(text, encoding="utf-8", newline="\n")
         _replace(part, folder, old)
     except OSError as error:

@@ -36,13 +36,13 @@ _SYNERGY = (
     "says little**: a hit confines the hand to a disc of the task's radius, so that runs cannot "
     "differ much in directions that move it, whatever the method."
 )
-_OTHER = (
+OTHER = (
     "How much nearer the waiting hand is to its next goal than in the initial solution when each "
     "goal is hit (a ratio; 1: there already): in all; seen from the base, which leaves out what a "
     "base does that moved otherwise than in the initial solution; and by what the arm did since "
     "its own last hit, 0 where it keeps still while it waits."
 )
-_CONTEXTS = (
+CONTEXTS = (
     "Postures at the same goal before different successors. Runs are those of both tasks. The "
     "distance mixes length unit and rad; the parts are per root of their dimension. The lead is "
     "the time before the hit for which contexts differ, of the shorter movement's ticks."
@@ -81,9 +81,9 @@ def signatures_page(study: Study) -> str:
     for name, task in study.results.tasks.items():
         own = frame[frame.task == name]
         parts.append(f"## {name}{' †' if task.reconstructed else ''}")
-        parts += _by_method("How it moves", "", own, labels[name], _main(task))
+        parts += _by_method("How it moves", "", own, labels[name], main_columns(task))
         if len(task.hands) > 1:
-            parts += _by_method("The other arm", _OTHER, own, labels[name], _other_arm(task))
+            parts += _by_method("The other arm", OTHER, own, labels[name], other_arm_columns(task))
         parts += _by_method("Synergy: ΔV z", _SYNERGY, own, labels[name], _synergy(task, own))
     parts += _contexts(frame, labels)
     parts += _slopes(frame, labels)
@@ -93,7 +93,7 @@ def signatures_page(study: Study) -> str:
 
 
 @dataclass(frozen=True)
-class _Column:
+class Column:
     """A signature at one place, and the head of its column."""
 
     signature: str
@@ -101,34 +101,36 @@ class _Column:
     head: str
 
 
-def _main(task: Task) -> list[_Column]:
+def main_columns(task: Task) -> list[Column]:
+    """The main signatures of one task."""
     columns = [
-        _Column("first subtask against initial", "goal 1", "first subtask, ticks"),
-        _Column("total against initial", "", "total, ticks"),
-        _Column("first subtask sacrificed", "", "sacrificed, share"),
-        _Column("subtask against isolated reach", "goal 1", "goal 1 against isolated, ticks"),
+        Column("first subtask against initial", "goal 1", "first subtask, ticks"),
+        Column("total against initial", "", "total, ticks"),
+        Column("first subtask sacrificed", "", "sacrificed, share"),
+        Column("subtask against isolated reach", "goal 1", "goal 1 against isolated, ticks"),
     ]
     if len(task.hands) > 1:
         columns += [
-            _Column("hand entropy", "", "hand entropy, bit"),
-            _Column("hands as the best corrective ones", "", "hands as corrective, share"),
+            Column("hand entropy", "", "hand entropy, bit"),
+            Column("hands as the best corrective ones", "", "hands as corrective, share"),
         ]
     columns += [
-        _Column("base reversals", f"base {axis}", f"base {axis} reversals, count")
+        Column("base reversals", f"base {axis}", f"base {axis} reversals, count")
         for axis in "xy"
         if axis not in task.locked_base
     ]
     if len(task.goals) > 1:
-        columns.append(_Column("turning angle", "goal 1", "turn at goal 1, rad"))
-    columns.append(_Column("hand path SPARC", "chosen hand", "SPARC, 1"))
-    columns.append(_Column("hand path log dimensionless jerk", "chosen hand", "log jerk, 1"))
+        columns.append(Column("turning angle", "goal 1", "turn at goal 1, rad"))
+    columns.append(Column("hand path SPARC", "chosen hand", "SPARC, 1"))
+    columns.append(Column("hand path log dimensionless jerk", "chosen hand", "log jerk, 1"))
     return columns
 
 
-def _other_arm(task: Task) -> list[_Column]:
+def other_arm_columns(task: Task) -> list[Column]:
+    """What the arm that is not chosen does, goal by goal."""
     goals = [f"goal {number}" for number in range(1, len(task.goals))]
     return [
-        _Column(name, goal, f"{goal}, {head}")
+        Column(name, goal, f"{goal}, {head}")
         for name, head in (
             ("preshaping of the other arm", "all"),
             ("preshaping seen from the base", "from the base"),
@@ -138,18 +140,18 @@ def _other_arm(task: Task) -> list[_Column]:
     ]
 
 
-def _synergy(task: Task, frame: pd.DataFrame) -> list[_Column]:
+def _synergy(task: Task, frame: pd.DataFrame) -> list[Column]:
     """A column per goal, with the neutral value in its head: one for all methods and hands."""
     columns = []
     for number in range(1, len(task.goals) + 1):
         goal = f"goal {number}"
         places = frame["where"][(frame.signature == "ΔV z") & frame["where"].str.startswith(goal)]
         neutral = places.str.extract(_NEUTRAL)[0].dropna().unique()
-        columns.append(_Column("ΔV z", goal, f"{goal} (neutral {' or '.join(neutral)})"))
+        columns.append(Column("ΔV z", goal, f"{goal} (neutral {' or '.join(neutral)})"))
     return columns
 
 
-def _place(row: Row) -> str:
+def place(row: Row) -> str:
     """Where a signature is, without what differs between methods."""
     if row["signature"] in ("hand entropy", "hands as the best corrective ones"):
         return ""
@@ -158,14 +160,14 @@ def _place(row: Row) -> str:
 
 
 def _by_method(
-    title: str, text: str, frame: pd.DataFrame, labels: Sequence[str], columns: Sequence[_Column]
+    title: str, text: str, frame: pd.DataFrame, labels: Sequence[str], columns: Sequence[Column]
 ) -> list[str]:
     """A table of methods by columns, with notes; nothing where no method has a value."""
     wanted = {column.signature for column in columns}
     rows = frame[frame.signature.isin(wanted)].to_dict("records")
     adjusted = _adjusted(rows)
     found = {
-        (row["label"], row["signature"], _place(row)): (row, p)
+        (row["label"], row["signature"], place(row)): (row, p)
         for row, p in zip(rows, adjusted, strict=True)
     }
     whole = {  # signatures that a method lacks altogether say so in one row
@@ -205,9 +207,9 @@ def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
         "lead time": "lead, ticks",
     }
     frame = frame[frame.signature.isin(list(names)) & frame["where"].str.contains("against")]
-    place = frame["where"].str.replace(_AT_MOST, "", regex=True)
+    spot = frame["where"].str.replace(_AT_MOST, "", regex=True)
     parts = []
-    for (task, where), group in frame.groupby([frame.task, place], sort=False):
+    for (task, where), group in frame.groupby([frame.task, spot], sort=False):
         rows = group.to_dict("records")
         notes, lines = _Notes(), []
         cells = {
@@ -223,7 +225,7 @@ def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
             title = f"{task}, {where}"
             table = Table(title, ("method", "runs", *names.values()), tuple(lines))
             parts += [f"### {title}", table.to_markdown(), *notes.lines()]
-    return ["## Between contexts", _CONTEXTS, *filter(None, parts)] if parts else []
+    return ["## Between contexts", CONTEXTS, *filter(None, parts)] if parts else []
 
 
 def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:

@@ -1,0 +1,288 @@
+"""The report of a results folder: which sections, tables and figures it has."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import pandas as pd
+
+from analysis.across_tasks import scores_frame
+from analysis.claims import judge
+from analysis.claims.page import FITTED
+from analysis.claims.register import Judged
+from analysis.figures import Figures, Plot, all_figures
+from analysis.figures.plot import save, svg_text
+from analysis.frontier import area_frame, for_both_arms, pareto_frame, targets_frame
+from analysis.overall import combined, overall_frame
+from analysis.pairwise import pairwise_frame
+from analysis.report import tables
+from analysis.report.document import (
+    Block,
+    Bullets,
+    DataTable,
+    Document,
+    FigureBlock,
+    PlayerBlock,
+    Prose,
+    Section,
+)
+from analysis.report.limitations import limitations
+from analysis.report.numbers import PREFIX, Number, headline_numbers, numbers_tex
+from analysis.report.player import player_json
+from analysis.report.text import typographic
+from analysis.report.trace import FILE, trace_json
+from analysis.report.write import write_report
+from analysis.results import Results
+from analysis.study import Study
+
+FOLDER = "report"
+
+
+@dataclass(frozen=True)
+class Report:
+    """A document with the figures and the numbers that belong to it."""
+
+    document: Document
+    plots: tuple[Plot, ...]
+    numbers: tuple[Number, ...]
+
+
+def build(study: Study) -> Report:
+    """Everything a report holds. A section that the runs do not allow is left out."""
+    figures, numbers = all_figures(study), tuple(headline_numbers(study))
+    by_id = {plot.id: plot for plot in figures.plots}
+    judged = judge(study)
+    pairs = pairwise_frame(study)
+    scores = combined(scores_frame(study.results))
+    used: set[str] = set()
+
+    def shown(*starts: str) -> list[Block]:
+        """Figures whose ids begin so, each once."""
+        found = [name for start in starts for name in by_id if name.startswith(start)]
+        fresh = [name for name in dict.fromkeys(found) if name not in used]
+        used.update(fresh)
+        return [_figure(by_id[name]) for name in fresh]
+
+    sections = [
+        _summary(study, judged, scores),
+        _section("paper", "Published and ours", [
+            *shown("published", "learned-reward"),
+            *_tables(tables.published_table(study), tables.exhaustive_table(study)),
+            *shown("recruitment"),
+        ]),
+        _section("movements", "Movements", [
+            *shown("tasks"),
+            PlayerBlock(
+                "player", "Movements, tick by tick",
+                "Of each method the run nearest its median reward, beside the initial solution. "
+                "Open squares: left arm; closed circles: right arm.",
+                player_json(study),
+            ),
+            *shown("configurations"),
+        ]),
+        _section("learning", "Learning", shown("learning-curves")),
+        _methods(study, pairs, scores, shown("profiles")),
+        _cost(study, shown("frontier")),
+        _signatures(study, shown("context"), shown("signatures")),
+        _claims(study, judged),
+        _section("more-figures", "More figures", shown("")),
+        _section("limitations", "Limitations", [Bullets(limitations(study))]),
+        _about(study, figures, numbers),
+    ]  # fmt: skip
+    document = Document(
+        _title(study.results),
+        tuple(section for section in sections if section.blocks or section.sections),
+        _lead(study.results),
+        {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
+    )
+    return Report(document, figures.plots, numbers)
+
+
+def write(report: Report, study: Study, folder: Path) -> None:
+    """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
+
+    Raises CoarticError where it cannot be written.
+    """
+    about = f"Headline values of {_title(study.results)}. {_lead(study.results)}"
+    extra = {
+        "numbers.tex": numbers_tex(report.numbers, about),
+        FILE: trace_json(study.results, report.document, report.numbers),
+    }
+    write_report(report.document, report.plots, folder, extra, save=save)
+
+
+def _title(results: Results) -> str:
+    return f"coartic: suite {results.manifest['specification']['suite']}"
+
+
+def _lead(results: Results) -> str:
+    specification, environment = results.manifest["specification"], results.manifest["environment"]
+    commit = environment["commit"]
+    where = f"coartic {environment['coartic']}"
+    if commit:
+        where += f", commit {commit['id'][:12]}{' with changes' if commit['dirty'] else ''}"
+    trials = specification["trials"]
+    return (
+        f"{len(results.runs)} runs, up to {specification['runs']} a cell"
+        + (f", of {trials} trials where a method learns" if trials else "")
+        + f"; seed {specification['seed']}. Made with {where} on {environment['date'][:10]}."
+    )
+
+
+def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Section:
+    results = study.results
+    failed = int((results.runs.status != "ok").sum())
+    items = [
+        f"{len(results.tasks)} tasks, {len({c.label for c in results.cells})} methods with their "
+        f"variants, {len(results.cells)} cells; "
+        + (f"{failed} of {len(results.runs)} runs failed." if failed else "no run failed."),
+    ]
+    for task in results.tasks:
+        best = study.optima.get((task, "free"))
+        rows = [
+            (row["reward"], label)
+            for (name, label), row in study.methods.items()
+            if name == task and label.startswith("dual-process/") and " " not in label
+            and label.removeprefix("dual-process/") in ("EC1", "EC2", "EC3", "EC4")
+            and not math.isnan(row["reward"])
+        ]  # fmt: skip
+        if not rows:
+            continue
+        reward, label = max(rows)
+        text = (
+            f"{task}: the learner's best condition is {label.rpartition('/')[2]}, "
+            f"{typographic(f'{reward:.1f}')}"
+        )
+        if best is not None and best.reward:
+            gap = (best.reward - reward) / -best.reward
+            proof = "proven" if best.proven else "best known"
+            text += f"; the optimum is {typographic(str(best.reward))} ({proof}), {gap:.1%} away"
+        items.append(f"{text}.")
+    paper = [entry for entry in judged if entry.claim.place]
+    for name, entries in (
+        ("Claims of the paper, independent tests", [e for e in paper if not e.claim.fitted]),
+        ("Claims that entered the tasks' reconstruction †", [e for e in paper if e.claim.fitted]),
+    ):
+        found = Counter(entry.verdict for entry in entries)
+        items.append(
+            f"{name}: {len(entries)}, of which "
+            + ", ".join(
+                f"{found[verdict]} {verdict}"
+                for verdict in ("supported", "not supported", "cannot tell")
+            )
+            + "."
+        )
+    overall = tables.overall_table(overall_frame(scores), scores)
+    blocks: list[Block] = [Bullets(tuple(items))]
+    if overall is not None:
+        blocks.append(overall)
+    return _section("summary", "Summary", blocks)
+
+
+def _methods(
+    study: Study, pairs: pd.DataFrame, scores: pd.DataFrame, profiles: list[Block]
+) -> Section:
+    below = []
+    for task, slug in tables.table_ids(study).items():
+        blocks = _tables(
+            tables.methods_table(study, task),
+            tables.pairwise_table(study, pairs, task),
+            tables.cost_table(study, pairs, task),
+        )
+        if blocks:
+            below.append(_section(f"methods-on-{slug}", task, blocks))
+    reading = Bullets(tables.reading_of_methods(study))
+    return _section("methods", "Methods side by side", [*profiles, reading], below)
+
+
+def _cost(study: Study, frontier: list[Block]) -> Section:
+    results, steps = study.results, study.steps
+    targets = for_both_arms(targets_frame, results, steps)
+    areas = for_both_arms(area_frame, results, steps)
+    pareto = pareto_frame(results)
+    below = []
+    for task, slug in tables.table_ids(study).items():
+        blocks = _tables(
+            tables.targets_table(study, targets, task),
+            tables.areas_table(study, areas, task),
+            tables.pareto_table(study, pareto, task),
+        )
+        if blocks:
+            below.append(_section(f"cost-on-{slug}", task, blocks))
+    return _section("cost", "Reward and what it costs", frontier, below)
+
+
+def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Section:
+    below = []
+    for task, slug in tables.table_ids(study).items():
+        found = tables.signatures_tables(study, task)
+        if found:
+            below.append(_section(f"signatures-on-{slug}", task, list(found)))
+    blocks = [*context, *_tables(tables.contexts_table(study)), *matrices]
+    return _section("signatures-of-coarticulation", "Signatures of coarticulation", blocks, below)
+
+
+def _claims(study: Study, judged: Sequence[Judged]) -> Section:
+    table = tables.claims_table(study, judged)
+    blocks: list[Block] = [Prose((FITTED,))]
+    if table is not None:
+        blocks.append(table)
+    below = []
+    for entry in judged:
+        claim = entry.claim
+        where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+        mark = " †" if claim.fitted else ""
+        lines = [
+            f"{_escape(claim.statement)} *{entry.verdict}{mark}*.",
+            f"Seen: {_escape(entry.evidence)}.",
+            f"Test: {_escape(claim.test)}. Place: {where}.",
+        ]
+        content: list[Block] = [Prose(tuple(lines))]
+        if entry.table is not None:
+            content.append(Bullets(tuple(
+                _escape("; ".join(f"{head} {cell}" for head, cell in zip(
+                    entry.table.columns, row, strict=True)))
+                for row in entry.table.rows
+            )))  # fmt: skip
+        below.append(_section(f"claim-{claim.id}", claim.id, content))
+    return _section("claims-register", "Claims", blocks, below)
+
+
+def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:
+    count = sum(1 for number in numbers for _ in number.macros())
+    example = next((n.macro for n in numbers if n.cells), f"{PREFIX}...")
+    items = [
+        "Every number of a table leads to its runs (last column); every table is in `tables/` as "
+        "CSV and LaTeX, every figure in `figures/` as PDF, SVG, PNG and CSV (the data behind it).",
+        f"`numbers.tex` has {count} macros, such as `\\\\{example}`.",
+        f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
+        "commit, the specification and the command behind a number; `coartic reproduce RUN` "
+        "performs a run again; `coartic cite` prints what to cite.",
+        *(f"No figure {_escape(name)}: {_escape(why)}" for name, why in figures.skipped.items()),
+    ]
+    return _section("about", "Tracing and citing", [Bullets(tuple(items))])
+
+
+def _section(
+    name: str, title: str, blocks: Sequence[Block], below: Sequence[Section] = ()
+) -> Section:
+    return Section(name, title, tuple(blocks), tuple(below))
+
+
+def _tables(*found: DataTable | None) -> list[Block]:
+    return [cast(Block, table) for table in found if table is not None]
+
+
+def _figure(plot: Plot) -> FigureBlock:
+    return FigureBlock(plot.id, plot.title, _escape(plot.caption), plot.alt, svg_text(plot))
+
+
+def _escape(text: str) -> str:
+    for mark in "\\*`[":
+        text = text.replace(mark, "\\" + mark)
+    return text
