@@ -1,4 +1,7 @@
-"""A document's tables for LaTeX: booktabs and siunitx, for pdfLaTeX with T1 and UTF-8."""
+"""A document's tables for LaTeX: booktabs and siunitx, for pdfLaTeX with T1 and UTF-8.
+
+A table wider than the line is scaled down to it; columns that are not for print are left out.
+"""
 
 from __future__ import annotations
 
@@ -60,6 +63,8 @@ _GREEK = {
 }
 _RAISED = {"⁻": "-", **dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True))}
 _LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True))
+MOST_ROWS = 32
+"""Of a table that fits on a page in footnotesize."""
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 
@@ -72,7 +77,8 @@ def latex_inputs(document: Document) -> str:
     """A file that inputs all tables from ``tables/``."""
     inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
     return (
-        "% Needs \\usepackage{booktabs,siunitx}, \\usepackage[T1]{fontenc} and UTF-8.\n" + inputs
+        "% Needs \\usepackage{booktabs,siunitx,graphicx}, \\usepackage[T1]{fontenc} and UTF-8.\n"
+        + inputs
     )
 
 
@@ -85,22 +91,24 @@ def latex_table(table: DataTable) -> str:
         " & ".join(_cell(part, row.values[part.index]) for part in shown) + r" \\"
         for row in table.rows
     )
+    size = "footnotesize" if len(table.rows) <= MOST_ROWS else "scriptsize"
     notes = "".join(
         f"\\par\\smallskip\\parbox{{\\linewidth}}{{{_spans(note)}}}\n" for note in table.notes
     )
     return f"""\\begin{{table}}[htbp]
 \\centering
-\\footnotesize
+\\{size}
 \\setlength{{\\tabcolsep}}{{4pt}}
 \\caption{{{_spans(table.caption)}}}
 \\label{{tab:{table.id}}}
+\\resizebox{{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}}{{!}}{{%
 \\begin{{tabular}}{{{"".join(kinds)}}}
 \\toprule
 {head} \\\\
 \\midrule
 {rows}
 \\bottomrule
-\\end{{tabular}}
+\\end{{tabular}}}}
 {notes}\\end{{table}}
 """
 

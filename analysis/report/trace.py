@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -166,7 +167,8 @@ def trace_text(found: Trace) -> str:
         *([f"how: {found.how}"] if found.how else []),
         f"results: {found.folder}",
         f"specification: {found.specification}",
-        f"asked for by: coartic {found.environment['coartic']}, commit {shown}, model code "
+        f"asked for by: {shlex.join(found.environment['command'])}",
+        f"code: coartic {found.environment['coartic']}, commit {shown}, model code "
         f"{found.environment['model_code']}",
         f"environment: Python {found.environment['python']}, {found.environment['platform']}, "
         + ", ".join(f"{k} {v}" for k, v in found.environment["packages"].items()),
