@@ -1,17 +1,26 @@
 # Two commands set everything up on a machine with Python >= 3.11 (with venv) and make:
-#   make benchmark   the paper's experiments beside the published numbers
+#   make benchmark   the paper's experiments and all methods beside them, then the report
 #   make test        the test suite
+# make benchmark FULL=1 also searches and proves the optima and moves the goals (suites
+# optimum and locus), each with its report.
 PYTHON ?= python3
 VENV   ?= .venv
-OUT    ?= results/paper
+OUT    ?= results
+FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
+SUITES := paper comparison $(if $(FULL),optimum locus)
 
 .PHONY: benchmark test check format speed setup clean
 
 benchmark: $(READY)
-	$(BIN)/coartic run paper --out $(OUT)
-
+	@for suite in $(SUITES); do \
+	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite || exit; \
+	done
+	@for suite in $(filter-out paper,$(SUITES)); do \
+	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
+	done
+	@echo "Look at $(OUT)/comparison/report/report.html, and at $(OUT)/paper/comparison.md."
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses auto
 
