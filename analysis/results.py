@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -44,14 +45,14 @@ class Results:
     runs: pd.DataFrame
     sequences: pd.DataFrame
 
-    @property
+    @cached_property
     def tasks(self) -> dict[str, Task]:
         """The tasks as they were run, by name."""
         source = str(self.folder / "manifest.json")
         content = self.manifest["specification"]["tasks"]
         return {name: parse_task(task, source) for name, task in content.items()}
 
-    @property
+    @cached_property
     def cells(self) -> list[CellRuns]:
         """The cells with their runs, in the order of the plan."""
         return [
