@@ -8,13 +8,12 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.frontier import SHARES
 from analysis.overall import NEAR, everywhere
-from analysis.pairwise import SHARES
-from analysis.statistics import RESAMPLES, Inference
+from analysis.statistics import LEVEL, RESAMPLES, Inference
 from analysis.study import Study
 from analysis.table import NONE, Table, interval, short
 
-LEVEL = 0.05
 _KINDS = {"conditions": 0, "method": 1, "variant": 2}
 
 

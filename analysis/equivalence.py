@@ -3,7 +3,8 @@
 A 95 % interval within ±margin is two one-sided tests at level 2.5 % (TOST; D. J.
 Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15). Against the paper,
 of which only mean, SD and number of runs are printed, the interval is Welch's; where the
-runs of both sides are at hand, it is the studentised bootstrap's.
+runs of both sides are at hand, it is the studentised bootstrap's. Of shares of runs it is
+Newcombe's.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special
+from scipy import optimize, special
 
 from analysis.published import Summary
 from analysis.statistics import (
@@ -22,6 +23,7 @@ from analysis.statistics import (
     FEWEST,
     RESAMPLES,
     Inference,
+    difference_of_shares,
     sample,
     samples_of,
     standard_error,
@@ -133,6 +135,39 @@ def bootstrap_equivalence(
         high=value - float(null[outside - 1]) * error,
         p=max(above, below) / (resamples + 1),
         seed=seed,
+    )
+
+
+def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:
+    """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
+
+    Newcombe's interval (:func:`analysis.statistics.difference_of_shares`). ``p`` is half the
+    error rate at which the interval just touches the margin, 1 where the shares themselves
+    differ by the margin or more.
+    """
+    margin = _positive(margin)
+    found = difference_of_shares(first, second)
+
+    def room(z: float) -> float:
+        """What the interval of ± z standard errors leaves of the margin."""
+        at = difference_of_shares(first, second, confidence=2 * float(special.ndtr(z)) - 1)
+        return margin - max(-at.low, at.high)
+
+    p = 1.0
+    if room(0.0) > 0:
+        widest = 8.0
+        p = float(
+            special.ndtr(-(optimize.brentq(room, 0.0, widest) if room(widest) < 0 else widest))
+        )
+    return Equivalence(
+        estimate=found.estimate,
+        n=found.n,
+        method=found.method,
+        low=found.low,
+        high=found.high,
+        confidence=found.confidence,
+        p=p,
+        margin=margin,
     )
 
 

@@ -26,6 +26,7 @@ from analysis import statistics
 from analysis.across_tasks import interquartile_mean
 from analysis.equivalence import bootstrap_equivalence, difference
 from analysis.published import Summary
+from analysis.statistics import LEVEL
 from analysis.table import Table
 from coartic.robot import Array
 
@@ -33,7 +34,6 @@ Draw = Callable[[np.random.Generator, int], Array]
 
 RUNS = 20
 RESAMPLES = 999
-LEVEL = 0.05
 SIMULATIONS = 4_000
 
 

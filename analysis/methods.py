@@ -15,6 +15,8 @@ from analysis.results import CellRuns, Results
 from analysis.table import NONE, Table, short, tally
 from coartic.method import Information
 
+LEARNER = "dual-process/"
+"""The paper's learner: the name begins so, and its exploration condition follows."""
 TOLD = {
     Information.GOALS: "G",
     Information.FORWARD_KINEMATICS: "F",

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.across_tasks import by_task, interquartile_mean, profile, task_mean
+from analysis.methods import LEARNER
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.statistics import FEWEST, Inference
 from analysis.study import SEED
@@ -24,7 +25,7 @@ NEAR = (0.01, 0.02, 0.05, 0.1)
 """Gaps, as shares of the optimum, that count as near."""
 THRESHOLDS = {"gap": np.arange(81) / 200, "score": np.arange(-10, 51) / 50}
 """Of the profiles: gaps from 0 to 40 %, normalised scores from −0.2 to 1."""
-_CONDITION = re.compile(r"dual-process/(EC\d)(.*)")
+_CONDITION = re.compile(re.escape(LEARNER) + r"(EC\d)(.*)")
 _ONE_ARMED, _TWO_ARMED = "EC1", ("EC4", "EC3")
 
 
@@ -41,11 +42,11 @@ def combined(scores: pd.DataFrame) -> pd.DataFrame:
         found = _CONDITION.fullmatch(label)
         if found is None or found[1] not in _TWO_ARMED:
             continue
-        one, variant = f"dual-process/{_ONE_ARMED}{found[2]}", found[2]
+        one, variant = f"{LEARNER}{_ONE_ARMED}{found[2]}", found[2]
         two_armed = scores[scores.method == label]
         elsewhere = scores[(scores.method == one) & ~scores.task.isin(two_armed.task)]
         if len(elsewhere):
-            name = f"dual-process ({_ONE_ARMED}{variant}, {found[1]}{variant})"
+            name = f"{LEARNER.rstrip('/')} ({_ONE_ARMED}{variant}, {found[1]}{variant})"
             parts.append(pd.concat([elsewhere, two_armed]).assign(method=name))
     return pd.concat(parts, ignore_index=True)
 

@@ -25,13 +25,15 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from analysis.methods import TOLD
+from analysis.frontier import SHARES
+from analysis.methods import LEARNER, TOLD
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.results import CellRuns
 from analysis.sample_size import runs_needed, smallest_difference
 from analysis.statistics import (
     Inference,
     bootstrap_test,
+    cliffs_delta,
     difference_of_means,
     holm,
     paired_by_seed,
@@ -44,9 +46,6 @@ from analysis.study import SEED, Study
 from coartic.exploration import CONDITIONS
 from coartic.robot import Array
 
-LEARNER = "dual-process/"
-SHARES = (0.05, 0.02, 0.01)
-"""Differences, as shares of the task's optimum, for which the runs needed are counted."""
 SPENDS = {
     "trials": ("trials",),
     "movement_ticks": ("movement_ticks",),
@@ -197,6 +196,7 @@ def _inference(pair: Pair, a: Array, b: Array) -> dict[str, Any]:
                 apart, kind = paired_difference(x, y, seed=SEED), "paired by seed"
             if pairs_n > 2 and np.ptp(x) and np.ptp(y):
                 correlation = float(np.corrcoef(x, y)[0, 1])
+    delta = cliffs_delta(better)
     notes = dict.fromkeys(n.note for n in (apart, test, permutation, better) if n.note)
     return {
         "difference": apart.estimate,
@@ -210,9 +210,9 @@ def _inference(pair: Pair, a: Array, b: Array) -> dict[str, Any]:
         "expected": "higher" if pair.expected == "greater" else "lower",
         "p_bootstrap": test.p,
         "p_permutation": permutation.p,
-        "delta": 2 * better.estimate - 1,
-        "delta_low": 2 * better.low - 1,
-        "delta_high": 2 * better.high - 1,
+        "delta": delta.estimate,
+        "delta_low": delta.low,
+        "delta_high": delta.high,
         "improvement": better.estimate,
         "improvement_low": better.low,
         "improvement_high": better.high,

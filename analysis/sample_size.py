@@ -12,7 +12,8 @@ import math
 
 from scipy import optimize, special, stats
 
-LEVEL = 0.05
+from analysis.statistics import LEVEL
+
 POWER = 0.8
 
 

@@ -11,8 +11,9 @@ Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, c
 to 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application,
 chapter 4 (p-values that count the observed sample); N. Cliff (1993), Psychological Bulletin
 114; R. Agarwal et al. (2021), NeurIPS 34 (interquartile mean, probability of improvement);
-R. G. Newcombe (2006), Statistics in Medicine 25; S. Holm (1979), Scandinavian Journal of
-Statistics 6; E. Chung & J. P. Romano (2013), Annals of Statistics 41.
+R. G. Newcombe (1998), Statistics in Medicine 17, 873 (difference of shares), and (2006),
+Statistics in Medicine 25; S. Holm (1979), Scandinavian Journal of Statistics 6; E. Chung &
+J. P. Romano (2013), Annals of Statistics 41.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ from coartic.robot import Array
 Alternative = Literal["greater", "less", "two-sided"]
 
 CONFIDENCE = 0.95
+LEVEL = 0.05
+"""Of a test."""
 RESAMPLES = 9_999
 """With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
 FEWEST = 3
@@ -217,28 +220,51 @@ def probability_of_improvement(
     )
 
 
-def cliffs_delta(
-    first: ArrayLike,
-    second: ArrayLike | float,
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
-) -> Inference:
+def cliffs_delta(improvement: Inference) -> Inference:
     """P(first higher) − P(second higher), from −1 to 1 (Cliff 1993).
 
-    Twice the probability of improvement, less one; so is its interval.
+    Of a :func:`probability_of_improvement`: twice that, less one; so is its interval.
     """
-    found = probability_of_improvement(
-        first, second, seed=seed, confidence=confidence, resamples=resamples
-    )
     return replace(
-        found,
-        estimate=2 * found.estimate - 1,
-        low=2 * found.low - 1,
-        high=2 * found.high - 1,
-        method=found.method.replace("probability of improvement", "Cliff's delta"),
+        improvement,
+        estimate=2 * improvement.estimate - 1,
+        low=2 * improvement.low - 1,
+        high=2 * improvement.high - 1,
+        method=improvement.method.replace("probability of improvement", "Cliff's delta"),
     )
+
+
+def difference_of_shares(
+    first: tuple[int, int], second: tuple[int, int], *, confidence: float = CONFIDENCE
+) -> Inference:
+    """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
+
+    Newcombe's hybrid of two Wilson intervals (1998, method 10), from −1 to 1. Raises ValueError
+    for a count that is not from 0 to a positive number of runs.
+    """
+    for count, total in (first, second):
+        if not 0 <= count <= total or not total:
+            raise ValueError(f"{count} of {total} runs is no share")
+    (a, low_a, high_a), (b, low_b, high_b) = (
+        _wilson(count, total, confidence) for count, total in (first, second)
+    )
+    return Inference(
+        a - b,
+        (first[1], second[1]),
+        "difference of shares, score interval (Newcombe 1998, method 10)",
+        a - b - math.hypot(a - low_a, high_b - b),
+        a - b + math.hypot(high_a - a, b - low_b),
+        confidence,
+    )
+
+
+def _wilson(count: int, total: int, confidence: float) -> tuple[float, float, float]:
+    """A share with Wilson's interval."""
+    z2 = float(special.ndtri(0.5 + confidence / 2)) ** 2
+    share = count / total
+    middle = (count + z2 / 2) / (total + z2)
+    half = math.sqrt(z2 * (total * share * (1 - share) + z2 / 4)) / (total + z2)
+    return share, max(0.0, middle - half), min(1.0, middle + half)
 
 
 def bootstrap_estimate(
@@ -437,6 +463,19 @@ def sign_flip_test(
         rng=np.random.default_rng(seed),
     ).pvalue
     return replace(found, p=float(p), seed=None if exact else seed)
+
+
+def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:
+    """Exact binomial test of ``count`` of ``total`` runs against a share (0 to 1).
+
+    The estimate is the share seen less that one.
+    """
+    return Inference(
+        count / total - share,
+        (total,),
+        f"{_TAILS[alternative]} exact binomial test against {share:.0%}",
+        p=float(stats.binomtest(count, total, share, alternative).pvalue),
+    )
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.equivalence import bootstrap_equivalence, difference
+from analysis.equivalence import bootstrap_equivalence, difference, shares
 from analysis.published import Summary
 
 
@@ -107,3 +107,25 @@ def test_arguments_that_cannot_be():
         difference([1.0, 2.0], Summary(1, 1, 20), margin=-1)
     with pytest.raises(ValueError, match="too few"):
         bootstrap_equivalence([1.0, 2, 3], 0.0, 1.0, seed=0, resamples=20)
+
+
+def test_shares_agree_where_newcombes_interval_is_within_the_margin():
+    """20 of 20 twice: the interval is ± z² / (20 + z²), a quarter at z² = 20/3."""
+    found = shares((20, 20), (20, 20), 0.25)
+    assert found.p == pytest.approx(stats.norm.sf(math.sqrt(20 / 3)), rel=1e-6)
+    assert found.verdict == "equivalent"
+    apart = shares((5, 20), (9, 20), 0.25)
+    assert apart.estimate == pytest.approx(-0.2)
+    assert apart.verdict == "undecided"
+    assert 0.025 < apart.p < 0.5
+    assert shares((0, 20), (11, 20), 0.25).p == 1.0
+    assert shares((0, 20), (11, 20), 0.25).verdict == "different"
+    many = shares((4_000_000, 8_000_000), (4_000_000, 8_000_000), 0.25)
+    assert many.verdict == "equivalent"
+    assert 0 < many.p < 1e-9
+    # The p-value is that of the interval.
+    for count in range(10, 20):
+        one = shares((count, 20), (17, 20), 0.25)
+        assert (one.p < 0.025) == (one.verdict == "equivalent")
+    with pytest.raises(ValueError, match="margin"):
+        shares((1, 2), (1, 2), 0.0)

@@ -177,8 +177,8 @@ def test_degenerate_samples(estimate):
 
 def test_shares_of_few_runs_have_no_interval_even_where_they_are_apart():
     for first, second in (([4.0], 1.0), ([4.0, 5.0], [1.0] * 9), ([4.0] * 9, [1.0, 2.0])):
-        for function in (statistics.probability_of_improvement, statistics.cliffs_delta):
-            found = function(first, second, seed=0)
+        improvement = statistics.probability_of_improvement(first, second, seed=0)
+        for found in (improvement, statistics.cliffs_delta(improvement)):
             assert found.estimate == 1.0
             assert math.isnan(found.low)
             assert "fewer than 3" in found.note
@@ -222,7 +222,7 @@ def test_pairs_of_different_length_are_refused():
 def test_probability_of_improvement_is_mann_whitneys(a, b):
     found = statistics.probability_of_improvement(a, b, seed=0, resamples=99)
     assert found.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / (len(a) * len(b)))
-    delta = statistics.cliffs_delta(a, b, seed=0, resamples=99)
+    delta = statistics.cliffs_delta(found)
     pairs = [np.sign(x - y) for x in a for y in b]
     assert delta.estimate == pytest.approx(np.mean(pairs))
     assert -1 <= delta.low <= delta.high <= 1 or math.isnan(delta.low)
@@ -239,7 +239,9 @@ def test_interval_of_samples_that_do_not_overlap():
     q1, q2 = low / (2 - low), 2 * low**2 / (1 + low)
     variance = (low * (1 - low) + (n - 1) * (q1 - low**2 + q2 - low**2)) / n**2
     assert (1 - low) / math.sqrt(variance) == pytest.approx(z)
-    mirrored = statistics.cliffs_delta(np.arange(n), np.arange(n) + 100, seed=0)
+    mirrored = statistics.cliffs_delta(
+        statistics.probability_of_improvement(np.arange(n), np.arange(n) + 100, seed=0)
+    )
     assert mirrored.low == mirrored.estimate == -1
     assert mirrored.high == pytest.approx(1 - 2 * low)
     known = statistics.probability_of_improvement(np.arange(n), -1, seed=0)
@@ -308,3 +310,37 @@ def test_pairing_by_seed():
     assert b.tolist() == [-30, -10]
     with pytest.raises(ValueError, match="one-to-one"):
         statistics.paired_by_seed(pd.concat([first, first]), second)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "low", "high"),
+    [  # Newcombe (1998), table II, method 10
+        ((56, 70), (48, 80), 0.0524, 0.3339),
+        ((9, 10), (3, 10), 0.1705, 0.8090),
+        ((6, 7), (2, 7), 0.0582, 0.8062),
+        ((5, 56), (0, 29), -0.0381, 0.1926),
+        ((10, 10), (0, 20), 0.6791, 1.0),
+        ((10, 10), (0, 10), 0.6075, 1.0),
+    ],
+)
+def test_difference_of_shares(first, second, low, high):
+    found = statistics.difference_of_shares(first, second)
+    assert found.estimate == pytest.approx(first[0] / first[1] - second[0] / second[1])
+    assert (found.low, found.high) == pytest.approx((low, high), abs=6e-5)
+    turned = statistics.difference_of_shares(second, first)
+    assert (-turned.high, -turned.low) == pytest.approx((found.low, found.high))
+
+
+def test_a_share_is_of_runs():
+    for wrong in ((3, 2), (-1, 2), (0, 0)):
+        with pytest.raises(ValueError, match="is no share"):
+            statistics.difference_of_shares((1, 2), wrong)
+
+
+def test_share_test():
+    """20 of 20 where three quarters are expected: 0.75 to the 20th."""
+    found = statistics.share_test(20, 20, 0.75, "greater")
+    assert found.estimate == pytest.approx(0.25)
+    assert found.p == pytest.approx(0.75**20)
+    assert statistics.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
+    assert statistics.share_test(15, 20, 0.75, "greater").p > 0.5

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from analysis.claims.beyond import BEYOND
+from analysis.claims.coarticulation import COARTICULATION
+from analysis.claims.conditions import CONDITIONS
 from analysis.claims.general import GENERAL
 from analysis.claims.one_armed import ONE_ARMED
 from analysis.claims.register import Claim, Judged, judge_claims
-from analysis.claims.two_armed import TWO_ARMED
+from analysis.claims.two_armed_1 import TWO_ARMED_1
+from analysis.claims.two_armed_2 import TWO_ARMED_2
 from analysis.study import Study
 
-CLAIMS: tuple[Claim, ...] = (*ONE_ARMED, *TWO_ARMED, *GENERAL, *BEYOND)
+CLAIMS: tuple[Claim, ...] = (
+    *ONE_ARMED, *TWO_ARMED_1, *TWO_ARMED_2, *CONDITIONS, *COARTICULATION, *GENERAL, *BEYOND
+)  # fmt: skip
 
 
 def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:

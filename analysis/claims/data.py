@@ -8,35 +8,40 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.methods import LEARNER, TOLD
 from analysis.published import TRIALS
 from analysis.results import Results
 from analysis.signatures.cell import Cell
+from analysis.signatures.recruitment import best_sequences
 from analysis.statistics import FEWEST
 from analysis.study import Study
 from coartic import Execution, Task, corrective_trial, initial_hands
 from coartic.errors import NotApplicableError
+from coartic.method import Information
 from coartic.robot import Array
 
-LEARNER = "dual-process/"
+ASCENDING, DESCENDING = "ascending", "descending"
+ONE, TWO = "two-armed-1", "two-armed-2"
 
-CELLS = (
-    ("ascending", "EC1"),
-    ("descending", "EC1"),
-    ("two-armed-1", "EC2"),
-    ("two-armed-1", "EC3"),
-    ("two-armed-1", "EC4"),
-    ("two-armed-2", "EC3"),
-    ("two-armed-2", "EC4"),
+Cells = tuple[tuple[str, str], ...]
+"""Tasks with a condition each."""
+
+CELLS: Cells = (
+    (ASCENDING, "EC1"),
+    (DESCENDING, "EC1"),
+    (ONE, "EC2"),
+    (ONE, "EC3"),
+    (ONE, "EC4"),
+    (TWO, "EC3"),
+    (TWO, "EC4"),
 )
 """Tasks and conditions of the paper."""
 
-BEST = (
-    ("ascending", "EC1"),
-    ("descending", "EC1"),
-    ("two-armed-1", "EC4"),
-    ("two-armed-2", "EC4"),
-)
+BEST: Cells = ((ASCENDING, "EC1"), (DESCENDING, "EC1"), (ONE, "EC4"), (TWO, "EC4"))
 """The condition that explores most, by task."""
+
+UNINFORMED = {TOLD[Information.CORRECTIVE_PROCESS], TOLD[Information.REWARD_BY_TRIAL]}
+"""All that the paper's learner is told (condition 2 is also told where the hands are)."""
 
 SMOOTH = {
     "squared-changes": "least squared configuration changes (Jordan)",
@@ -84,29 +89,38 @@ class Data:
 
     def runs(self, task: str, method: str) -> pd.DataFrame:
         """Solved runs of a method; raises MissingError where they cannot be judged."""
+        found = self._judgeable(task, method)
+        self.note(tuple(found.run_id))
+        return found
+
+    def _judgeable(self, task: str, method: str) -> pd.DataFrame:
         cell = self.study.cells.get((task, method))
         if cell is None or not len(cell.runs):
-            raise MissingError(f"no runs of {method} on {task}")
+            raise MissingError(f"this folder has no runs of {method} on {task}")
         if len(cell.good) < len(cell.runs):
             failed = len(cell.runs) - len(cell.good)
             raise MissingError(
-                f"{failed} of {len(cell.runs)} runs of {method} on {task} have no solution"
+                f"{failed} of {len(cell.runs)} runs of {method} on {task} failed, and without "
+                "their rewards the cell is not what the method does"
             )
         if method.startswith(LEARNER):
             trials = sorted(set(cell.runs.trials))
             if trials != [TRIALS]:
                 raise MissingError(
-                    f"runs of {method} on {task} with {TRIALS} trials, as the paper's have "
-                    f"(here {', '.join(map(str, trials))})"
+                    f"the paper's runs have {TRIALS} trials; those of {method} on {task} have "
+                    f"{', '.join(map(str, trials))}"
                 )
             if len(cell.runs) < FEWEST:
-                raise MissingError(f"at least {FEWEST} runs of {method} on {task}")
-        self.note(tuple(cell.good.run_id))
+                raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}")
         return cell.good
 
-    def learned(self, task: str, condition: str) -> pd.DataFrame:
-        """Runs of the paper's learner."""
-        return self.runs(task, LEARNER + condition)
+    def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
+        """Runs of the paper's learner, of ``hands`` only those that learned that sequence."""
+        found = self._judgeable(task, LEARNER + condition)
+        if hands is not None:
+            found = found[found.hands == hands]
+        self.note(tuple(found.run_id))
+        return found
 
     def rewards(self, task: str, condition: str) -> Array:
         """Learned rewards, shape ``(runs,)``."""
@@ -117,22 +131,18 @@ class Data:
 
         Not the learned reward, which as the best of all trials is never below trial 0's.
         """
-        runs = self.learned(task, condition)
-        if hands is not None:
-            runs = runs[runs.hands == hands]
+        runs = self.learned(task, condition, hands)
         replays = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         if not np.isfinite(replays).all():
-            raise MissingError(f"a replay of every run of {condition} on {task}")
+            raise MissingError(f"a run of {condition} on {task} has no replay")
         return replays
 
     def group(self, task: str, condition: str, hands: str) -> Array:
         """Learned rewards of the runs that learned a hand sequence, shape ``(runs,)``."""
-        runs = self.learned(task, condition)
-        found = rewards_of(runs[runs.hands == hands])
+        found = rewards_of(self.learned(task, condition, hands))
         if len(found) < FEWEST:
             raise MissingError(
-                f"at least {FEWEST} runs of {condition} on {task} that learned {hands} "
-                f"(here {len(found)})"
+                f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
             )
         return found
 
@@ -155,7 +165,7 @@ class Data:
         """A task of the folder."""
         known = self.results.tasks
         if name not in known:
-            raise MissingError(f"task {name}")
+            raise MissingError(f"this folder has no task {name}")
         return known[name]
 
     def initial(self, name: str) -> Execution:
@@ -175,18 +185,22 @@ class Data:
         table = self.results.sequences
         own = table[table.task == task] if len(table) else table
         if not len(own):
-            raise MissingError(f"the corrective process alone on {task}")
+            raise MissingError(
+                f"this folder has no rewards of the corrective process alone on {task}"
+            )
         self._others.append("sequences.parquet")
         rewards = own.reward.to_numpy(dtype=np.float64, na_value=np.nan)
         return dict(zip(map(str, own.hands), rewards.tolist(), strict=True))
 
     def best_sequences(self, task: str) -> tuple[list[str], float]:
         """Hand sequences that are best by the corrective process alone, and their reward."""
-        known = {h: r for h, r in self.sequences(task).items() if np.isfinite(r)}
-        if not known:
-            raise MissingError(f"a hand sequence with which the corrective process does {task}")
-        best = max(known.values())
-        return [hands for hands, reward in known.items() if reward == best], best
+        known = self.sequences(task)
+        best = best_sequences(self.results.sequences, task)
+        if not best:
+            raise MissingError(
+                f"the corrective process alone completes {task} with no hand sequence"
+            )
+        return best, known[best[0]]
 
 
 def rewards_of(runs: pd.DataFrame) -> Array:

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.claims.data import LEARNER, Data, MissingError
+from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
 from analysis.claims.register import Claim, Finding
+from analysis.methods import LEARNER
 from analysis.statistics import Inference, bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval
 
 CONTROLS = ("posture-based/one-goal", "corrective-alone/given")
 """Methods that do not look beyond the current goal."""
-_TASKS = ("ascending", "descending")
 _EC1 = f"{LEARNER}EC1"
 
 
 def _first_movement_sacrificed(data: Data) -> Finding:
     tests, parts = [], []
-    for task in _TASKS:
+    for task in (ASCENDING, DESCENDING):
         cell, initial = data.cell(task, _EC1), data.initial(task)
         before = initial.ticks_by_goal()[0]
         first = np.array([float(run.execution.ticks_by_goal()[0]) for run in cell.runs])
@@ -46,8 +46,8 @@ def sacrifice(data: Data, method: str) -> tuple[float, float] | None:
     None where the folder lacks the runs.
     """
     try:
-        first = data.signature("ascending", method, "first subtask against initial")
-        total = data.signature("ascending", method, "total against initial")
+        first = data.signature(ASCENDING, method, "first subtask against initial")
+        total = data.signature(ASCENDING, method, "total against initial")
     except MissingError:
         return None
     return float(first["value"]), float(total["value"])
@@ -55,11 +55,11 @@ def sacrifice(data: Data, method: str) -> tuple[float, float] | None:
 
 def _context_matters(data: Data) -> Finding:
     where = "goal 1"
-    data.runs("descending", _EC1)
-    distance = data.signature("ascending", _EC1, "context distance", where)["value"]
-    row = data.signature("ascending", _EC1, "context dependence", where)
-    equivalent = data.signature("ascending", _EC1, "motor-equivalent part", where)["value"]
-    other = data.signature("ascending", _EC1, "non-motor-equivalent part", where)["value"]
+    data.runs(DESCENDING, _EC1)
+    distance = data.signature(ASCENDING, _EC1, "context distance", where)["value"]
+    row = data.signature(ASCENDING, _EC1, "context dependence", where)
+    equivalent = data.signature(ASCENDING, _EC1, "motor-equivalent part", where)["value"]
+    other = data.signature(ASCENDING, _EC1, "non-motor-equivalent part", where)["value"]
     apart = row["value"]
     test = Inference(apart, (int(row["n"]),), "permutation test over runs", p=row["p"], seed=SEED)
     parts = [
@@ -72,14 +72,14 @@ def _context_matters(data: Data) -> Finding:
         if (apart := context_distance(data, method)) is not None
     ]
     # A permutation test has no contrary side: too small a difference leaves it open.
-    return Finding(True if row["value"] > 1 else None, "; ".join(parts), (test,))
+    return Finding(True if row["value"] > 1 else None, "; ".join(parts), (test,), ())
 
 
 def context_distance(data: Data, method: str) -> float | None:
     """Distance of mean postures at goal 1, ascending and descending; None without runs."""
     try:
-        data.runs("descending", method)
-        return float(data.signature("ascending", method, "context distance", "goal 1")["value"])
+        data.runs(DESCENDING, method)
+        return float(data.signature(ASCENDING, method, "context distance", "goal 1")["value"])
     except MissingError:
         return None
 
@@ -94,6 +94,7 @@ ONE_ARMED: tuple[Claim, ...] = (
         "current goal stand beside it",
         _first_movement_sacrificed,
         "Results, Exploration Condition 1",
+        "the reward incurred after making the first movement is more negative",
         "Figure 5",
     ),
     Claim(
@@ -104,6 +105,7 @@ ONE_ARMED: tuple[Claim, ...] = (
         "Controls that do not look beyond the current goal stand beside it",
         _context_matters,
         "Results, Exploration Condition 1",
+        "the joint configuration the robot used to hit the first goal differed",
         "Figure 5",
     ),
 )

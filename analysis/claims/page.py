@@ -15,8 +15,8 @@ from analysis.results import Results
 from analysis.table import NONE, Table
 
 FITTED = (
-    "† entered the choice of the two-armed tasks' goals, which are a reconstruction "
-    "(docs/model.md): a reproduction, no independent test."
+    "† rests on the two-armed tasks. Their goals are a reconstruction, chosen so that printed "
+    "rewards and hand sequences come out (docs/model.md): a reproduction, no independent test."
 )
 
 
@@ -25,8 +25,9 @@ def claims_frame(judged: Iterable[Judged]) -> pd.DataFrame:
 
     Columns: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence`` (with its
     table, row by row), ``test``, ``p`` (largest of the claim's tests), ``adjusted_p`` (Holm),
-    ``place``, ``figure`` (of the paper), ``runs`` (ids, space-separated), ``sources`` (what
-    else it rests on).
+    ``contrary_p`` (smallest of the contrary's tests, times their number),
+    ``adjusted_contrary_p``, ``place``, ``quote``, ``figure`` (of the paper), ``runs`` (ids,
+    space-separated), ``sources`` (what else it rests on).
     """
     return pd.DataFrame(
         [
@@ -40,7 +41,10 @@ def claims_frame(judged: Iterable[Judged]) -> pd.DataFrame:
                 "test": entry.claim.test,
                 "p": entry.p,
                 "adjusted_p": entry.adjusted_p,
+                "contrary_p": entry.contrary_p,
+                "adjusted_contrary_p": entry.adjusted_contrary_p,
                 "place": entry.claim.place,
+                "quote": entry.claim.quote,
                 "figure": entry.claim.figure,
                 "runs": " ".join(entry.run_ids),
                 "sources": ", ".join(entry.sources),
@@ -57,6 +61,7 @@ def claims_page(results: Results, judged: Sequence[Judged]) -> str:
     """
     specification = results.manifest["specification"]
     tests = sum(not math.isnan(entry.p) for entry in judged)
+    contraries = sum(not math.isnan(entry.contrary_p) for entry in judged)
     parts = [
         "# Claims",
         f"What Shah, Barto & Fagg (2013) say of their model, tested on suite "
@@ -66,13 +71,19 @@ def claims_page(results: Results, judged: Sequence[Judged]) -> str:
         f"{_rules()} {FITTED} Run ids of every claim are in `claims.csv`.",
         Table(
             "Verdicts",
-            ("claim", "verdict", "adjusted p"),
+            ("claim", "verdict", "adjusted p", "of the contrary"),
             tuple(
-                (f"[{entry.claim.id}](#{entry.claim.id})", _verdict(entry), _p(entry.adjusted_p))
+                (
+                    f"[{entry.claim.id}](#{entry.claim.id})",
+                    _verdict(entry),
+                    _p(entry.adjusted_p),
+                    _p(entry.adjusted_contrary_p),
+                )
                 for entry in judged
             ),
         ).to_markdown(),
-        f"p: the largest of a claim's tests, adjusted by Holm over {tests} claims.",
+        f"Adjusted by Holm over the {tests} claims that could be tested here, for the contrary "
+        f"over {contraries}.",
     ]
     for section, entries in itertools.groupby(judged, key=lambda entry: entry.claim.section):
         parts += [f"## {section}", *map(_entry, entries)]
@@ -103,6 +114,7 @@ def _rules() -> str:
 def _entry(entry: Judged) -> str:
     claim = entry.claim
     where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+    quote = f": “{claim.quote}”" if claim.quote else ""
     lines = [
         f"### {claim.id}",
         f"{claim.statement} **{_verdict(entry).capitalize()}.**",
@@ -111,8 +123,10 @@ def _entry(entry: Judged) -> str:
     ]
     if claim.place and entry.methods:
         p = f"p = {_p(entry.p)}, adjusted {_p(entry.adjusted_p)}"
-        lines.append(f"- {p}; {'; '.join(entry.methods)}.")
-    lines.append(f"- Place: {where}. Rests on: {_basis(entry)}.")
+        contrary = f"of the contrary {_p(entry.contrary_p)}, adjusted "
+        contrary += _p(entry.adjusted_contrary_p)
+        lines.append(f"- {p}; {contrary}; {'; '.join(entry.methods)}.")
+    lines.append(f"- Place: {where}{quote}. Rests on: {_basis(entry)}.")
     text = "\n\n".join([*lines[:2], "\n".join(lines[2:])])
     return text if entry.table is None else f"{text}\n\n{entry.table.to_markdown()}"
 

@@ -1,10 +1,13 @@
 """What a claim is, and the rules of its verdict.
 
 *Supported*: what the claim says is seen, and the largest p-value of the tests it rests on
-(they must all hold: an intersection-union test) stays below 5 % after Holm's correction over
-the paper's claims. *Not supported*: the contrary is significant, or what can be counted
-exactly is not there. *Cannot tell*: neither, or the folder lacks the runs. Comparisons that
-the paper does not make are *measured*, not judged.
+(they must all hold: an intersection-union test) stays below 5 % after Holm's correction.
+*Not supported*: it is not seen, and the contrary of one of its tests is significant (the
+smallest p-value of the contrary times their number, below 5 % after Holm's correction). What
+is counted exactly, or shows no spread over runs, needs no test and is supported or not as it
+is. *Cannot tell*: neither, or the folder lacks the runs. Each of the two corrections is over
+all of the paper's claims that the folder can test. Comparisons that the paper does not make
+are *measured*, not judged.
 """
 
 from __future__ import annotations
@@ -15,11 +18,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from analysis.claims.data import Data, MissingError
-from analysis.statistics import Inference, holm
+from analysis.statistics import LEVEL, RESAMPLES, Inference, holm
 from analysis.study import Study
 from analysis.table import Table
 
-LEVEL = 0.05
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
 Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
 
@@ -32,7 +34,9 @@ class Finding:
     """Whether what the claim says is seen; None where nothing is judged."""
     evidence: str
     tests: tuple[Inference, ...] = ()
-    """One-tailed tests that it rests on, turned so that a positive estimate is as claimed."""
+    """Tests that it rests on, turned so that a positive estimate is as claimed."""
+    against: tuple[Inference, ...] | None = None
+    """Tests of the contrary, any of which refutes it; None: the other tails of ``tests``."""
     table: Table | None = None
     """Numbers that are more than a sentence can hold."""
 
@@ -48,10 +52,12 @@ class Claim:
     judge: Callable[[Data], Finding]
     place: str = ""
     """Section of the paper that makes it; empty for comparisons of our own."""
+    quote: str = ""
+    """A few words of the paper by which the place can be found."""
     figure: str = ""
     """Figure of the paper that shows it, where one does."""
     fitted: bool = False
-    """Whether it entered the choice of the two-armed tasks' goals."""
+    """Whether it rests on a task whose goals were chosen for results like it."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +71,9 @@ class Judged:
     """Largest of its tests; NaN without a test, and where nothing is judged."""
     adjusted_p: float = math.nan
     """The same, adjusted over the paper's claims (Holm)."""
+    contrary_p: float = math.nan
+    """Smallest p-value of the contrary, times the number of tests."""
+    adjusted_contrary_p: float = math.nan
     methods: tuple[str, ...] = ()
     """Tests, in words."""
     run_ids: tuple[str, ...] = ()
@@ -82,24 +91,27 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
         try:
             finding = claim.judge(data)
         except MissingError as missing:
-            found.append((claim, Finding(None, f"not in this folder: {missing}"), (), ()))
+            found.append((claim, Finding(None, f"not judged: {missing}"), (), ()))
         else:
             found.append((claim, finding, data.run_ids, data.others))
     largest = [_largest(finding) if claim.place else math.nan for claim, finding, *_ in found]
+    contrary = [_contrary(finding) if claim.place else math.nan for claim, finding, *_ in found]
     return [
         Judged(
             claim,
-            _verdict(claim, finding, adjusted, seen=bool(run_ids or sources)),
+            _verdict(claim, finding, adjusted, refuted, seen=bool(run_ids or sources)),
             finding.evidence,
             p,
             adjusted,
-            tuple(dict.fromkeys(map(_in_words, finding.tests))),
+            against,
+            refuted,
+            tuple(dict.fromkeys(map(_in_words, (*finding.tests, *(finding.against or ()))))),
             run_ids,
             sources,
             finding.table,
         )
-        for (claim, finding, run_ids, sources), p, adjusted in zip(
-            found, largest, holm(largest), strict=True
+        for (claim, finding, run_ids, sources), p, adjusted, against, refuted in zip(
+            found, largest, holm(largest), contrary, holm(contrary), strict=True
         )
     ]
 
@@ -115,7 +127,18 @@ def _largest(finding: Finding) -> float:
     return max((t.p for t in finding.tests if not math.isnan(t.p)), default=math.nan)
 
 
-def _verdict(claim: Claim, finding: Finding, p: float, *, seen: bool) -> Verdict:
+def _contrary(finding: Finding) -> float:
+    """One contrary suffices: the smallest p-value, times their number (Bonferroni)."""
+    against = finding.against
+    p = [
+        t.p if against is not None else min(1.0, 1 - t.p + 1 / (RESAMPLES + 1))
+        for t in (finding.tests if against is None else against)
+        if not math.isnan(t.p)
+    ]
+    return min(1.0, min(p) * len(p)) if p else math.nan
+
+
+def _verdict(claim: Claim, finding: Finding, p: float, contrary: float, *, seen: bool) -> Verdict:
     if not seen:
         return "cannot tell"
     if not claim.place:
@@ -125,11 +148,5 @@ def _verdict(claim: Claim, finding: Finding, p: float, *, seen: bool) -> Verdict
     if finding.holds:
         # NaN: counted exactly, or no spread in any sample.
         return "cannot tell" if p >= LEVEL else "supported"
-    if not finding.tests:
-        return "not supported"
-    return "not supported" if any(map(_contrary, finding.tests)) else "cannot tell"
-
-
-def _contrary(test: Inference) -> bool:
-    """Of a one-tailed test: the contrary is as significant as p is near to one."""
-    return test.estimate < 0 if math.isnan(test.p) else test.p >= 1 - LEVEL / 2
+    certain = not finding.tests or any(t.estimate < 0 and math.isnan(t.p) for t in finding.tests)
+    return "not supported" if certain or contrary < LEVEL else "cannot tell"

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import LEARNER, Data, MissingError
+from analysis.claims.data import Data, MissingError
 from analysis.claims.register import Finding
+from analysis.methods import LEARNER
 from analysis.statistics import bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval

@@ -1,0 +1,116 @@
+"""The paper's claims that coarticulation shows in the hands chosen and in the other arm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.claims.data import ONE, Data, MissingError
+from analysis.claims.register import Claim, Finding
+from analysis.methods import LEARNER
+from analysis.signatures.cell import Cell
+from analysis.signatures.other_arm import preshaping, preshaping_since_hit
+from analysis.signatures.recruitment import isolated_agreement
+from analysis.statistics import FEWEST, bootstrap_test, mean, share_test
+from analysis.study import SEED
+from analysis.table import interval
+from coartic.robot import Array
+
+_CONTROLS = ("corrective-alone/every", "posture-based/one-goal hands=every, other_arm=free")
+"""Methods that do not look beyond the current goal."""
+
+
+def _hand_coarticulation(data: Data) -> Finding:
+    tests, against, parts = [], [], []
+    for condition in ("EC3", "EC4"):
+        cell = data.cell(ONE, LEARNER + condition)
+        # The last goal has no successor to be prepared for.
+        agrees = np.array([isolated_agreement(run)[:-1] for run in cell.runs])
+        away, total = int((~agrees.all(axis=1)).sum()), len(agrees)
+        tests.append(share_test(away, total, 0.5, "greater"))
+        against.append(share_test(away, total, 0.5, "less"))
+        goals = ", ".join(f"goal {k} {n}" for k, n in enumerate((~agrees).sum(axis=0), 1) if n)
+        parts.append(f"{condition}: {away} of {total} runs ({goals or 'no goal'})")
+    return Finding(
+        all(test.estimate > 0 for test in tests), "; ".join(parts), tuple(tests), tuple(against)
+    )
+
+
+def prepared_by_waiting(cell: Cell) -> Array:
+    """How much nearer the waiting arm has brought its hand to its next goal, mean over goals.
+
+    :func:`analysis.signatures.other_arm.preshaping_since_hit` of each run, shape ``(runs,)``:
+    0 where the arm keeps still. Runs that use one hand only are left out. Raises MissingError
+    where the corrective process alone does not complete the task.
+    """
+    values = _by_goal(cell, since_hit=True)
+    known = ~np.isnan(values)
+    return np.asarray(np.nanmean(values[known.any(axis=1)], axis=1))
+
+
+def _by_goal(cell: Cell, *, since_hit: bool) -> Array:
+    """Preshaping of each run by goal, shape ``(runs, G)``."""
+    initial = cell.initial
+    if initial is None:
+        raise MissingError(f"the corrective process alone does not complete {cell.task.name}")
+    measure = preshaping_since_hit if since_hit else preshaping
+    return np.array([measure(run, initial) for run in cell.runs])
+
+
+def _goals(values: Array) -> str:
+    """Means by goal, of the goals that have one."""
+    known = [(k, row[~np.isnan(row)]) for k, row in enumerate(values.T, 1)]
+    return ", ".join(f"goal {k} {row.mean():+.2f}" for k, row in known if len(row))
+
+
+def _other_arm_prepares(data: Data) -> Finding:
+    moving, still = (data.cell(ONE, LEARNER + condition) for condition in ("EC4", "EC3"))
+    own = prepared_by_waiting(moving)
+    if len(own) < FEWEST:
+        raise MissingError(f"fewer than {FEWEST} runs of EC4 on {ONE} use both hands")
+    test = bootstrap_test(own, 0.0, seed=SEED)
+    parts = [
+        f"what the waiting arm does under EC4 brings its hand nearer by "
+        f"{interval(mean(own, seed=SEED), '.2f')} of the initial distance "
+        f"({_goals(_by_goal(moving, since_hit=True))})",
+        "with the base and the posture that its last hit left, it is nearer than in the initial "
+        f"solution by {_goals(_by_goal(moving, since_hit=False))} under EC4, by "
+        f"{_goals(_by_goal(still, since_hit=False))} under EC3, where that arm cannot move",
+    ]
+    for label in _CONTROLS:
+        try:
+            control = prepared_by_waiting(data.cell(ONE, label))
+        except MissingError:
+            continue
+        if len(control):
+            parts.append(f"{label}, by waiting: {control.mean():.2f}")
+    return Finding(test.estimate > 0, "; ".join(parts), (test,))
+
+
+COARTICULATION: tuple[Claim, ...] = (
+    Claim(
+        "hand-coarticulation",
+        "Coarticulation shows in which hand is chosen: a goal that others follow is hit with a "
+        "hand that is not the quicker one for it alone (two-armed task 1, conditions 3 and 4).",
+        "Two-armed tasks",
+        "exact binomial tests that more than half the runs do so; the quicker hand is that of the "
+        "corrective process from the same posture",
+        _hand_coarticulation,
+        "Discussion",
+        "Coarticulation was seen in terms of which arm was used",
+        "Figure 6",
+        fitted=True,
+    ),
+    Claim(
+        "other-arm-coarticulation",
+        "Coarticulation shows in the other arm: under condition 4 the waiting arm moves so that "
+        "its hand gets nearer to its own next goal (two-armed task 1).",
+        "Two-armed tasks",
+        "one-tailed bootstrap test that preshaping since the arm's last hit (0 where it keeps "
+        "still) is above 0, mean over the goals of a run; controls that do not look beyond the "
+        "current goal stand beside it",
+        _other_arm_prepares,
+        "Method, The Learning Process; Discussion",
+        "so that the robot would be able to hit goal 3",
+        fitted=True,
+    ),
+)
