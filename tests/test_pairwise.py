@@ -286,7 +286,7 @@ def test_one_row_over_one_and_two_armed_tasks(tmp_path):
     profiles = profiles_frame(scores).set_index(["method", "kind", "threshold"]).share
     assert profiles[name, "gap", 0.01] == overall.loc[name, "within_1"]
     assert profiles[name, "gap", 0.1] == 7 / 8
-    assert profiles[name, "score", 0.9] == 4 / 8
+    assert profiles[name, "score", 0.8] == 5 / 8
 
 
 @pytest.fixture(scope="module")

@@ -204,7 +204,7 @@ def _absent_without_looking_ahead(data: Data) -> Finding:
     for method in (f"{LEARNER}EC1", *CONTROLS):
         apart, change = context_distance(data, method), sacrifice(data, method)
         if apart is None or change is None:
-            raise MissingError(f"runs of {method} on ascending and descending")
+            raise MissingError(f"this folder lacks runs of {method} on ascending and descending")
         parts.append(
             f"{method}: postures at goal 1 {apart:.2f} apart, first movement {change[0]:+.1f} and "
             f"all {change[1]:+.1f} ticks against the initial solution"
@@ -377,8 +377,8 @@ BEYOND: tuple[Claim, ...] = (
         "How far the learned rewards agree with those that the paper prints.",
         "Beyond the paper",
         f"95 % interval of the difference of means (Welch's) within ± {MARGIN:.0%} of the printed "
-        "reward: equivalent, outside: different; EC2 printed by hand sequence, its mean over all "
-        "runs is ours",
+        "reward: equivalent, outside: different. EC2 is printed by hand sequence, from which the "
+        "mean over all its runs follows",
         _as_printed,
     ),
     Claim(
