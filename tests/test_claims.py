@@ -445,7 +445,7 @@ def cheap(spent):
 
 
 JUST = {"squared-changes": -302, "acceleration": -300, "jerk": -300}
-"""One plan a little worse than the learner: p of its test is some 0.03, times six above 0.05."""
+"""One plan a little worse than the learner: p of its test is 0.049, too much times six."""
 
 
 @pytest.mark.parametrize(
