@@ -290,15 +290,21 @@ def test_a_tick_is_no_sacrifice(change, seen):
     assert sacrifices(np.array(change)) is seen
 
 
-def test_p_of_a_sacrifice_by_hand():
-    """First subtask 2, 4 and 6 ticks longer, less 1: mean 3, standard error 2 / √3; t = 2.598."""
-    changes = np.array([[2, -100], [4, -101], [6, -105]])
-    exact = stats.t.sf(3 / (2 / math.sqrt(3)), 2)
-    assert sacrifice_p(changes) == pytest.approx(exact)  # the whole is far shorter
-    assert sacrifice_p(changes * [1, -1]) > 0.99  # the whole is longer
-    assert sacrifice_p(np.array([[1, -9], [2, -8], [0, -7]])) == 0.5  # by one tick in the mean
-    assert math.isnan(sacrifice_p(changes[:1]))
-    assert math.isnan(sacrifice_p(np.array([[27, -60], [27, -61]])))  # no spread to test
+def test_p_of_a_sacrifice():
+    """Both have to be: a first subtask longer by more than a tick, and a shorter whole."""
+    noise = rng(3).standard_normal(20) * 3
+    first, rest = 6 + noise, -30 + noise[::-1]
+
+    def p(first, rest):
+        return sacrifice_p(np.stack([first, rest], axis=1), seed=1)
+
+    assert p(first, rest) < 0.001
+    assert p(first, rest + 30) > 0.9  # the whole is longer
+    assert p(-first, rest) > 0.9  # the first is shorter
+    assert p(noise - noise.mean() + 1, rest) == pytest.approx(0.5, abs=0.1)  # by one tick
+    assert math.isnan(p(first[:1], rest[:1]))
+    assert math.isnan(p(np.full(20, 27), rest))  # no spread to test
+    assert math.isnan(p(first, 5 - first))
 
 
 def test_other_hands_are_no_sacrifice(tmp_path):

@@ -77,7 +77,7 @@ def signatures_frame(
     Wilson's. What each one means stands with its function. Differences between contexts
     stand with the first task of the pair and name the other; tasks that locus families join
     are no pairs, their slopes say how each depends on the others. ``seed`` is of the permutation
-    tests, which draw apart for each row and do not depend on the other rows.
+    and bootstrap tests, which draw apart for each row and do not depend on the other rows.
     """
     cells = cells_of(results) if cells is None else cells
     groups = families(results.tasks)
@@ -95,7 +95,7 @@ def signatures_frame(
         rows.extend({**key, **asdict(signature)} for signature in found)
 
     for cell in cells:
-        add(cell, _of_cell(cell, best_sequences(results.sequences, cell.task.name)))
+        add(cell, _of_cell(cell, best_sequences(results.sequences, cell.task.name), seed))
         alone = True
         for first, second, shared in pairs:
             both = [by_key.get((cell.method, cell.variant, name)) for name in (first, second)]
@@ -116,18 +116,18 @@ def signatures_frame(
     return pd.DataFrame(rows)
 
 
-def _of_cell(cell: Cell, best: list[str]) -> Iterator[Signature]:
-    yield from _sacrifice(cell)
+def _of_cell(cell: Cell, best: list[str], seed: int) -> Iterator[Signature]:
+    yield from _sacrifice(cell, seed)
     yield from _recruitment(cell, best)
     yield from _other_arm(cell)
     yield from _form(cell)
     yield from _synergies(cell)
 
 
-def _sacrifice(cell: Cell) -> Iterator[Signature]:
+def _sacrifice(cell: Cell, seed: int) -> Iterator[Signature]:
     goals = _goals(cell.task)
     yield from _against_initial(cell)
-    yield from _against_same_hands(cell)
+    yield from _against_same_hands(cell, seed)
     yield from _by_goal(
         "subtask against isolated reach",
         goals,
@@ -148,7 +148,7 @@ def _against_initial(cell: Cell) -> Iterator[Signature]:
     yield _mean(names[1], "", change.sum(axis=1), TICKS)
 
 
-def _against_same_hands(cell: Cell) -> Iterator[Signature]:
+def _against_same_hands(cell: Cell, seed: int) -> Iterator[Signature]:
     """Against the corrective process alone with each run's own hands: the sacrifice."""
     names = (
         "first subtask against the same hands",
@@ -168,7 +168,7 @@ def _against_same_hands(cell: Cell) -> Iterator[Signature]:
     changes = np.array([change_from(execution, reference) for execution, reference in pairs])
     yield _mean(names[0], "goal 1", changes[:, 0], TICKS)
     yield _mean(names[1], "", changes.sum(axis=1), TICKS)
-    p = sacrifice_p(changes)
+    p = sacrifice_p(changes, seed=seed)
     why = _one_run(len(changes))
     if not why and math.isnan(p):
         why = "no test: the first subtask or the whole takes the same ticks in every run"

@@ -35,8 +35,8 @@ _NOTES = (
 )
 _HANDS = (
     "Hand sequences with the number of runs; ticks less those of the corrective process alone "
-    "with each run's own hands, which is what a sacrifice is judged by; and by goal, the share of runs "
-    "that hit it with the hand that is quickest for it by itself."
+    "with each run's own hands, which is what a sacrifice is judged by; and by goal, the share of "
+    "runs that hit it with the hand that is quickest for it by itself."
 )
 _VARIANCE = (
     "Variance over runs per dimension within (V_ucm) and orthogonal to (V_ort) the uncontrolled "

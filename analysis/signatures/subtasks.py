@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
+from analysis.statistics import RESAMPLES, bootstrap_test
 from coartic import PAPER, Execution, Hand, MotionModel, Task, Trajectory, correct, move
 from coartic.robot import Array
 
@@ -63,21 +61,21 @@ def sacrifices(change: ArrayLike) -> bool:
     return bool(ticks[0] > ROUNDING and ticks.sum() < 0)
 
 
-def sacrifice_p(changes: ArrayLike) -> float:
+def sacrifice_p(changes: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> float:
     """Probability of such changes, shape ``(runs, G)``, if there were no sacrifice in the mean.
 
     No sacrifice: the mean first subtask takes longer by no more than :data:`ROUNDING`, or the
-    mean whole takes no less. The larger p of Student's two one-sided tests (intersection-union
+    mean whole takes no less. The larger p of two one-tailed tests
+    (:func:`analysis.statistics.bootstrap_test`), as both have to reject (intersection-union
     test, Berger 1982). NaN below two runs, and where either does not differ between runs.
     """
     ticks = np.asarray(changes, dtype=np.float64)
-    first, total = ticks[:, 0] - ROUNDING, -ticks.sum(axis=1)
-    if len(ticks) < 2 or min(np.ptp(first), np.ptp(total)) == 0:
-        return math.nan
-    return max(
-        float(stats.ttest_1samp(values, 0.0, alternative="greater").pvalue)
-        for values in (first, total)
+    first, total = ticks[:, 0], ticks.sum(axis=1)
+    tests = (
+        bootstrap_test(first, ROUNDING, seed=seed, resamples=resamples),
+        bootstrap_test(total, 0.0, "less", seed=seed, resamples=resamples),
     )
+    return float(np.max([test.p for test in tests]))
 
 
 def excess(path: Trajectory) -> Array:
