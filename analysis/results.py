@@ -10,10 +10,18 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.integrity import (
+    ANEW,
+    check_columns,
+    check_learning,
+    check_manifest,
+    check_paths,
+    check_runs,
+    check_sequences,
+    check_solutions,
+    damaged,
+)
 from coartic import CoarticError, Task, parse_task
-
-FORMAT = 3  # of the tables, as benchmarks.tables writes them
-_ANEW = "start the same `coartic run` again: it makes the tables anew from the records"
 
 
 @dataclass(frozen=True)
@@ -70,49 +78,55 @@ class Results:
         ]
 
     def solutions(self) -> pd.DataFrame:
-        """Movements of every run's solution. Raises CoarticError where they cannot be read.
+        """Movements of every run's solution.
 
-        That includes a run with a solution whose movements are missing.
+        Raises CoarticError where they cannot be read, or are not all that the runs made.
         """
-        table = read_table(self.folder, "solutions", nullable=False)
-        solved = self.runs.run_id[self.runs.status == "ok"]
-        lost = solved[~solved.isin(table.run_id)]
-        if len(lost):
-            raise CoarticError(
-                f"{self.folder / 'solutions.parquet'} is damaged (it lacks the movements of "
-                f"{len(lost)} runs, {lost.iloc[0]} the first of them); {_ANEW}"
-            )
+        path, table = read_table(self.folder, "solutions", nullable=False)
+        check_solutions(path, table, self.runs, self.tasks)
         return table
 
     def paths(self) -> pd.DataFrame:
         """Waypoints of the movements that follow a path. Raises CoarticError as above."""
-        return read_table(self.folder, "paths", nullable=False)
+        path, table = read_table(self.folder, "paths", nullable=False)
+        check_paths(path, table, self.solutions(), self.runs, self.tasks)
+        return table
 
     def learning(self) -> pd.DataFrame:
         """Reward of every trial. Raises CoarticError as above."""
-        return read_table(self.folder, "learning")
+        path, table = read_table(self.folder, "learning")
+        check_learning(path, table, self.runs)
+        return table
 
 
 def load_results(folder: Path) -> Results:
-    """Read a results folder. Raises CoarticError where it is not one or is damaged."""
+    """Read a results folder.
+
+    Raises CoarticError where it is not one, is not finished, or is damaged: where its runs are
+    not those of its plan, say.
+    """
+    source = folder / "manifest.json"
     try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise CoarticError(
-            f"{folder} is not a results folder: {error.filename} is missing"
-        ) from None
+        manifest = json.loads(source.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        if (folder / "records").is_dir():
+            raise CoarticError(
+                f"{folder} has records of runs but no tables yet: its run was interrupted, or is "
+                "still at work; start the same `coartic run` again, which does what is missing"
+            ) from None
+        raise CoarticError(f"{folder} is not a results folder: {source} is missing") from None
     except (OSError, ValueError) as error:
         raise CoarticError(f"{folder}: results cannot be read: {error}") from None
-    if manifest.get("format") != FORMAT:
-        raise CoarticError(
-            f"{folder}: its tables have format {manifest.get('format')}, this version reads "
-            f"{FORMAT}; run the same `coartic run` again to make them anew from the records"
-        )
-    return Results(folder, manifest, read_table(folder, "runs"), read_table(folder, "sequences"))
+    check_manifest(source, manifest)
+    (path, runs), (other, sequences) = (read_table(folder, name) for name in ("runs", "sequences"))
+    results = Results(folder, manifest, runs, sequences)
+    check_runs(path, runs, manifest["specification"]["run_ids"])
+    check_sequences(other, sequences, results.tasks)
+    return results
 
 
-def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFrame:
-    """A table of a results folder, with nullable types unless it has no missing values.
+def read_table(folder: Path, name: str, *, nullable: bool = True) -> tuple[Path, pd.DataFrame]:
+    """A table of a results folder and its path; nullable types unless it lacks no values.
 
     Raises CoarticError where it is missing or damaged, or holds another table.
     """
@@ -123,11 +137,8 @@ def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFram
         else:
             table = pd.read_parquet(path)
     except FileNotFoundError:
-        raise CoarticError(f"{path} is missing; {_ANEW}") from None
+        raise CoarticError(f"{path} is missing; {ANEW}") from None
     except (OSError, ValueError) as error:
-        why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise CoarticError(f"{path} is damaged ({why}); {_ANEW}") from None
-    key = "task" if name == "sequences" else "run_id"
-    if key not in table.columns:
-        raise CoarticError(f"{path} is damaged (it has no column {key!r}); {_ANEW}")
-    return table
+        damaged(path, str(error).splitlines()[0] if str(error) else type(error).__name__)
+    check_columns(path, table)
+    return path, table

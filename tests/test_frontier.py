@@ -23,6 +23,8 @@ from analysis.progress import SPENDS, by_trial, progress
 from analysis.results import Results
 from coartic import load_task
 
+from .strategies import tiny_task
+
 BEST = -465  # proven optimum of two-armed 1
 NAN = math.nan
 
@@ -377,6 +379,52 @@ def test_the_page(tmp_path):
         assert f"other arm {arm}" in page
     assert "No run within the widest: none." in page
     assert "within 10% of each other count as ties" in page
+    assert "Optimum: -465 with the other arm free (proven); " in page
+
+
+def test_a_page_has_no_empty_tables(tmp_path):
+    """No method keeps the other arm still: nothing is said of that optimum."""
+    rows = [run("m", [-600.0, -470.0], number=i, other_arm_travel=0.5) for i in range(3)]
+    results = folder(rows, tmp_path)
+    frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
+    page = frontier_page(results, *frames, pareto_frame(results))
+    for block in page.split("\n\n"):
+        assert not block.startswith("|") or len(block.splitlines()) > 2
+    far = folder([run("m", [-900.0, -900.0], number=i) for i in range(3)], tmp_path)
+    frames = [for_both_arms(frame, far) for frame in (targets_frame, area_frame)]
+    page = frontier_page(far, *frames, pareto_frame(far))
+    assert "trials to come near" not in page
+    assert "No run within the widest: m." in page
+
+
+def test_an_optimum_by_search_alone_is_marked(tmp_path):
+    task = tiny_task(name="two-armed-1")  # not a shipped task: its optimum is the folder's own
+    search = run("optimum/multistart", reward=-100)
+    for bound, words in (
+        (None, "-100 with the other arm free (**not proven**: the best that was found, by search"),
+        (-90, "-100 with the other arm free (**not proven**: the best that was found; none ex"),
+        (-100, "-100 with the other arm free (proven)"),
+    ):
+        rows = [run("m", [-120.0, -101.0]), search | {"proven_bound": bound}]
+        results = folder(rows, tmp_path)
+        results.manifest["specification"]["tasks"] = {task.name: task.model_dump(mode="json")}
+        frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
+        assert words in frontier_page(results, *frames, pareto_frame(results))
+
+
+def test_medians_are_censored_at_the_least_end(tmp_path):
+    """Two of three runs reach it, one of them behind the least end: no median before that."""
+    rows = [
+        run("m", [-466.0, -466.0], number=0),
+        run("m", [-900.0, -900.0, -900.0, -466.0], number=1),
+        run("m", [-900.0, -900.0, -900.0, -900.0], number=2),
+    ]
+    results = folder(rows, tmp_path)
+    frame = targets_frame(results, shares=(0.05,))
+    row = of(frame, "m").iloc[0]
+    assert (row.reached, row.horizon, row["median"]) == (2, 2, math.inf)
+    ((table, _),) = targets_tables(frame, "trials")
+    assert table.rows[0][1].startswith("2/3, > 2")
 
 
 # Pareto sets

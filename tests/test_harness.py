@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis.comparison import compare
+from analysis.integrity import FORMAT, NUMBERS, TEXT
 from analysis.results import load_results
 from benchmarks import tables
 from benchmarks.executors import Local
@@ -572,12 +573,7 @@ def test_damaged_results_are_named(results, tmp_path):
 def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
     folder = shutil.copytree(results.folder, tmp_path / "copy")
     table = folder / f"{name}.parquet"
-
-    def read():
-        found = load_results(folder)
-        return found.solutions(), found.paths(), found.learning()
-
-    read()
+    read_all(folder)
     for content, why in (
         (None, "is missing"),
         (b"", "is damaged"),
@@ -586,10 +582,10 @@ def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
     ):
         table.unlink() if content is None else table.write_bytes(content)
         with pytest.raises(CoarticError, match=rf"{name}\.parquet {why}.*`coartic run` again"):
-            read()
+            read_all(folder)
     pd.DataFrame({"x": [1]}).to_parquet(table)
     with pytest.raises(CoarticError, match=rf"{name}\.parquet is damaged \(it has no column"):
-        read()
+        read_all(folder)
 
 
 def test_lost_solutions_are_noticed(results, tmp_path):
@@ -599,6 +595,98 @@ def test_lost_solutions_are_noticed(results, tmp_path):
     whole[whole.run_id != first].to_parquet(folder / "solutions.parquet")
     with pytest.raises(CoarticError, match=f"lacks the movements of 1 runs, {first} the first"):
         load_results(folder).solutions()
+
+
+CUTS = {
+    "runs": [
+        (lambda t: t[: len(t) // 2], "lacks 7 of 14 planned runs"),
+        (lambda t: pd.concat([t, t[:1]]), "holds 1 rows twice"),
+        (lambda t: t.assign(run_id=t.run_id.where(t.index > 0, "x-y")), "lacks 1 of 14"),
+        (lambda t: t.assign(reward=t.reward.where(t.index > 0)), "has no reward"),
+        (lambda t: t.assign(reward=t.reward.astype(str)), "'reward' does not hold numbers"),
+        (lambda t: t.drop(columns="reward"), "has no column 'reward'"),
+        (lambda t: t.drop(columns="told"), "has no column 'told'"),
+    ],
+    "solutions": [
+        (lambda t: t[:-1], "do not add up to their reward"),
+        (lambda t: t.drop(columns="right_2"), "has no column 'right_2'"),
+        (lambda t: t.assign(right_2=np.nan), "'right_2' lacks numbers"),
+    ],
+    "sequences": [(lambda t: t[:-1], "of the 16 hand sequences of two-armed-2")],
+    "learning": [
+        (lambda t: t[: len(t) // 2], "lacks trials of"),
+        (lambda t: t[:-1], "has 149 of 150"),
+        (lambda t: t[1:], "not in order"),
+        (lambda t: pd.concat([t[:10], t[11:]]), "not in order"),
+        (lambda t: t[::-1], "not in order"),
+        (lambda t: t[:0], "has 0 of 150"),
+    ],
+}
+
+
+def read_all(folder):
+    found = load_results(folder)
+    return found.solutions(), found.paths(), found.learning()
+
+
+@pytest.mark.parametrize(
+    ("name", "cut", "words"), [(name, *case) for name, cases in CUTS.items() for case in cases]
+)
+def test_tables_that_are_not_whole_are_named(results, tmp_path, name, cut, words):
+    """A truncated table that is still Parquet gave wrong results without a word."""
+    folder = shutil.copytree(results.folder, tmp_path / "copy")
+    path = folder / f"{name}.parquet"
+    cut(pd.read_parquet(path)).to_parquet(path)
+    with pytest.raises(CoarticError, match=rf"{name}\.parquet is damaged \(.*{words}"):
+        read_all(folder)
+
+
+def test_paths_that_are_not_whole_are_named(tmp_path):
+    cells = suite_of(tmp_path, 'tasks = ["ascending"]\nmethods = ["nullspace-qp/none"]')
+    whole = run_and_write(tmp_path / "results", cells=cells, runs=1)
+    path = whole.folder / "paths.parquet"
+    table = whole.paths()
+    assert len(table) > 4
+    for cut, words in (
+        (table[:-1], "do not lead to their targets"),
+        (table[1:], "not in order"),
+        (table[table["order"] > 0], "do not lead to their targets"),
+        (table.drop(columns="base_x"), "no column 'base_x'"),
+    ):
+        cut.to_parquet(path)
+        with pytest.raises(CoarticError, match=words):
+            load_results(whole.folder).paths()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ([], "not an object"),
+        ({"format": 2}, "have format 2"),
+        ({"format": 3}, "no 'specification'"),
+        ({"format": 3, "specification": {}, "environment": {}}, "'suite' that is a str"),
+    ],
+)
+def test_manifests_that_are_none(results, tmp_path, content, words):
+    folder = shutil.copytree(results.folder, tmp_path / "copy")
+    (folder / "manifest.json").write_text(json.dumps(content))
+    with pytest.raises(CoarticError, match=words):
+        load_results(folder)
+
+
+def test_a_first_run_that_was_interrupted(results, tmp_path):
+    folder = shutil.copytree(results.folder, tmp_path / "copy")
+    (folder / "manifest.json").unlink()
+    with pytest.raises(CoarticError, match="no tables yet.*start the same `coartic run` again"):
+        load_results(folder)
+
+
+def test_columns_that_are_checked_are_those_written(results):
+    assert tables.FORMAT == FORMAT
+    for name in TEXT:
+        written = pq.read_schema(results.folder / f"{name}.parquet").names
+        joints = [column for column in written if column.startswith(("base", "left", "right"))]
+        assert {*TEXT[name], *NUMBERS[name]} == set(written) - set(joints)
 
 
 def test_manifest(results):

@@ -31,9 +31,13 @@ class Cell:
         None where it completes the task with none.
         """
         try:
-            execution = corrective_trial(self.task, initial_hands(self.task))
+            return self.corrective(initial_hands(self.task))
         except NotApplicableError:
             return None
+
+    def corrective(self, hands: str) -> Execution | None:
+        """The corrective process alone with these hands; None where it fails the task."""
+        execution = corrective_trial(self.task, hands)
         return execution if execution.completed else None
 
     @cached_property

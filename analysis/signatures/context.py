@@ -14,13 +14,11 @@ from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import stats
 
+from analysis.signatures.permutation import RESAMPLES, divisions, p_values
 from coartic import Task
 from coartic.robot import Array
 
-RESAMPLES = 9999
 _SAME = 1e-12  # spread below which configurations are the same but for rounding
 
 
@@ -78,38 +76,35 @@ def permutation_p(
 ) -> float:
     """Probability of so large a distance between means if the context did nothing.
 
-    One-sided permutation test over runs (``scipy.stats.permutation_test``), exact where
-    all permutations are fewer than ``resamples``. The statistic is :func:`distance`, which
-    orders permutations as :func:`context_dependence` does; with an orthonormal ``basis``
-    (dof, k) it is the distance within its span. 0 < p ≤ 1; 1 where no run differs from
-    another. NaN where a context has one run only.
+    One-sided permutation test over runs, exact where all divisions of the runs are no more
+    than ``resamples``. The statistic is :func:`distance`, which orders permutations as
+    :func:`context_dependence` does; with an orthonormal ``basis`` (dof, k) it is the distance
+    within its span. 0 < p ≤ 1; 1 where no run differs from another. NaN where a context has
+    one run only.
     """
     if min(len(first), len(second)) < 2:
         return math.nan
+    if basis is not None:
+        first, second = first @ basis, second @ basis
+    return float(_apart(first[:, None], second[:, None], rng, resamples)[0])
+
+
+def _apart(first: Array, second: Array, rng: np.random.Generator, resamples: int) -> Array:
+    """p-value at each of k ticks, shape ``(k,)``; groups have shape ``(runs, k, dof)``.
+
+    Runs are permuted as wholes: the same divisions at every tick.
+    """
     pool = np.concatenate([first, second])
     pool = pool - pool.mean(axis=0)
-    if basis is not None:
-        pool = pool @ basis
-    if np.ptp(pool, axis=0).max(initial=0.0) < _SAME:
-        return 1.0
-
-    def statistic(a: NDArray[np.int64], b: NDArray[np.int64], axis: int) -> Array:
-        between = pool[a].mean(axis=-2) - pool[b].mean(axis=-2)
-        length: Array = np.sqrt((between**2).sum(axis=-1))
-        return length
-
-    runs = np.arange(len(pool))
-    test = stats.permutation_test(
-        (runs[: len(first)], runs[len(first) :]),
-        statistic,
-        permutation_type="independent",
-        vectorized=True,
-        n_resamples=resamples,
-        batch=1000,
-        alternative="greater",
-        rng=rng,
+    pool[:, np.ptp(pool, axis=0) < _SAME] = 0.0
+    weights, exact = divisions(len(first), len(second), rng, resamples)
+    own = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
+    flat = pool.reshape(len(pool), -1)
+    null, observed = (
+        np.linalg.norm((rows @ flat).reshape(len(rows), *pool.shape[1:]), axis=-1)
+        for rows in (weights, own[None])
     )
-    return float(test.pvalue)
+    return p_values(null, observed[0], exact=exact)
 
 
 def lead_time(
@@ -124,7 +119,8 @@ def lead_time(
 
     ``first`` and ``second`` have shape ``(runs, k, dof)``: the last k control ticks of
     each run up to the hit, which is entry -1. Going back from the hit, contexts count as
-    distinguishable at a tick while :func:`permutation_p` is at most ``alpha`` there. The
+    distinguishable at a tick while the test of :func:`permutation_p` gives at most
+    ``alpha`` there. The
     first tick that fails ends the count: tests in a fixed order (Maurer, Hothorn & Lehmacher
     1995), so that the error rate of the whole is ``alpha`` without correction. 0 means at the
     hit only; None, not even there, or a context with one run. At most k - 1, the whole movement.
@@ -135,10 +131,8 @@ def lead_time(
     a lead shorter than the movement speaks of noise or of different speeds, not of a late
     decision.
     """
-    lead = None
-    for back in range(first.shape[1]):
-        tick = first.shape[1] - 1 - back
-        if not permutation_p(first[:, tick], second[:, tick], rng, resamples=resamples) <= alpha:
-            break
-        lead = back
-    return lead
+    if min(len(first), len(second)) < 2:
+        return None
+    failed = _apart(first, second, rng, resamples)[::-1] > alpha
+    lead = int(failed.argmax()) if failed.any() else len(failed)
+    return lead - 1 if lead else None

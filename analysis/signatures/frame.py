@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,14 @@ from analysis.signatures.context import (
     permutation_p,
 )
 from analysis.signatures.intervals import mean, share
-from analysis.signatures.locus import LEAST, Family, families, locus_slopes
+from analysis.signatures.locus import (
+    LEAST,
+    Family,
+    families,
+    locus_slopes,
+    slope_norm,
+    variants,
+)
 from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
 from analysis.signatures.other_arm import (
     preshaping,
@@ -31,12 +38,10 @@ from analysis.signatures.other_arm import (
 )
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
 from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
-from analysis.signatures.subtasks import change_from_initial, excess, sacrifices
-from coartic import Task
+from analysis.signatures.subtasks import change_from, excess, sacrifice_p, sacrifices
+from coartic import Execution, Task
 from coartic.robot import HANDS, Array, Hand
 
-SEED = 0
-"""Of the permutation tests."""
 MIXED = "length unit, rad"
 TICKS = "ticks"
 
@@ -61,7 +66,7 @@ class Signature:
 
 
 def signatures_frame(
-    results: Results, cells: Sequence[Cell] | None = None, *, seed: int = SEED
+    results: Results, cells: Sequence[Cell] | None = None, *, seed: int = 0
 ) -> pd.DataFrame:
     """Every signature of every cell; ``cells`` are those of the results where they are read.
 
@@ -70,16 +75,18 @@ def signatures_frame(
     that went into it), ``unit``, ``why_not`` (why there is no value, or no test; empty where
     all is there). Signatures over runs are means with Student's interval, shares of runs have
     Wilson's. What each one means stands with its function. Differences between contexts
-    stand with the first task of the pair and name the other. ``seed`` is of the permutation
-    tests, which draw apart for each row and do not depend on the other rows.
+    stand with the first task of the pair and name the other; tasks that locus families join
+    are no pairs, their slopes say how each depends on the others. ``seed`` is of the permutation
+    and bootstrap tests, which draw apart for each row and do not depend on the other rows.
     """
     cells = cells_of(results) if cells is None else cells
     groups = families(results.tasks)
+    joined = variants(groups)
     by_key = {(cell.method, cell.variant, cell.task.name): cell for cell in cells}
     pairs = [
         (first, second, shared)
         for first, second, shared in context_pairs(results.tasks)
-        if not any({first, second} <= set(family.tasks) for family in groups)
+        if not any({first, second} <= names for names in joined)
     ]
     rows: list[dict[str, Any]] = []
 
@@ -88,7 +95,7 @@ def signatures_frame(
         rows.extend({**key, **asdict(signature)} for signature in found)
 
     for cell in cells:
-        add(cell, _of_cell(cell, best_sequences(results.sequences, cell.task.name)))
+        add(cell, _of_cell(cell, best_sequences(results.sequences, cell.task.name), seed))
         alone = True
         for first, second, shared in pairs:
             both = [by_key.get((cell.method, cell.variant, name)) for name in (first, second)]
@@ -97,37 +104,30 @@ def signatures_frame(
                 if cell is both[0]:
                     add(cell, _of_pair(cell, both[1], shared, seed))
         if alone:
-            add(cell, _no_context())
+            slopes = any(cell.task.name in names for names in joined)
+            add(cell, _no_context(IN_FAMILY if slopes else NO_CONTEXT))
         for family in groups:
             members = [by_key.get((cell.method, cell.variant, name)) for name in family.tasks]
             if next((member for member in members if member is not None), None) is cell:
-                add(cell, _of_family(family, members))
+                add(cell, _of_family(family, members, seed))
         if not any(cell.task.name in family.tasks for family in groups):
             why = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
-            add(cell, iter([Signature("locus slope", why_not=why)]))
+            add(cell, (Signature(name, why_not=why) for name in LOCUS))
     return pd.DataFrame(rows)
 
 
-def _of_cell(cell: Cell, best: list[str]) -> Iterator[Signature]:
-    yield from _sacrifice(cell)
+def _of_cell(cell: Cell, best: list[str], seed: int) -> Iterator[Signature]:
+    yield from _sacrifice(cell, seed)
     yield from _recruitment(cell, best)
     yield from _other_arm(cell)
     yield from _form(cell)
     yield from _synergies(cell)
 
 
-def _sacrifice(cell: Cell) -> Iterator[Signature]:
+def _sacrifice(cell: Cell, seed: int) -> Iterator[Signature]:
     goals = _goals(cell.task)
-    names = ("first subtask against initial", "total against initial", "first subtask sacrificed")
-    if cell.initial is None or not cell.runs:
-        why = NO_INITIAL if cell.runs else NO_RUN
-        yield from (Signature(name, why_not=why) for name in names)
-    else:
-        initial = cell.initial
-        change = np.array([change_from_initial(run.execution, initial) for run in cell.runs])
-        yield _mean(names[0], "goal 1", change[:, 0], TICKS)
-        yield _mean(names[1], "", change.sum(axis=1), TICKS)
-        yield _share(names[2], "", [sacrifices(run.execution, initial) for run in cell.runs])
+    yield from _against_initial(cell)
+    yield from _against_same_hands(cell, seed)
     yield from _by_goal(
         "subtask against isolated reach",
         goals,
@@ -135,6 +135,45 @@ def _sacrifice(cell: Cell) -> Iterator[Signature]:
         TICKS,
         "the corrective process reaches the goal from the posture before with no hand",
     )
+
+
+def _against_initial(cell: Cell) -> Iterator[Signature]:
+    names = ("first subtask against initial", "total against initial")
+    if cell.initial is None or not cell.runs:
+        why = NO_INITIAL if cell.runs else NO_RUN
+        yield from (Signature(name, why_not=why) for name in names)
+        return
+    change = np.array([change_from(run.execution, cell.initial) for run in cell.runs])
+    yield _mean(names[0], "goal 1", change[:, 0], TICKS)
+    yield _mean(names[1], "", change.sum(axis=1), TICKS)
+
+
+def _against_same_hands(cell: Cell, seed: int) -> Iterator[Signature]:
+    """Against the corrective process alone with each run's own hands: the sacrifice."""
+    names = (
+        "first subtask against the same hands",
+        "total against the same hands",
+        "first subtask sacrificed",
+    )
+    alone = {hands: cell.corrective(hands) for hands in set(cell.sequences)}
+    pairs: list[tuple[Execution, Execution]] = [
+        (run.execution, reference)
+        for run in cell.runs
+        if (reference := alone[run.execution.hands]) is not None
+    ]
+    if not pairs:
+        why = NO_INITIAL if cell.runs else NO_RUN
+        yield from (Signature(name, why_not=why) for name in names)
+        return
+    changes = np.array([change_from(execution, reference) for execution, reference in pairs])
+    yield _mean(names[0], "goal 1", changes[:, 0], TICKS)
+    yield _mean(names[1], "", changes.sum(axis=1), TICKS)
+    p = sacrifice_p(changes, seed=seed)
+    why = _one_run(len(changes))
+    if not why and math.isnan(p):
+        why = "no test: the first subtask or the whole takes the same ticks in every run"
+    shown = _share(names[2], "", [sacrifices(change) for change in changes])
+    yield replace(shown, p=p, why_not=why)
 
 
 def _recruitment(cell: Cell, best: list[str]) -> Iterator[Signature]:
@@ -253,8 +292,11 @@ CONTEXT = (
 )
 
 
-def _no_context() -> Iterator[Signature]:
-    why = "the method did no other task that shares the start and the first goals"
+NO_CONTEXT = "the method did no other task that shares the start and the first goals"
+IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
+
+
+def _no_context(why: str) -> Iterator[Signature]:
     yield from (Signature(name, why_not=why) for name in CONTEXT)
 
 
@@ -321,9 +363,11 @@ def _of_contexts(
     )
 
 
-def _of_family(family: Family, members: Sequence[Cell | None]) -> Iterator[Signature]:
+LOCUS = ("locus slope", "locus slope norm")
+
+
+def _of_family(family: Family, members: Sequence[Cell | None], seed: int) -> Iterator[Signature]:
     """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
-    name = "locus slope"
     known = [
         (cell, place)
         for cell, place in zip(members, family.positions.tolist(), strict=True)
@@ -345,13 +389,16 @@ def _of_family(family: Family, members: Sequence[Cell | None]) -> Iterator[Signa
             where = f"{text}, {hand} hand"
             if len(set(places)) < LEAST:
                 why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-                yield Signature(name, where, n=len(runs), why_not=why)
+                yield from (Signature(name, where, n=len(runs), why_not=why) for name in LOCUS)
                 continue
             q = postures(tuple(run for run, _ in runs), goal)
             joints = known[0][0].task.robot.joint_names
             for joint, slope in zip(joints, locus_slopes(q, places), strict=True):
                 unit = "1" if joint.startswith("base") else "rad per length unit"
-                yield Signature(name, f"{where}, {joint}", *slope, n=len(runs), unit=unit)
+                yield Signature(LOCUS[0], f"{where}, {joint}", *slope, n=len(runs), unit=unit)
+            norm = slope_norm(q, places, _rng(seed, LOCUS[1], where))
+            unit = f"{MIXED}, per length unit"
+            yield Signature(LOCUS[1], where, norm.value, p=norm.p, n=len(runs), unit=unit)
 
 
 def _goals(task: Task) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-CONFIDENCE = 0.95
+from analysis.statistics import CONFIDENCE
 
 
 class Interval(NamedTuple):

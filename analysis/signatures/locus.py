@@ -4,6 +4,10 @@ In speech, a locus equation regresses the onset of a consonant's formant transit
 vowel that follows; its slope measures how far the vowel is anticipated (Lindblom 1963;
 Sussman, McCaffrey & Matthews 1991). Here the posture at goal g is regressed on the position
 of goal g + 1 (anticipatory) or g - 1 (carry-over), over tasks that differ in that goal only.
+
+What is regressed is the mean posture at each position, whatever number of runs is behind it:
+runs of one task share its posture's departure from a straight line, so that they are no
+independent evidence of the slope.
 """
 
 from __future__ import annotations
@@ -15,11 +19,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from analysis.signatures.permutation import orders, p_values
+from analysis.statistics import CONFIDENCE
 from coartic import Task
 from coartic.robot import Array
 
 LEAST = 3
-"""Tasks that make a family."""
+"""Positions of the moving goal that make a family."""
+_SAME = 1e-12  # spread below which configurations are the same but for rounding
 
 
 @dataclass(frozen=True)
@@ -53,11 +60,27 @@ def families(tasks: Mapping[str, Task]) -> list[Family]:
     return found
 
 
+def variants(groups: Sequence[Family]) -> list[set[str]]:
+    """Tasks that families join, directly or through tasks that they share."""
+    found: list[set[str]] = []
+    for family in groups:
+        joined = set(family.tasks)
+        apart = []
+        for other in found:
+            if joined & other:
+                joined |= other
+            else:
+                apart.append(other)
+        found = [*apart, joined]
+    return found
+
+
 def _along(points: Array) -> Array:
     centred = points - points.mean(axis=0)
     axis = np.linalg.svd(centred, full_matrices=False)[2][0]
     main = axis[np.argmax(np.abs(axis))]
-    positions: Array = centred @ (axis if main > 0 else -axis)
+    # Rounded, so that tasks that are the same have one position.
+    positions: Array = np.round(centred @ (axis if main > 0 else -axis), 9)
     return positions
 
 
@@ -73,22 +96,30 @@ class Slope(NamedTuple):
     """Two-sided, of slope 0."""
 
 
+class Norm(NamedTuple):
+    """How far the whole posture follows."""
+
+    value: float
+    """Length of the vector of slopes, ≥ 0; length unit and rad mixed, per length unit."""
+    p: float
+    """Of no dependence of any joint."""
+
+
 def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Slope]:
-    """One slope per joint, by least squares (``scipy.stats.linregress``).
+    """One slope per joint, by least squares over the mean posture at each position.
 
     ``configurations`` has shape ``(n, dof)``: postures at goal g, one row a run; ``positions``
-    ``(n,)`` those of the neighbouring goal in each run's task. Joints that do not change have
-    slope 0 and p 1. Errors are taken as independent and of equal variance, so slopes over
-    deterministic runs have an interval that speaks of curvature, not of chance. Raises
-    ValueError for fewer than three runs or a goal that does not move.
+    ``(n,)`` those of the neighbouring goal in each run's task. Interval and test have
+    positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are run once
+    or often, and take what departs from the line as independent and of equal variance between
+    positions: curvature widens the interval. Joints that do not change have slope 0 and p 1.
+    Raises ValueError for fewer than three positions.
     """
-    x = np.asarray(positions, dtype=np.float64)
-    if len(x) < LEAST or np.ptp(x) == 0:
-        raise ValueError("a slope needs three runs and a goal that moves")
-    reach = float(stats.t.ppf(0.975, len(x) - 2))
+    x, means = _by_position(configurations, positions)
+    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(x) - 2))
     slopes = []
-    for joint in configurations.T:
-        if np.ptp(joint) < 1e-12:
+    for joint in means.T:
+        if np.ptp(joint) < _SAME:
             slopes.append(Slope(0.0, 0.0, 0.0, 1.0))
             continue
         fit = stats.linregress(x, joint)
@@ -97,3 +128,34 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
             Slope(float(fit.slope), fit.slope - half, fit.slope + half, float(fit.pvalue))
         )
     return slopes
+
+
+def slope_norm(
+    configurations: Array, positions: Sequence[float] | Array, rng: np.random.Generator
+) -> Norm:
+    """Length of the vector of all joints' slopes, as :func:`locus_slopes` has them.
+
+    It is never negative and so biased upwards. Permutation test: the mean postures are put in
+    every order along the line (up to seven positions, else 9999 orders drawn), so that with k
+    positions p is at least 2/k!. It takes the means as exchangeable where nothing depends on the
+    position. Raises ValueError for fewer than three positions.
+    """
+    x, means = _by_position(configurations, positions)
+    means = means - means.mean(axis=0)
+    means[:, np.ptp(means, axis=0) < _SAME] = 0.0
+    centred = x - x.mean()
+    weights = centred / (centred**2).sum()
+    ways, exact = orders(len(x), rng)
+    observed = np.asarray(np.linalg.norm(weights @ means))
+    null = np.linalg.norm(weights[ways] @ means, axis=1)
+    return Norm(float(observed), float(p_values(null, observed, exact=exact)))
+
+
+def _by_position(configurations: Array, positions: Sequence[float] | Array) -> tuple[Array, Array]:
+    """Positions, each once, shape ``(k,)``, and the mean configuration at each."""
+    places, of_run = np.unique(np.asarray(positions, dtype=np.float64), return_inverse=True)
+    if len(places) < LEAST:
+        raise ValueError(f"a slope needs {LEAST} positions of a goal that moves")
+    means = np.zeros((len(places), configurations.shape[1]))
+    np.add.at(means, of_run, configurations)
+    return places, means / np.bincount(of_run)[:, None]

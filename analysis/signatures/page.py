@@ -27,8 +27,20 @@ _NOTES = (
     "would not. Methods by mean reward, best first. What each signature means, and how its tests "
     "and intervals hold: docs/signatures.md; all of them, by goal, hand and joint: "
     "`signatures.csv`.",
-    "p-values are two-sided for ΔV z and slopes, of permutation tests for contexts, and adjusted "
-    "by Holm's method over all tests of their own table. Over several tables nothing is adjusted.",
+    "p-values are two-sided for ΔV z and slopes, of permutation tests for contexts and norms of "
+    "slopes, one-sided for the sacrifice (in the mean over runs, the first subtask takes longer "
+    "by more than one tick and the whole takes less than by the corrective process with the same "
+    "hands). They are adjusted by Holm's method over all tests of their own table, norms apart "
+    "from slopes. Over several tables nothing is adjusted.",
+)
+_HANDS = (
+    "Hand sequences with the number of runs; ticks less those of the corrective process alone "
+    "with each run's own hands, which is what a sacrifice is judged by; and by goal, the share of "
+    "runs that hit it with the hand that is quickest for it by itself."
+)
+_VARIANCE = (
+    "Variance over runs per dimension within (V_ucm) and orthogonal to (V_ort) the uncontrolled "
+    "manifold, squared units, and ΔV, their difference over the total."
 )
 _SYNERGY = (
     "ΔV z at each goal, over the runs with a method's commonest hand sequence; p of the test "
@@ -49,8 +61,10 @@ CONTEXTS = (
 )
 _LOCUS = (
     "Slopes of the posture at a goal on the position of a neighbouring goal, by joint: length "
-    "unit (base) or rad (joints) per length unit. Joints without any slope are left out. Over "
-    "methods that are run once per task, interval and p speak of curvature, not of chance."
+    "unit (base) or rad (joints) per length unit. They are those of the mean posture at each "
+    "position, with positions − 2 degrees of freedom, for methods that are run once as for the "
+    "others; curvature widens their intervals. Joints without any slope are left out. The norm is "
+    "that of all joints together; it is never negative."
 )
 
 
@@ -81,10 +95,21 @@ def signatures_page(study: Study) -> str:
     for name, task in study.results.tasks.items():
         own = frame[frame.task == name]
         parts.append(f"## {name}{' †' if task.reconstructed else ''}")
-        parts += _by_method("How it moves", "", own, labels[name], main_columns(task))
+        tables = [("How it moves", "", main_columns(task))]
+        if len(task.goals) > 1:
+            tables.append(("Further goals", "", _further(task)))
         if len(task.hands) > 1:
-            parts += _by_method("The other arm", OTHER, own, labels[name], other_arm_columns(task))
-        parts += _by_method("Synergy: ΔV z", _SYNERGY, own, labels[name], _synergy(task, own))
+            tables += [
+                ("Hands", _HANDS, _hands(task)),
+                ("The other arm", OTHER, other_arm_columns(task)),
+                ("Travel of the other arm", "", _by_goal(task, "travel of the other arm", "rad")),
+            ]
+        tables += [
+            ("Synergy: ΔV z", _SYNERGY, _synergy(task, own)),
+            ("Synergy: V_ucm, V_ort and ΔV", _VARIANCE, _variance(task)),
+        ]
+        for title, text, columns in tables:
+            parts += _by_method(title, text, own, labels[name], columns)
     parts += _contexts(frame, labels)
     parts += _slopes(frame, labels)
     if any(task.reconstructed for task in study.results.tasks.values()):
@@ -99,6 +124,8 @@ class Column:
     signature: str
     place: str
     head: str
+    spelt: bool = False
+    """Whether it shows the signature's ``where``, not its value."""
 
 
 def main_columns(task: Task) -> list[Column]:
@@ -137,6 +164,38 @@ def other_arm_columns(task: Task) -> list[Column]:
             ("preshaping since its last hit", "since its hit"),
         )
         for goal in goals
+    ]
+
+
+def _by_goal(task: Task, signature: str, head: str, first: int = 1) -> list[Column]:
+    """A column for each goal from ``first`` on."""
+    goals = range(first, len(task.goals) + 1)
+    return [Column(signature, f"goal {goal}", f"goal {goal}, {head}") for goal in goals]
+
+
+def _further(task: Task) -> list[Column]:
+    """What :func:`main_columns` have at goal 1, at the others."""
+    return [
+        *_by_goal(task, "subtask against isolated reach", "against isolated, ticks", 2),
+        *_by_goal(task, "turning angle", "turn, rad", 2)[:-1],  # there is none at the last
+    ]
+
+
+def _hands(task: Task) -> list[Column]:
+    return [
+        Column("hand entropy", "", "hands", spelt=True),
+        Column("first subtask against the same hands", "goal 1", "first subtask, ticks"),
+        Column("total against the same hands", "", "total, ticks"),
+        *_by_goal(task, "hand as in isolation", "as in isolation, share"),
+    ]
+
+
+def _variance(task: Task) -> list[Column]:
+    return [
+        column
+        for goal in range(1, len(task.goals) + 1)
+        for name in ("V_ucm", "V_ort", "ΔV")
+        for column in _by_goal(task, name, name)[goal - 1 : goal]
     ]
 
 
@@ -183,7 +242,7 @@ def _by_method(
             empty.setdefault(why, []).append(label)
             continue
         cells = [
-            _cell(*entry, notes)
+            _cell(*entry, notes, spelt=column.spelt)
             if entry
             else notes.mark(whole.get((label, column.signature), "not in every run's sequence"))
             for entry, column in zip(entries, columns, strict=True)
@@ -229,6 +288,7 @@ def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
 
 
 def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
+    norms = frame[frame.signature == "locus slope norm"]
     frame = frame[(frame.signature == "locus slope") & frame.value.notna()]
     if not len(frame):
         return []
@@ -246,10 +306,16 @@ def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
             (row["label"], row["joint"]): (row, p)
             for row, p in zip(rows, _adjusted(rows), strict=True)
         }
+        whole = norms[(norms.task == task) & (norms["where"] == at)].to_dict("records")
+        cells |= {
+            (row["label"], "norm"): (row, p)
+            for row, p in zip(whole, _adjusted(whole), strict=True)
+        }
         lines = [
             (
                 label,
                 str(cells[label, joints[0]][0]["n"]),
+                _cell(*cells[label, "norm"], _Notes()),
                 *(_cell(*cells[label, joint], _Notes()) for joint in joints),
             )
             for label in labels[str(task)]
@@ -257,7 +323,7 @@ def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
         ]
         if lines:
             title = f"{at} (first of the tasks: {task})"
-            table = Table(title, ("method", "runs", *joints), tuple(lines))
+            table = Table(title, ("method", "runs", "norm", *joints), tuple(lines))
             parts += [f"### {title}", table.to_markdown()]
     return parts
 
@@ -266,10 +332,12 @@ def _adjusted(rows: Iterable[Row]) -> list[float]:
     return holm([row["p"] for row in rows])
 
 
-def _cell(row: Row, p: float, notes: _Notes) -> str:
+def _cell(row: Row, p: float, notes: _Notes, *, spelt: bool = False) -> str:
     """Value, interval, adjusted p; a letter for the reason where there is no value."""
     if pd.isna(row["value"]):
         return notes.mark(row["why_not"])
+    if spelt:
+        return str(row["where"])
     text = _interval(row["value"], row["low"], row["high"], share=row["signature"] in _SHARES)
     longest = _AT_MOST.search(row["where"])
     text += f" of {longest.group(1)}" if longest else ""
@@ -278,11 +346,17 @@ def _cell(row: Row, p: float, notes: _Notes) -> str:
     return text
 
 
-_SHARES = ("first subtask sacrificed", "hands as the best corrective ones")
+_SHARES = (
+    "first subtask sacrificed",
+    "hand as in isolation",
+    "hands as the best corrective ones",
+)
+_ZERO = 1e-9  # what rounding leaves of a value that is 0
 
 
 def _interval(value: float, low: float, high: float, *, share: bool) -> str:
     """``value ± half`` with two figures of the half; ``value [low, high]`` for shares."""
+    value = 0.0 if abs(value) < _ZERO else value
     if pd.isna(low):
         return f"{value:.3g}"
     if share:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from analysis.statistics import RESAMPLES, bootstrap_test
 from coartic import PAPER, Execution, Hand, MotionModel, Task, Trajectory, correct, move
 from coartic.robot import Array
+
+ROUNDING = 1
+"""Ticks that a planned movement can lose to rounding alone."""
 
 
 def isolated_reaches(
@@ -40,24 +44,38 @@ def postures_before(execution: Execution, task: Task) -> list[Array]:
     return [np.array(task.q0), *execution.configurations[:-1]]
 
 
-def change_from_initial(execution: Execution, initial: Execution) -> NDArray[np.int64]:
-    """Ticks of each subtask less those of the initial solution, shape ``(G,)``.
-
-    Negative is faster. The first subtask is sacrificed for the whole where its entry is
-    positive and the sum negative (Shah, Barto & Fagg 2013, results of EC1).
-    """
-    ticks, before = execution.ticks_by_goal(), initial.ticks_by_goal()
+def change_from(execution: Execution, reference: Execution) -> NDArray[np.int64]:
+    """Ticks of each subtask less those of another solution, shape ``(G,)``; negative: faster."""
+    ticks, before = execution.ticks_by_goal(), reference.ticks_by_goal()
     return np.array([a - b for a, b in zip(ticks, before, strict=True)], dtype=np.int64)
 
 
-def sacrifices(execution: Execution, initial: Execution) -> bool:
-    """Whether the first subtask takes longer than initially while the whole takes less.
+def sacrifices(change: ArrayLike) -> bool:
+    """Whether the first subtask takes longer while the whole takes less.
 
-    By any number of ticks: a plan's movement can lose one to rounding alone, so read it beside
-    :func:`change_from_initial`.
+    ``change`` has shape ``(G,)``: :func:`change_from` of a solution to the corrective process
+    alone *with the same hands*, so that a choice of hand does not count as a sacrifice. Longer
+    is longer by more than :data:`ROUNDING`. Source: Shah, Barto & Fagg (2013), results of EC1.
     """
-    change = change_from_initial(execution, initial)
-    return bool(change[0] > 0 > change.sum())
+    ticks = np.asarray(change)
+    return bool(ticks[0] > ROUNDING and ticks.sum() < 0)
+
+
+def sacrifice_p(changes: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> float:
+    """Probability of such changes, shape ``(runs, G)``, if there were no sacrifice in the mean.
+
+    No sacrifice: the mean first subtask takes longer by no more than :data:`ROUNDING`, or the
+    mean whole takes no less. The larger p of two one-tailed tests
+    (:func:`analysis.statistics.bootstrap_test`), as both have to reject (intersection-union
+    test, Berger 1982). NaN below two runs, and where either does not differ between runs.
+    """
+    ticks = np.asarray(changes, dtype=np.float64)
+    first, total = ticks[:, 0], ticks.sum(axis=1)
+    tests = (
+        bootstrap_test(first, ROUNDING, seed=seed, resamples=resamples),
+        bootstrap_test(total, 0.0, "less", seed=seed, resamples=resamples),
+    )
+    return float(np.max([test.p for test in tests]))
 
 
 def excess(path: Trajectory) -> Array:
