@@ -580,8 +580,8 @@ def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrifice
         signature("ascending", label, "context dependence", goal, 2.0, p=p),
         signature("ascending", label, "motor-equivalent part", goal, 0.2),
         signature("ascending", label, "non-motor-equivalent part", goal, 0.1),
-        signature("ascending", label, "first subtask against initial", "goal 1", 5.0),
-        signature("ascending", label, "total against initial", "", -5.0),
+        signature("ascending", label, "first subtask against the same hands", "goal 1", 5.0),
+        signature("ascending", label, "total against the same hands", "", -5.0),
         signature("ascending", label, "first subtask sacrificed", "", **sacrificed),
     ]
     study.__dict__["signatures"] = pd.DataFrame(planted)

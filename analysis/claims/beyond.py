@@ -249,7 +249,7 @@ PRESENCE = (
     "lie more than 0.1 apart (ten steps), with p < 5 % where there are several runs; "
     "*sacrifice*, most runs sacrifice the first subtask of the ascending task (Wilson's interval "
     "lies above one half, where there are several), shown are the mean ticks of the first "
-    "movement and of all against the initial solution; "
+    "movement and of all against the corrective process with the same hands; "
     "*motor-equivalent*, context is present and its motor-equivalent part (per root of dimension) "
     "exceeds the other; *preshaping*, on two-armed task 1 the waiting arm brings its hand nearer "
     "to its next goal, since its own last hit, by more than 0.1 of the initial distance, mean "

@@ -7,6 +7,7 @@ import numpy as np
 from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
 from analysis.claims.register import Claim, Finding
 from analysis.methods import LEARNER
+from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
 from analysis.statistics import Inference, bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval
@@ -24,12 +25,13 @@ def _first_movement_sacrificed(data: Data) -> Finding:
         first = np.array([float(run.execution.ticks_by_goal()[0]) for run in cell.runs])
         total = np.array([float(run.execution.ticks) for run in cell.runs])
         tests += [
-            bootstrap_test(first, before + 1.0, seed=SEED),  # one tick is rounding
+            bootstrap_test(first, float(before + ROUNDING), seed=SEED),
             bootstrap_test(-total, -float(initial.ticks), seed=SEED),
         ]
+        both = sum(sacrifices(change_from(run.execution, initial)) for run in cell.runs)
         parts.append(
             f"{task}: first movement {before} to {interval(mean(first, seed=SEED))} ticks, "
-            f"all {initial.ticks} to {total.mean():.1f}"
+            f"all {initial.ticks} to {total.mean():.1f}, both in {both} of {len(cell.runs)} runs"
         )
     parts += [
         f"{method}: first {first:+.1f}, all {total:+.1f} on ascending"
@@ -41,13 +43,13 @@ def _first_movement_sacrificed(data: Data) -> Finding:
 
 
 def sacrifice(data: Data, method: str) -> tuple[float, float] | None:
-    """Ticks of the first movement and of all, less the initial solution's, on ascending.
+    """Ticks of the first movement and of all, less the corrective process's, on ascending.
 
-    None where the folder lacks the runs.
+    Of the corrective process alone with the same hands. None where the folder lacks the runs.
     """
     try:
-        first = data.signature(ASCENDING, method, "first subtask against initial")
-        total = data.signature(ASCENDING, method, "total against initial")
+        first = data.signature(ASCENDING, method, "first subtask against the same hands")
+        total = data.signature(ASCENDING, method, "total against the same hands")
     except MissingError:
         return None
     return float(first["value"]), float(total["value"])
@@ -90,8 +92,8 @@ ONE_ARMED: tuple[Claim, ...] = (
         "The first movement gets worse than in the initial solution while the whole gets better.",
         "One-armed tasks",
         "one-tailed bootstrap tests against the initial solution: the first movement is longer by "
-        "more than one tick (rounding), the whole shorter. Controls that do not look beyond the "
-        "current goal stand beside it",
+        f"more than {ROUNDING} tick (rounding), the whole shorter. Controls that do not look beyond "
+        "the current goal stand beside it",
         _first_movement_sacrificed,
         "Results, Exploration Condition 1",
         "the reward incurred after making the first movement is more negative",
