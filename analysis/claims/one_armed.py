@@ -92,8 +92,8 @@ ONE_ARMED: tuple[Claim, ...] = (
         "The first movement gets worse than in the initial solution while the whole gets better.",
         "One-armed tasks",
         "one-tailed bootstrap tests against the initial solution: the first movement is longer by "
-        f"more than {ROUNDING} tick (rounding), the whole shorter. Controls that do not look beyond "
-        "the current goal stand beside it",
+        f"more than {ROUNDING} tick (rounding), the whole shorter. Controls that do not look "
+        "beyond the current goal stand beside it",
         _first_movement_sacrificed,
         "Results, Exploration Condition 1",
         "the reward incurred after making the first movement is more negative",
