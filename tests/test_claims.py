@@ -655,6 +655,77 @@ def test_runs_of_other_hands_are_no_basis(tmp_path):
     assert "RRLR 8, RRRR 8, neither 0 of 16 runs" in verdict_of("ec2-sequences", study).evidence
 
 
+def timed(task, first, others):
+    """A run whose first movement takes ``first`` ticks more than initially, the next so many."""
+    ticks = corrective_trial(load_task(task), "RRR").ticks_by_goal()
+    ticks = [ticks[0] + first, ticks[1] + others, ticks[2]]
+    return SimpleNamespace(
+        execution=SimpleNamespace(ticks_by_goal=lambda: ticks, ticks=sum(ticks))
+    )
+
+
+@pytest.mark.parametrize(
+    ("first", "others", "verdict"),
+    [
+        (6, -20, "supported"),
+        (1, -20, "cannot tell"),  # one tick is rounding
+        (-6, -20, "not supported"),
+        (6, 20, "not supported"),
+    ],
+)
+def test_the_first_movement_is_sacrificed(first, others, verdict, tmp_path):
+    tasks = ("ascending", "descending")
+    rows = [entry for task in tasks for entry in learner(task, "EC1", MIDDLE, "RRR")]
+    paths = {
+        (task, "dual-process/EC1"): [timed(task, first + k, others) for k in SPREAD]
+        for task in tasks
+    }
+    for runs in paths.values():  # as many as rows
+        runs += runs[:2]
+    judged = verdict_of(
+        "first-movement-sacrificed", with_paths(planted_results(rows, tmp_path), paths)
+    )
+    assert judged.verdict == verdict, judged.evidence
+    both = sum(first + k > 1 and first + k + others < 0 for k in (*SPREAD, *SPREAD[:2]))
+    assert judged.evidence.count(f"both in {both} of 8 runs") == 2
+
+
+@pytest.mark.parametrize(
+    ("apart", "p", "verdict"),
+    [(5.0, 0.001, "supported"), (5.0, 0.2, "cannot tell"), (0.9, 0.001, "cannot tell")],
+)
+def test_context_is_more_than_the_spread_and_no_chance(apart, p, verdict, tmp_path):
+    rows = [
+        entry
+        for task in ("ascending", "descending")
+        for entry in learner(task, "EC1", MIDDLE, "RRR")
+    ]
+    study = Study(planted_results(rows, tmp_path))
+    goal = "goal 1, right hand, against descending"
+    study.__dict__["signatures"] = pd.DataFrame(
+        [
+            signature("ascending", "dual-process/EC1", name, goal, apart, p=p)
+            for name in (
+                "context distance", "context dependence", "motor-equivalent part",
+                "non-motor-equivalent part",
+            )
+        ]
+    )  # fmt: skip
+    assert verdict_of("context", study).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("xs", "verdict"), [([1, 2, 3, 4], "supported"), ([1, 2, 1.5, 4], "not supported")]
+)
+def test_the_base_goes_right_once_rrlr_is_learned(xs, verdict, tmp_path):
+    q = np.zeros((4, 10))
+    q[:, 0] = xs
+    run = SimpleNamespace(execution=SimpleNamespace(configurations=q, hands="RRLR"))
+    rows = learner(T1, "EC2", MIDDLE, "RRLR")
+    study = with_paths(planted_results(rows, tmp_path), {(T1, "dual-process/EC2"): [run] * 8})
+    assert verdict_of("no-reversal", study).verdict == verdict
+
+
 def test_the_contrary_of_one_test_is_not_that_of_another():
     """Runs without spread that are as claimed say nothing against it."""
 
