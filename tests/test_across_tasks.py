@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from analysis import across_tasks, statistics
+from analysis.overall import profiles_frame
 from tests.test_comparison import fake_results
 
 
@@ -140,3 +141,19 @@ def test_one_definition_of_the_interquartile_mean():
     assert across_tasks.interquartile_mean({"a": values}, seed=1).estimate == pytest.approx(
         statistics.interquartile_mean(values, seed=1).estimate
     )
+
+
+def test_profiles_of_scores_count_what_is_above():
+    """Thresholds met exactly tell "above" from "at least", and either from "at most"."""
+    scores = pd.DataFrame(
+        [
+            {"task": task, "method": "m", "score": score, "gap": gap}
+            for task in "ab"
+            for score, gap in ((0.0, 0.4), (0.5, 0.1), (0.5, 0.1), (1.0, 0.0))
+        ]
+    )
+    shares = profiles_frame(scores).set_index(["kind", "threshold"]).share
+    for threshold, share in ((-0.02, 1.0), (0.0, 0.75), (0.5, 0.25), (1.0, 0.0)):
+        assert shares.loc["score", threshold] == share
+    for threshold, share in ((0.0, 0.25), (0.1, 0.75), (0.395, 0.75), (0.4, 1.0)):
+        assert shares.loc["gap", threshold] == share

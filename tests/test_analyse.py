@@ -77,6 +77,51 @@ def test_the_page_of_signatures_says_what_the_runs_say(results):
     assert re.search(r"Without values \(.*\): dual-process/EC1\.", page)
 
 
+def test_every_signature_of_a_task_is_on_the_page(results):
+    """By hand sequence, goal and subspace, from what the frame says of the same place."""
+    study = Study(results)
+    found = tables(signatures_page(study))
+    frame = study.signatures
+    frame = frame[(frame.task == "two-armed-1") & (frame.label == "dual-process/EC4")]
+    runs = study.cells["two-armed-1", "dual-process/EC4"].runs
+    row = found["two-armed-1", "Hands"]["dual-process/EC4"]
+    counts = runs.hands.value_counts()
+    assert set(row["hands"].split(", ")) == {f"{hands} {n}" for hands, n in counts.items()}
+    for goal in range(1, 5):
+        where = frame["where"].str.startswith(f"goal {goal}")
+        own = frame[where].set_index("signature").value
+
+        def shown(table, column, goal=goal):
+            text = found["two-armed-1", table]["dual-process/EC4"][f"goal {goal}, {column}"]
+            return float(text.split()[0])
+
+        near = {"rel": 0.06, "abs": 0.5}
+        assert shown("Hands", "as in isolation, share") == own["hand as in isolation"]
+        assert shown("Travel of the other arm", "rad") == pytest.approx(
+            own["travel of the other arm"], rel=0.06
+        )
+        for name in ("V_ucm", "V_ort", "ΔV") if counts.iloc[0] > 1 else ():
+            value = shown("Synergy: V_ucm, V_ort and ΔV", name)
+            assert value == pytest.approx(own[name], rel=0.006)
+        if goal > 1:
+            value = shown("Further goals", "against isolated, ticks")
+            assert value == pytest.approx(own["subtask against isolated reach"], **near)
+        if goal in (2, 3):
+            value = shown("Further goals", "turn, rad")
+            assert value == pytest.approx(own["turning angle"], rel=0.06)
+
+
+def test_rounding_is_not_shown(results):
+    """A path that goes straight on turns by 3e-11 rad: by nothing."""
+    study = Study(results)
+    turns = (study.signatures.signature == "turning angle") & (
+        study.signatures["where"] == "goal 1"
+    )
+    study.signatures.loc[turns, ["value", "low", "high"]] = [3.28e-11, np.nan, np.nan]
+    row = tables(signatures_page(study))["ascending", "How it moves"]["dual-process/EC1"]
+    assert row["turn at goal 1, rad"] == "0"
+
+
 def test_p_values_are_adjusted_within_their_table(results):
     study = Study(results)
     page = signatures_page(study)
@@ -115,6 +160,11 @@ def test_locus_slopes_are_on_the_page(results):
     half = (slope.high - slope.low) / 2
     assert float(rest.partition(",")[0]) == pytest.approx(half, rel=0.06)
     assert "left_1" not in row
+    norms = study.signatures[study.signatures.signature == "locus slope norm"].dropna(subset="p")
+    norms = norms[norms["where"] == "goal 1, anticipatory of goal 2, right hand"]
+    shown, _, p = row["norm"].partition(", p ")
+    assert float(shown) == pytest.approx(norms.value.item(), rel=0.006)
+    assert float(p) == pytest.approx(norms.p.item(), rel=0.06)  # the only one of its table
 
 
 def test_analyse_writes_all_it_names(results, monkeypatch, capsys, tmp_path):

@@ -799,7 +799,7 @@ def test_every_test_finds_what_is_planted():
 
 def test_intervals_hold_the_truth():
     for simulation in signature_nulls.coverage():
-        share, _, high = signature_nulls.rate(simulation, 150)
+        share, _, high = signature_nulls.rate(simulation, 100)
         low_counts = "Poisson, 0.1" in simulation.name
         assert high > (0.6 if low_counts else 0.9), f"{simulation.name}: {share}"
     (_, first), (truth, second), _ = signature_nulls.entropies(400)

@@ -338,7 +338,10 @@ def _cell(row: Row, p: float, notes: _Notes, *, spelt: bool = False) -> str:
         return notes.mark(row["why_not"])
     if spelt:
         return str(row["where"])
-    text = _interval(row["value"], row["low"], row["high"], share=row["signature"] in _SHARES)
+    value = row["value"]
+    if abs(value) < _ZERO and not row["unit"].startswith("squared"):
+        value = 0.0
+    text = _interval(value, row["low"], row["high"], share=row["signature"] in _SHARES)
     longest = _AT_MOST.search(row["where"])
     text += f" of {longest.group(1)}" if longest else ""
     if pd.notna(p):
@@ -351,12 +354,11 @@ _SHARES = (
     "hand as in isolation",
     "hands as the best corrective ones",
 )
-_ZERO = 1e-9  # what rounding leaves of a value that is 0
+_ZERO = 1e-8  # what rounding leaves of a value that is 0
 
 
 def _interval(value: float, low: float, high: float, *, share: bool) -> str:
     """``value ± half`` with two figures of the half; ``value [low, high]`` for shares."""
-    value = 0.0 if abs(value) < _ZERO else value
     if pd.isna(low):
         return f"{value:.3g}"
     if share:
