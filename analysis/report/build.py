@@ -32,7 +32,7 @@ from analysis.report.document import (
     Section,
 )
 from analysis.report.limitations import limitations
-from analysis.report.numbers import PREFIX, Number, headline_numbers, numbers_tex
+from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
 from analysis.report.text import typographic
 from analysis.report.trace import FILE, trace_json
@@ -108,7 +108,8 @@ def write(report: Report, study: Study, folder: Path) -> None:
 
     Raises CoarticError where it cannot be written.
     """
-    about = f"Headline values of {_title(study.results)}. {_lead(study.results)}"
+    about = [f"Headline values of {_title(study.results)}.", _lead(study.results)]
+    about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study.results, report.document, report.numbers),
@@ -254,7 +255,7 @@ def _claims(study: Study, judged: Sequence[Judged]) -> Section:
 
 
 def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:
-    count = sum(1 for number in numbers for _ in number.macros())
+    count = sum(1 for number in numbers for _ in number.companions())
     example = next((n.macro for n in numbers if n.cells), f"{PREFIX}...")
     items = [
         "Every number of a table leads to its runs (last column); every table is in `tables/` as "
@@ -263,6 +264,7 @@ def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "
         "performs a run again; `coartic cite` prints what to cite.",
+        *map(_escape, macro_names(study).renamed()),
         *(f"No figure {_escape(name)}: {_escape(why)}" for name, why in figures.skipped.items()),
     ]
     return _section("about", "Tracing and citing", [Bullets(tuple(items))])
