@@ -40,7 +40,8 @@ from analysis.report.write import write_report
 from analysis.results import Results
 from analysis.study import Study
 
-FOLDER = "report"
+MOST_TASKS = 8
+"""More would make a report that nobody reads."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Report:
 
 def build(study: Study) -> Report:
     """Everything a report holds. A section that the runs do not allow is left out."""
-    figures, numbers = all_figures(study), tuple(headline_numbers(study))
+    figures, numbers = all_figures(study, MOST_TASKS), tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
     judged = judge(study)
     pairs = pairwise_frame(study)
@@ -190,18 +191,20 @@ def _methods(
 ) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
-        blocks = _tables(
-            tables.methods_table(study, task),
-            tables.pairwise_table(study, pairs, task),
-            tables.cost_table(study, pairs, task),
-        )
+        blocks = _tables(tables.methods_table(study, task))
+        if not _many(study):
+            blocks += _tables(
+                tables.pairwise_table(study, pairs, task), tables.cost_table(study, pairs, task)
+            )
         if blocks:
-            below.append(_section(f"methods-on-{slug}", task, blocks))
+            below.append(_section(f"on-{slug}-methods", task, blocks))
     reading = Bullets(tables.reading_of_methods(study))
     return _section("methods", "Methods side by side", [*profiles, reading], below)
 
 
 def _cost(study: Study, frontier: list[Block]) -> Section:
+    if _many(study):
+        return _section("cost", "Reward and what it costs", frontier)
     results, steps = study.results, study.steps
     targets = for_both_arms(targets_frame, results, steps)
     areas = for_both_arms(area_frame, results, steps)
@@ -214,7 +217,7 @@ def _cost(study: Study, frontier: list[Block]) -> Section:
             tables.pareto_table(study, pareto, task),
         )
         if blocks:
-            below.append(_section(f"cost-on-{slug}", task, blocks))
+            below.append(_section(f"on-{slug}-cost", task, blocks))
     return _section("cost", "Reward and what it costs", frontier, below)
 
 
@@ -223,9 +226,9 @@ def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Se
     for task, slug in tables.table_ids(study).items():
         found = tables.signatures_tables(study, task)
         if found:
-            below.append(_section(f"signatures-on-{slug}", task, list(found)))
+            below.append(_section(f"on-{slug}-signatures", task, list(found)))
     blocks = [*context, *_tables(tables.contexts_table(study)), *matrices]
-    return _section("signatures-of-coarticulation", "Signatures of coarticulation", blocks, below)
+    return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 
 def _claims(study: Study, judged: Sequence[Judged]) -> Section:
@@ -265,9 +268,25 @@ def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "
         "performs a run again; `coartic cite` prints what to cite.",
         *map(_escape, macro_names(study).renamed()),
-        *(f"No figure {_escape(name)}: {_escape(why)}" for name, why in figures.skipped.items()),
+        *(
+            f"No figure {_escape(name)}: {_escape(why.removeprefix(f'{study.results.folder}: '))}."
+            for name, why in figures.skipped.items()
+        ),
+        *([_few(study)] if _many(study) else []),
     ]
     return _section("about", "Tracing and citing", [Bullets(tuple(items))])
+
+
+def _many(study: Study) -> bool:
+    return len(study.results.tasks) > MOST_TASKS
+
+
+def _few(study: Study) -> str:
+    return (
+        f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has no "
+        "tables of pairs, targets, areas and Pareto sets by task, and no figures of signatures; "
+        "`coartic analyse` writes all of them as CSV."
+    )
 
 
 def _section(

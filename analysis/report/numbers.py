@@ -226,12 +226,12 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
     )  # fmt: skip
     if cell.variant:
         return
-    row = study.methods[key]
+    row, free = study.methods[key], study.optima.get((task, "free"))
     for column, macro, arm in (("gap", "Gap", "free"), ("gap_still", "GapStill", "still")):
         if math.isnan(row[column]):
             continue
         best = study.optima[task, arm].reward
-        if arm == "still" and best == getattr(study.optima.get((task, "free")), "reward", None):
+        if arm == "still" and free is not None and best == free.reward:
             continue
         gap = f"gap to the optimum{', other arm still' if arm == 'still' else ''}, {who}"
         for suffix, share, unit in (
@@ -341,5 +341,6 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
             f"{PREFIX}{names.tasks[task]}{names.labels[label]}{what}",
             f"{signature}{place}, {label} on {task}", float(row["value"]), 2, unit,
             float(row["low"]), float(row["high"]),
-            n=n if n != len(study.cells[task, label].good) else None, how="docs/signatures.md", cells=tuple(cells),
+            n=n if n != len(study.cells[task, label].good) else None,
+            how="docs/signatures.md", cells=tuple(cells),
         )  # fmt: skip

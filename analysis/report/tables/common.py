@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.slugs import slugs
 from analysis.statistics import mean
 from analysis.study import SEED, Study
 
 
 def table_ids(study: Study) -> dict[str, str]:
-    """Names of tasks as tables' ids have them: small letters, digits and dashes, all different."""
-    found: dict[str, str] = {}
-    for name in study.results.tasks:
-        signed = re.sub(r"(?<=[_=])-(?=\d)", "minus", name.lower())
-        base = re.sub(r"[^a-z0-9]+", "-", signed).strip("-")
-        slug, number = base, 2
-        while slug in found.values():
-            slug, number = f"{base}-{number}", number + 1
-        found[name] = slug
-    return found
+    """Names of tasks as tables' ids have them."""
+    return slugs(study.results.tasks)
 
 
 def table(

@@ -40,7 +40,7 @@ def targets_table(study: Study, targets: pd.DataFrame, task: str) -> DataTable |
     heads = [Column("method", "method")]
     for share in shares:
         name = f"within_{share:.0%}".rstrip("%")
-        heads.append(Column(f"{name}_reached", f"within {share:.0%}"))
+        heads.append(Column(f"{name}_reached", f"within {100 * share:.0f} %"))
         heads.append(Column(name, "median trials", "number", digits=0))
     return table(
         f"targets-{table_ids(study)[task]}",
@@ -109,7 +109,7 @@ def pareto_table(study: Study, pareto: pd.DataFrame, task: str) -> DataTable | N
         values: list[Value] = [str(method), str(first.told), float(first.reward)]
         for spend in spends:
             row = by_spend[spend]
-            values += [finite(row["amount"]), finite(row["front_share"])]
+            values += [_whole(row["amount"]), finite(row["front_share"])]
         rows.append(Row(str(method), tuple(values), ((task, str(method)),)))
     heads = [
         Column("method", "method"), Column("told", "told"),
@@ -130,6 +130,11 @@ def pareto_table(study: Study, pareto: pd.DataFrame, task: str) -> DataTable | N
             "times within 10 % are ties.",
         ),
     )
+
+
+def _whole(value: float) -> float | int | None:
+    """Counts that a median left whole are written so; None for NaN."""
+    return int(value) if float(value).is_integer() else finite(value)
 
 
 def _number(value: Value) -> float:

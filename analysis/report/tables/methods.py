@@ -11,6 +11,7 @@ from analysis.methods import methods_notes
 from analysis.overall import NEAR
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
+from analysis.report.text import typographic
 from analysis.study import Study
 
 
@@ -46,7 +47,11 @@ def methods_table(study: Study, task: str) -> DataTable | None:
     return table(
         f"methods-{table_ids(study)[task]}",
         f"All methods on {marked(study, task)}"
-        + ("" if best is None else f"; optimum {best.reward}{' (proven)' if best.proven else ''}")
+        + (
+            ""
+            if best is None
+            else f"; optimum {typographic(str(best.reward))}{' (proven)' if best.proven else ''}"
+        )
         + ".",
         (
             Column("method", "method"),
@@ -85,7 +90,9 @@ def overall_table(overall: pd.DataFrame, scores: pd.DataFrame) -> DataTable | No
     ]
     for share in NEAR:
         near = f"within_{share:.0%}".rstrip("%")
-        head = Column(near, f"within {share:.0%}", "share", digits=0, printed=share == 0.05)
+        head = Column(
+            near, f"within {100 * share:.0f} %", "share", digits=0, printed=share == 0.05
+        )
         columns.append((head, (near, f"{near}_low", f"{near}_high")))
     rows = []
     for row in overall.to_dict("records"):

@@ -9,6 +9,7 @@ from analysis.equivalence import MARGIN, difference
 from analysis.published import TRIALS, Summary, published_exhaustive, published_initial
 from analysis.report.document import Column, DataTable, Estimate, Row
 from analysis.report.tables.common import counts, marked, mean_of, table, with_interval
+from analysis.report.text import typographic
 from analysis.study import Study
 
 
@@ -91,8 +92,11 @@ def exhaustive_table(study: Study) -> DataTable | None:
                 task,
                 (
                     marked(study, task),
-                    f"{paper[0]} {paper[1]}" if paper else None,
-                    ", ".join(f"{row.hands} {row.reward}" for row in best.head(4).itertuples()),
+                    f"{paper[0]} {typographic(str(paper[1]))}" if paper else None,
+                    ", ".join(
+                        f"{row.hands} {typographic(str(row.reward))}"
+                        for row in best.head(4).itertuples()
+                    ),
                     len(trials),
                     int(trials.reward.isna().sum()),
                 ),

@@ -11,6 +11,7 @@ from analysis.signatures.page import Column as SignatureColumn
 from analysis.study import Study
 
 MOST_CONTEXTS = 120
+_UNITS = ("ticks", "share", "bit", "count", "rad", "1")
 
 
 def signatures_tables(study: Study, task: str) -> list[DataTable]:
@@ -106,13 +107,15 @@ def _signatures(
     heads = []
     for index, column in enumerate(columns):
         head, _, unit = column.head.rpartition(", ")
+        if unit not in _UNITS:
+            head, unit = column.head, ""
         unit = "" if unit == "1" else unit
         heads.append(
             Column(
                 f"signature_{index}",
-                head or unit,
+                head,
                 "number",
-                unit if head else "",
+                unit,
                 printed=index < 3,
             )
         )
