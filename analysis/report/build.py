@@ -142,7 +142,11 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
     items = [
         f"{len(results.tasks)} tasks, {len({c.label for c in results.cells})} methods with their "
         f"variants, {len(results.cells)} cells; "
-        + (f"{failed} of {len(results.runs)} runs failed." if failed else "no run failed."),
+        + (
+            f"{failed} of {len(results.runs)} runs have no solution."
+            if failed
+            else "every run has a solution."
+        ),
     ]
     for task in results.tasks:
         best = study.optima.get((task, "free"))
@@ -163,7 +167,8 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
         if best is not None and best.reward:
             gap = (best.reward - reward) / -best.reward
             proof = "proven" if best.proven else "best known"
-            text += f"; the optimum is {typographic(str(best.reward))} ({proof}), {gap:.1%} away"
+            known = typographic(str(best.reward))
+            text += f"; the optimum is {known} ({proof}), {100 * gap:.1f} % away"
         items.append(f"{text}.")
     paper = [entry for entry in judged if entry.claim.place]
     for name, entries in (
@@ -179,7 +184,7 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
             )
             + "."
         )
-    overall = tables.overall_table(overall_frame(scores), scores)
+    overall = tables.overall_table(study, overall_frame(scores), scores)
     blocks: list[Block] = [Bullets(tuple(items))]
     if overall is not None:
         blocks.append(overall)

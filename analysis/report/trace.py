@@ -62,7 +62,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
     Cells are named by their place in the list ``cells``. The same results give the same text,
     wherever they lie: of paths in the command that asked for them only the last part is kept.
     """
-    commits = results.runs.set_index("run_id").commit.astype(str)
+    commits = results.runs.set_index("run_id").commit.astype(object).fillna("unknown")
     labels = {(cell.task, cell.label): cell for cell in results.cells}
     places = {key: place for place, key in enumerate(document.runs)}
     environment = results.manifest["environment"]

@@ -80,8 +80,8 @@ def reading_of_methods(study: Study) -> tuple[str, ...]:
     return tuple(methods_notes(study.results))
 
 
-def overall_table(overall: pd.DataFrame, scores: pd.DataFrame) -> DataTable | None:
-    """Every method over all tasks."""
+def overall_table(study: Study, overall: pd.DataFrame, scores: pd.DataFrame) -> DataTable | None:
+    """Every method over all tasks that have an optimum."""
     columns: list[tuple[Column, str | tuple[str, str, str]]] = [
         (Column("method", "method"), "method"),
         (Column("runs", "runs", "number", printed=False), "runs"),
@@ -104,9 +104,11 @@ def overall_table(overall: pd.DataFrame, scores: pd.DataFrame) -> DataTable | No
                 tuple(dict.fromkeys(zip(own.task.map(str), own.label.map(str), strict=True))),
             )
         )
+    known, tasks = scores.task.nunique(), len(study.results.tasks)
+    of = "All tasks" if known == tasks else f"The {known} of {tasks} tasks with a known optimum"
     return table(
         "across-tasks",
-        "All tasks together, each counting the same.",
+        f"{of} together, each counting the same.",
         tuple(column for column, _ in columns),
         rows,
         (
