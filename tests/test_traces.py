@@ -3,7 +3,9 @@
 import json
 import random
 import re
+import shutil
 import statistics as plain
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +89,18 @@ def study(results):
     return Study(results)
 
 
+LATEX = r"""\documentclass{article}
+\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
+\usepackage{booktabs,siunitx,graphicx}
+\hfuzz=1pt
+\input{numbers.tex}
+\begin{document}
+%s
+\input{tables.tex}
+\end{document}
+"""
+
+
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
 
 
@@ -105,6 +119,21 @@ def report_of(study, folder):
 @pytest.fixture(scope="module")
 def home(study):
     return report_of(study, study.results.folder / "report")
+
+
+def compiled(folder, body=""):
+    """The log of a document with all macros and tables; skips where LaTeX is missing."""
+    if not shutil.which("pdflatex"):
+        pytest.skip("pdflatex is not installed")
+    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty", "geometry.sty"]
+    if subprocess.run(styles, capture_output=True, check=False).returncode:
+        pytest.skip("booktabs, siunitx, graphicx or geometry is not installed")
+    (folder / "paper.tex").write_text(LATEX % body, encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=120)
+    log = done.stdout.decode(errors="replace")
+    assert done.returncode == 0, log[-2000:]
+    return log
 
 
 class Records:
@@ -409,6 +438,20 @@ def test_a_wrong_number_would_be_found(what, home, study, records, tmp_path):
         row["cells"] = other
     with pytest.raises(AssertionError):
         check()
+
+
+def test_latex_takes_every_macro_and_table(home, tmp_path):
+    folder = tmp_path / "report"
+    shutil.copytree(home, folder)
+    text = (folder / "numbers.tex").read_text(encoding="utf-8")
+    macros = re.findall(r"^\\newcommand\{\\(\w+)\}", text, re.M)
+    assert len(macros) > 100
+    log = compiled(folder, "\n\n".join(f"\\{name}" for name in macros))
+    for fault in ("Overfull", "Undefined", "Missing character", "multiply defined"):
+        assert fault not in log, re.findall(f".*{fault}.*", log)
+    again = text.replace("\\providecommand", "\\newcommand{\\coarticnum}[1]{\\num{#1}}%", 1)
+    (folder / "numbers.tex").write_text(again, encoding="utf-8")
+    compiled(folder, f"\\{macros[-1]}")
 
 
 def test_variants_have_their_reward_only(home):
