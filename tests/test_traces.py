@@ -276,6 +276,7 @@ def check_macro(home, study, records, name):
     assert len(shown) == len(values), (name, found.text, value)
     for got, wanted in zip(shown, values, strict=True):
         assert abs(got - wanted) <= 0.5 * 10.0**-decimals + 1e-9, (name, found.text, value)
+    assert all(name in found.meaning for key in keys[:1] for name in key), found.meaning
     check_sources(found, records, keys)
 
 

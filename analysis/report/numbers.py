@@ -55,6 +55,8 @@ class Number:
     """How value and interval were obtained."""
     cells: tuple[Cell, ...] = ()
     """What it was computed from; none for what the paper prints and for known optima."""
+    of: str = ""
+    """What the meaning is said of, such as a method on a task."""
 
     def companions(self) -> Iterator[tuple[str, str]]:
         """What follows the macro's name, first nothing, with the text that it stands for."""
@@ -151,9 +153,13 @@ def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
         "%   \\newcommand{\\coarticnum}[1]{\\num{#1}}   before \\input",
         f"\\providecommand{{\\{PREFIX}num}}[1]{{\\ensuremath{{#1}}}}",
     ]
+    of = ""
     for number in numbers:
         unit = f", {number.unit}" if number.unit else ""
         how = f"; {number.how}" if number.how and math.isnan(number.low) else ""
+        if number.of != of:
+            of = number.of
+            lines.append(f"% {of}:")
         lines.append(f"% {number.meaning}{unit}{how}")
         for suffix, text in number.companions():
             content = number.full(_tex, "$n$") if suffix == "Full" else _tex(text)
@@ -183,11 +189,12 @@ def _how(found: Inference) -> str:
 
 
 def _number(
-    macro: str, meaning: str, found: Inference, cells: tuple[Cell, ...], digits: int, unit: str
-) -> Number:
+    macro: str, meaning: str, of: str, found: Inference, cells: tuple[Cell, ...], digits: int,
+    unit: str,
+) -> Number:  # fmt: skip
     return Number(
         PREFIX + macro, meaning, found.estimate, digits, unit, found.low, found.high,
-        n=sum(found.n), how=_how(found), cells=cells,
+        n=sum(found.n), how=_how(found), cells=cells, of=of,
     )  # fmt: skip
 
 
@@ -197,17 +204,17 @@ def _tasks(study: Study, names: Names) -> Iterator[Number]:
             best = study.optima.get((task, arm))
             if best is None:
                 continue
-            meaning = f"best reward known of {task}, other arm {arm}"
+            meaning = f"best reward known, other arm {arm}"
             how = "proven" if best.proven else "not proven"
             macro = f"{PREFIX}{names.tasks[task]}Optimum{'' if arm == 'free' else 'Still'}"
-            yield Number(macro, meaning, best.reward, 0, "ticks", how=how)
+            yield Number(macro, meaning, best.reward, 0, "ticks", how=how, of=task)
         printed = published_initial(task)
         if printed is not None:
-            meaning = f"published reward of the initial solution of {task}"
+            meaning = "published reward of the initial solution"
             how = "derived from other printed numbers" if printed[2] else "printed"
             yield Number(
                 f"{PREFIX}{names.tasks[task]}PublishedInitialReward", meaning, printed[1], 0,
-                "ticks", how=how,
+                "ticks", how=how, of=task,
             )  # fmt: skip
 
 
@@ -220,9 +227,9 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
     spread = float(np.std(rewards, ddof=1)) if len(rewards) > 1 else math.nan
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
     yield Number(
-        f"{PREFIX}{name}Reward", f"mean learned reward, {who}{solved}", found.estimate, 1,
+        f"{PREFIX}{name}Reward", f"mean learned reward{solved}", found.estimate, 1,
         "ticks", found.low, found.high, spread, len(rewards),
-        _how(found), (key,),
+        _how(found), (key,), who,
     )  # fmt: skip
     if cell.variant:
         return
@@ -233,7 +240,7 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
         best = study.optima[task, arm].reward
         if arm == "still" and free is not None and best == free.reward:
             continue
-        gap = f"gap to the optimum{', other arm still' if arm == 'still' else ''}, {who}"
+        gap = f"gap to the optimum{', other arm still' if arm == 'still' else ''}"
         for suffix, share, unit in (
             ("", 1.0, "ticks"),
             ("Percent", 100 / -best if best else math.nan, "% of the optimum"),
@@ -242,7 +249,7 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
                 yield Number(
                     f"{PREFIX}{name}{macro}{suffix}", gap, (best - found.estimate) * share, 1,
                     unit, (best - found.high) * share, (best - found.low) * share,
-                    how=_how(found), cells=(key,),
+                    how=_how(found), cells=(key,), of=who,
                 )  # fmt: skip
     evaluations = cell.runs.forward_kinematics + cell.runs.jacobians
     for what, meaning, values, digits, unit in (
@@ -259,24 +266,25 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
         known = values.dropna()
         if len(known):
             yield Number(
-                f"{PREFIX}{name}{what}", f"median of {meaning}, {who}", float(known.median()),
+                f"{PREFIX}{name}{what}", f"median of {meaning}", float(known.median()),
                 digits, unit, n=len(known) if len(known) != len(rewards) else None,
-                cells=(key,),
+                cells=(key,), of=who,
             )  # fmt: skip
     if label.startswith(_LEARNER):
         initial = cell.good.initial_reward.dropna().unique()
         if len(initial) == 1:
             yield Number(
-                f"{PREFIX}{name}InitialReward", f"reward of the initial solution, {who}",
-                float(initial[0]), 0, "ticks", how="deterministic", cells=(key,),
+                f"{PREFIX}{name}InitialReward", "reward of the initial solution",
+                float(initial[0]), 0, "ticks", how="deterministic", cells=(key,), of=who,
             )  # fmt: skip
         printed = published_cell(task, label.removeprefix(_LEARNER))
         if printed is not None and printed.summary is not None:
             summary = printed.summary
             yield Number(
-                f"{PREFIX}{name}PublishedReward", f"published mean reward, {who}", summary.mean,
+                f"{PREFIX}{name}PublishedReward", "published mean reward", summary.mean,
                 1, "ticks", sd=math.nan if summary.sd is None else summary.sd, n=summary.runs,
                 how="derived from other printed numbers" if summary.derived else "printed",
+                of=who,
             )  # fmt: skip
 
 
@@ -296,11 +304,11 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
             what = f"{higher} less {lower} on {task}"
             apart = difference_of_means(a, b, seed=SEED)
             yield _number(
-                f"{name}Reward", f"difference of mean rewards, {what}", apart, cells, 1, "ticks"
+                f"{name}Reward", "difference of mean rewards", what, apart, cells, 1, "ticks"
             )
             better = probability_of_improvement(a, b, seed=SEED)
             yield _number(
-                f"{name}Improvement", f"probability of improvement, {what}", better, cells, 2, ""
+                f"{name}Improvement", "probability of improvement", what, better, cells, 2, ""
             )
 
 
@@ -314,8 +322,9 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
             yield Number(
                 f"{PREFIX}{names.tasks[task]}{names.labels[label]}Hands{hands}",
-                f"runs that learned {hands}, {label} on {task}", float(count), 0, "runs",
+                f"runs that learned {hands}", float(count), 0, "runs",
                 how=f"of {len(cell.good)} with a solution", cells=(key,),
+                of=f"{label} on {task}",
             )  # fmt: skip
 
 
@@ -339,8 +348,8 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
         place = f" ({where})" if where else ""
         yield Number(
             f"{PREFIX}{names.tasks[task]}{names.labels[label]}{what}",
-            f"{signature}{place}, {label} on {task}", float(row["value"]), 2, unit,
+            f"{signature}{place}", float(row["value"]), 2, unit,
             float(row["low"]), float(row["high"]),
             n=n if n != len(study.cells[task, label].good) else None,
-            how="docs/signatures.md", cells=tuple(cells),
+            how="docs/signatures.md", cells=tuple(cells), of=f"{label} on {task}",
         )  # fmt: skip

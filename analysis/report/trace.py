@@ -87,6 +87,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
             number.macro: {
                 "texts": dict(number.companions()),
                 "meaning": number.meaning,
+                "of": number.of,
                 "how": number.how,
                 "cells": [places[key] for key in number.cells],
             }
@@ -176,7 +177,7 @@ def _find(content: dict[str, Any], home: Path, name: str, where: Sequence[str]) 
         macro, suffix = macros[name]
         entry = content["macros"][macro]
         text, how, keys = entry["texts"][suffix], entry["how"], entry["cells"]
-        title, meaning = name, _COMPANIONS.get(suffix, "") + entry["meaning"]
+        title, meaning = name, _meaning(entry, suffix)
     elif name in content["tables"]:
         title, text, meaning, keys = _table_cell(content["tables"][name], name, where)
         how = ""
@@ -241,6 +242,11 @@ def _table_cell(
     cells = entry["cells_by_column"].get(column, entry["cells"])
     text = entry["texts"][columns.index(column)]
     return f"{name} [{row}, {column}]", text, table["caption"], cells
+
+
+def _meaning(entry: dict[str, Any], suffix: str) -> str:
+    of = f", {entry['of']}" if entry["of"] else ""
+    return f"{_COMPANIONS.get(suffix, '')}{entry['meaning']}{of}"
 
 
 def _source(content: dict[str, Any], cell: dict[str, Any]) -> Source:
