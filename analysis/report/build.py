@@ -268,7 +268,7 @@ def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section
     items = [
         "Every number of a table leads to its runs (last column); every table is in `tables/` as "
         "CSV and LaTeX, every figure in `figures/` as PDF, SVG, PNG and CSV (the data behind it).",
-        f"`numbers.tex` has {count} macros, such as `\\\\{example}`.",
+        f"`numbers.tex` has {count} macros, such as `\\{example}`.",
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "
         "performs a run again; `coartic cite` prints what to cite.",
