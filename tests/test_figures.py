@@ -332,3 +332,11 @@ def test_numbers():
     ]  # fmt: skip
     assert number(-3.25, 1) == "−3.2"
     assert (on("#0072b2"), on("#e69f00")) == ("#fdfdfd", "#111111")
+
+
+def test_variants_of_a_task_are_told_apart():
+    task = load_task("ascending")
+    moved = task.model_copy(update={"name": "ascending.goal2_0_1"})
+    titles = [axes.get_title(loc="left").strip() for axes in tasks_plot([task, moved]).figure.axes]
+    assert titles == ["ascending", "ascending.goal2_0_1"]
+    assert tasks_plot([task]).figure.axes[0].get_title(loc="left").strip() == "Ascending"

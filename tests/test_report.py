@@ -262,7 +262,7 @@ def test_csv_reads_back_as_the_raw_values():
 
 
 def test_latex_escapes():
-    assert latex_text("a_b & 5 % #1 {x} $") == r"a\_b \& 5 \% \#1 \{x\} \$"
+    assert latex_text("a_b & 5 % #1 {x} $") == r"a\_b \& 5~\% \#1 \{x\} \$"
     assert latex_text("−1 ± 2 ΔV †") == r"$-$1 $\pm$ 2 $\Delta$V \textdagger{}"
     assert latex_text("--- [*") == "-{}-{}- {[}{*}"
     assert latex_text("λΛ漢") == r"$\lambda$$\Lambda$[U+6F22]"
@@ -294,13 +294,13 @@ def write(folder, shown=None):
 def test_latex_compiles(tmp_path):
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty"]
+    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty"]
     if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip("booktabs and siunitx are not installed")
+        pytest.skip("booktabs, siunitx and graphicx are not installed")
     write(tmp_path / "report")
     (tmp_path / "report" / "paper.tex").write_text(
         r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}"
-        r"\usepackage{booktabs,siunitx}\begin{document}\input{tables.tex}\end{document}",
+        r"\usepackage{booktabs,siunitx,graphicx}\begin{document}\input{tables.tex}\end{document}",
         encoding="utf-8",
     )
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]

@@ -15,6 +15,7 @@ from matplotlib.patches import Rectangle
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, known_tasks, missing
 from analysis.figures.style import GREY, TWO, dagger, number, on, short, styled
+from analysis.slugs import slugs
 from analysis.study import Study
 from coartic import Task
 
@@ -50,13 +51,13 @@ def signature_matrix(
     The value of a cell is the mean over the places (goals, coordinates) of the signature.
     Raises CoarticError where no method has a signature on any of the tasks.
     """
-    plots = []
+    plots, ids = [], slugs(study.results.tasks)
     for name, task in known_tasks(study, tasks).items():
         frame = study.signatures
         labels = chosen(study, [name], methods) if (frame.task == name).any() else []
         data = _values(frame[(frame.task == name) & frame.label.isin(labels)], labels)
         if data.value.notna().any():
-            plots.append(_plot(task, data))
+            plots.append(_plot(task, ids[name], data))
     if not plots:
         raise missing(study, "no solved run on any of the tasks: there are no signatures")
     return plots
@@ -89,7 +90,7 @@ def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
     return data.assign(standardised=standard.where(data.value.isna(), standard.fillna(0.0)))
 
 
-def _plot(task: Task, data: pd.DataFrame) -> Plot:
+def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     values = data.pivot_table(
         index="method", columns="signature", values="value", sort=False, dropna=False
     )
@@ -141,7 +142,7 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
     axes.tick_params(length=0, pad=2)
     axes.spines[:].set_visible(False)
     return Plot(
-        id=f"signatures-{task.name}",
+        id=f"signatures-{slug}",
         title=f"Signatures of coarticulation: {task.label}",
         caption=(
             f"{task.label}: signatures (docs/signatures.md), each the mean over its goals or "

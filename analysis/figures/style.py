@@ -10,6 +10,7 @@ import itertools
 import re
 from collections.abc import Callable, Iterable
 from functools import wraps
+from string import ascii_lowercase
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from matplotlib import style
@@ -223,6 +224,6 @@ def log_axis(axes: Axes) -> None:
 
 
 def letters(panels: Iterable[Axes]) -> None:
-    """Name panels a, b, ... before their titles."""
-    for letter, axes in zip("abcdefghijklmnop", panels, strict=False):
+    """Name panels a, b, ... z before their titles."""
+    for letter, axes in zip(ascii_lowercase, panels, strict=False):
         axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left")

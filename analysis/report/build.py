@@ -32,7 +32,7 @@ from analysis.report.document import (
     Section,
 )
 from analysis.report.limitations import limitations
-from analysis.report.numbers import PREFIX, Number, headline_numbers, numbers_tex
+from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
 from analysis.report.text import typographic
 from analysis.report.trace import FILE, trace_json
@@ -40,7 +40,8 @@ from analysis.report.write import write_report
 from analysis.results import Results
 from analysis.study import Study
 
-FOLDER = "report"
+MOST_TASKS = 8
+"""More would make a report that nobody reads."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Report:
 
 def build(study: Study) -> Report:
     """Everything a report holds. A section that the runs do not allow is left out."""
-    figures, numbers = all_figures(study), tuple(headline_numbers(study))
+    figures, numbers = all_figures(study, MOST_TASKS), tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
     judged = judge(study)
     pairs = pairwise_frame(study)
@@ -108,7 +109,8 @@ def write(report: Report, study: Study, folder: Path) -> None:
 
     Raises CoarticError where it cannot be written.
     """
-    about = f"Headline values of {_title(study.results)}. {_lead(study.results)}"
+    about = [f"Headline values of {_title(study.results)}.", _lead(study.results)]
+    about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study.results, report.document, report.numbers),
@@ -140,7 +142,11 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
     items = [
         f"{len(results.tasks)} tasks, {len({c.label for c in results.cells})} methods with their "
         f"variants, {len(results.cells)} cells; "
-        + (f"{failed} of {len(results.runs)} runs failed." if failed else "no run failed."),
+        + (
+            f"{failed} of {len(results.runs)} runs have no solution."
+            if failed
+            else "every run has a solution."
+        ),
     ]
     for task in results.tasks:
         best = study.optima.get((task, "free"))
@@ -161,7 +167,8 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
         if best is not None and best.reward:
             gap = (best.reward - reward) / -best.reward
             proof = "proven" if best.proven else "best known"
-            text += f"; the optimum is {typographic(str(best.reward))} ({proof}), {gap:.1%} away"
+            known = typographic(str(best.reward))
+            text += f"; the optimum is {known} ({proof}), {100 * gap:.1f} % away"
         items.append(f"{text}.")
     paper = [entry for entry in judged if entry.claim.place]
     for name, entries in (
@@ -177,7 +184,7 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
             )
             + "."
         )
-    overall = tables.overall_table(overall_frame(scores), scores)
+    overall = tables.overall_table(study, overall_frame(scores), scores)
     blocks: list[Block] = [Bullets(tuple(items))]
     if overall is not None:
         blocks.append(overall)
@@ -189,18 +196,20 @@ def _methods(
 ) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
-        blocks = _tables(
-            tables.methods_table(study, task),
-            tables.pairwise_table(study, pairs, task),
-            tables.cost_table(study, pairs, task),
-        )
+        blocks = _tables(tables.methods_table(study, task))
+        if not _many(study):
+            blocks += _tables(
+                tables.pairwise_table(study, pairs, task), tables.cost_table(study, pairs, task)
+            )
         if blocks:
-            below.append(_section(f"methods-on-{slug}", task, blocks))
+            below.append(_section(f"on-{slug}-methods", task, blocks))
     reading = Bullets(tables.reading_of_methods(study))
     return _section("methods", "Methods side by side", [*profiles, reading], below)
 
 
 def _cost(study: Study, frontier: list[Block]) -> Section:
+    if _many(study):
+        return _section("cost", "Reward and what it costs", frontier)
     results, steps = study.results, study.steps
     targets = for_both_arms(targets_frame, results, steps)
     areas = for_both_arms(area_frame, results, steps)
@@ -213,7 +222,7 @@ def _cost(study: Study, frontier: list[Block]) -> Section:
             tables.pareto_table(study, pareto, task),
         )
         if blocks:
-            below.append(_section(f"cost-on-{slug}", task, blocks))
+            below.append(_section(f"on-{slug}-cost", task, blocks))
     return _section("cost", "Reward and what it costs", frontier, below)
 
 
@@ -222,9 +231,9 @@ def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Se
     for task, slug in tables.table_ids(study).items():
         found = tables.signatures_tables(study, task)
         if found:
-            below.append(_section(f"signatures-on-{slug}", task, list(found)))
+            below.append(_section(f"on-{slug}-signatures", task, list(found)))
     blocks = [*context, *_tables(tables.contexts_table(study)), *matrices]
-    return _section("signatures-of-coarticulation", "Signatures of coarticulation", blocks, below)
+    return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 
 def _claims(study: Study, judged: Sequence[Judged]) -> Section:
@@ -254,18 +263,35 @@ def _claims(study: Study, judged: Sequence[Judged]) -> Section:
 
 
 def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:
-    count = sum(1 for number in numbers for _ in number.macros())
+    count = sum(1 for number in numbers for _ in number.companions())
     example = next((n.macro for n in numbers if n.cells), f"{PREFIX}...")
     items = [
         "Every number of a table leads to its runs (last column); every table is in `tables/` as "
         "CSV and LaTeX, every figure in `figures/` as PDF, SVG, PNG and CSV (the data behind it).",
-        f"`numbers.tex` has {count} macros, such as `\\\\{example}`.",
+        f"`numbers.tex` has {count} macros, such as `\\{example}`.",
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "
         "performs a run again; `coartic cite` prints what to cite.",
-        *(f"No figure {_escape(name)}: {_escape(why)}" for name, why in figures.skipped.items()),
+        *map(_escape, macro_names(study).renamed()),
+        *(
+            f"No figure {_escape(name)}: {_escape(why.removeprefix(f'{study.results.folder}: '))}."
+            for name, why in figures.skipped.items()
+        ),
+        *([_few(study)] if _many(study) else []),
     ]
     return _section("about", "Tracing and citing", [Bullets(tuple(items))])
+
+
+def _many(study: Study) -> bool:
+    return len(study.results.tasks) > MOST_TASKS
+
+
+def _few(study: Study) -> str:
+    return (
+        f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has no "
+        "tables of pairs, targets, areas and Pareto sets by task, and no figures of signatures; "
+        "`coartic analyse` writes all of them as CSV."
+    )
 
 
 def _section(
