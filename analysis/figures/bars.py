@@ -71,7 +71,7 @@ def bars(
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
         axes.set_title(heading(found[name]))
-        axes.set_ylabel("learned reward" if axes is panels[0] else "")
+        axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     letters(panels)
     values = "; ".join(
         f"{row['task']}, {short(row['method'])}: {row['reward']:.1f}"

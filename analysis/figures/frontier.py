@@ -101,7 +101,7 @@ def _plot(
             axes, data[data.task == task.name], present, edge, optimum.reward if optimum else None
         )
         axes.set_title(heading(task))
-        axes.set_ylabel("" if place % columns else "best reward so far")
+        axes.set_ylabel("" if place % columns else "best reward so far (ticks)")
         axes.set_xlabel(NAMES[spend] if place + columns >= len(tasks) else "")
     panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
     letters(panels[: len(tasks)])

@@ -27,7 +27,7 @@ TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
 SMALL, NORMAL = 7.0, 8.0  # pt
 INK, PAPER = "#000000", "#ffffff"
-GREY = "#8a8a8a"
+GREY = "#7a7a7a"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
     "#0072b2",
     "#56b4e9",

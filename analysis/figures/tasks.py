@@ -36,7 +36,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
     for axes, task, corners in zip(panels, tasks, boxes, strict=False):
         draw_robot(axes, task, task.q0, marked=task.hands)
         draw_goals(axes, task)
-        axes.set_title(_title(task), fontsize=NORMAL, wrap=True)
+        axes.set_title(_title(task), fontsize=NORMAL)
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)
