@@ -13,7 +13,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
-from analysis.figures.style import INK, PAPER, RC
+from analysis.figures.style import GREY, INK, PAPER, RC
 from analysis.figures.svg import compact
 from coartic import CoarticError
 
@@ -82,8 +82,9 @@ def svg_text(plot: Plot) -> str:
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the
-    page has one. Ids begin with the plot's id, so that several can share a page. Text stays
-    text, in the page's own sans-serif where DejaVu Sans is missing.
+    page has one, and its grey is ``--grey``. Ids begin with the plot's id, so that several can
+    share a page. Text stays text, in Verdana or the page's own sans-serif where DejaVu Sans is
+    missing.
     """
     stream = io.StringIO()
     with rc_context({**RC, "svg.fonttype": "none"}):
@@ -94,6 +95,7 @@ def svg_text(plot: Plot) -> str:
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.
     text = text.replace(INK, "currentColor").replace(PAPER, "var(--paper, none)")
+    text = text.replace(GREY, f"var(--grey, {GREY})")
     head, body = text.split(">", 1)
     head = re.sub(r' (width|height|version|xmlns:xlink)="[^"]*"', "", head)
     # What the backend says for all elements would go for all of the page.

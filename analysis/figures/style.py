@@ -193,6 +193,11 @@ def number(value: float, digits: int = 0) -> str:
     return f"{value:.{digits}f}".replace("-", "−")
 
 
+def percent(share: float) -> str:
+    """A share in whole per cent."""
+    return f"{share:.0%}".replace("%", " %")
+
+
 def grid(panels: int, tall: float, legend: float) -> tuple[int, int, float]:
     """Rows, columns and height in inches of panels that are ``tall`` where the page allows."""
     columns = min(2 if panels <= 6 else 3, panels)

@@ -21,11 +21,13 @@ from analysis.report import tables
 from analysis.report.document import (
     Block,
     Bullets,
+    Column,
     DataTable,
     Document,
     FigureBlock,
     PlayerBlock,
     Prose,
+    Row,
     Section,
 )
 from analysis.report.legends import with_legends
@@ -37,6 +39,7 @@ from analysis.report.trace import FILE, trace_json
 from analysis.report.write import write_report
 from analysis.results import Results
 from analysis.study import Study
+from analysis.table import Table
 
 FOLDER = "report"
 CLAIMS = "claims-register"
@@ -222,15 +225,23 @@ def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Sectio
         ]
         content: list[Block] = [Prose(tuple(lines))]
         if entry.table is not None:
-            content.append(Bullets(tuple(
-                _escape("; ".join(f"{head} {cell}" for head, cell in zip(
-                    entry.table.columns, row, strict=True)))
-                for row in entry.table.rows
-            )))  # fmt: skip
+            content.append(_evidence(study, entry.table, claim.id))
         title = f"{claim.id}: {entry.verdict}{mark}"
         below.append(Section(f"claim-{claim.id}", title, tuple(content), folded=True))
     each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(below), folded=True)
     return _section(CLAIMS, "Claims", blocks, [each])
+
+
+def _evidence(study: Study, table: Table, claim: str) -> DataTable:
+    """A claim's numbers; rows named like a method rest on its cells."""
+    rows = []
+    for place, texts in enumerate(table.rows, 1):
+        cells = tuple(key for key in study.cells if key[1] == texts[0])
+        rows.append(Row(f"{place}: {texts[0]}", tuple(texts), cells))
+    columns = tuple(Column(f"column_{k}", head) for k, head in enumerate(table.columns, 1))
+    return DataTable(
+        f"evidence-{claim}", _escape(f"{claim}: {table.title}."), columns, tuple(rows)
+    )
 
 
 def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:

@@ -24,6 +24,7 @@ from analysis.table import NONE
 
 _MAGNIFIED = 1.5
 _WIDE, _READABLE = 320.0, 1.4  # pt; CSS pixels per pt that text of 7 pt needs
+_WORD, _SENTENCE = 18, 60  # characters: up to one stays on a line, beyond the other has room
 _MOST_LINKS = 4  # stretches of run lists linked from one row
 
 MOST_ROWS = 15
@@ -145,6 +146,7 @@ def _spans(text: str) -> str:
         if style == "link":
             return f'<a href="{escape(address)}">{escape(words)}</a>'
         tag = {"emphasis": "em", "code": "code"}.get(style)
+        words = words if style == "code" else true_minus(words)
         return f"<{tag}>{escape(words)}</{tag}>" if tag else escape(words)
 
     return "".join(mark(span.style, span.text, span.address) for span in inline(text))
@@ -161,7 +163,7 @@ def _table(table: DataTable, numbers: Mapping[CellKey, int]) -> str:
         heads.append('<th scope="col">Runs</th>')
     rows = "\n".join(_row(row, shown, sourced, numbers) for row in table.rows)
     notes = "".join(f'<p class="notes">{_spans(note)}</p>\n' for note in table.notes)
-    caption = f'<span id="{table.id}-caption">{_spans(true_minus(table.caption))}</span>'
+    caption = f'<span id="{table.id}-caption">{_spans(table.caption)}</span>'
     size = f"{len(table.rows)} row{'' if len(table.rows) == 1 else 's'}"
     # The summary of a folded table names it; once is enough.
     own = f"<caption>{caption}</caption>\n" if not table.folded else ""
@@ -203,7 +205,11 @@ def _row(row: Row, shown: list[list[Part]], sourced: bool, numbers: Mapping[Cell
                 text = f'<a href="{escape(row.link)}">{text}</a>'
             cells.append(f'<th scope="row">{text}</th>')
         else:
-            cells.append(f"<td{_kind(parts_[0])}>{text}</td>")
+            kind = _kind(parts_[0])
+            length = len(str(row.values[parts_[0].index] or ""))
+            if kind and (length <= _WORD or length > _SENTENCE):
+                kind = ' class="word"' if length <= _WORD else ' class="text sentence"'
+            cells.append(f"<td{kind}>{text}</td>")
     if sourced:
         cells.append(f"<td>{_links(row.cells, numbers)}</td>")
     return f"<tr>{''.join(cells)}</tr>"
@@ -230,7 +236,8 @@ def _cell(row: Row, own: list[Part], numbers: Mapping[CellKey, int]) -> str:
 
 def _words(text: str) -> str:
     """Text of a cell, which may break after a slash, as in names of methods."""
-    return re.sub(r"(?<=\w)/(?=\w)", "/<wbr>", escape(text))
+    text = escape(text)
+    return text if len(text) <= _WORD else re.sub(r"(?<=\w)/(?=\w)", "/<wbr>", text)
 
 
 def _kind(part: Part) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from analysis.claims.register import Judged, Verdict
 from analysis.published import published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.statistics import CONFIDENCE, mean
+from analysis.statistics import mean
 from analysis.study import SEED, Study
 
 LEARNER = "dual-process/"
@@ -72,7 +72,7 @@ def tasks_table(study: Study) -> DataTable | None:
             Column("task", "task"),
             Column("initial", "initial", "number", "ticks", 0),
             Column("condition", "condition"),
-            Column("learned", "learned", "number", "ticks", 1, f"{CONFIDENCE:.0%} interval"),
+            Column("learned", "learned", "number", "ticks", 1),
             Column("published", "published", "number", "ticks", 1),
             Column("optimum", "optimum", "number", "ticks", 0),
             Column("proof", "known as"),

@@ -100,8 +100,8 @@ class Part:
 
 
 def true_minus(text: str) -> str:
-    """Text with a minus where a hyphen before a digit begins a word."""
-    return re.sub(r"(?<!\S)-(?=\d)", MINUS, text)
+    """Text with a minus where a hyphen before a digit begins a word, in brackets or not."""
+    return re.sub(r"(?<![^\s(\[])-(?=\d)", MINUS, text)
 
 
 def parts(table: DataTable) -> list[Part]:
