@@ -240,7 +240,7 @@ def _evidence(study: Study, table: Table, claim: str) -> DataTable:
         rows.append(Row(f"{place}: {texts[0]}", tuple(texts), cells))
     columns = tuple(Column(f"column_{k}", head) for k, head in enumerate(table.columns, 1))
     return DataTable(
-        f"evidence-{claim}", _escape(f"{claim}: {table.title}."), columns, tuple(rows)
+        f"evidence-{claim}", _escape(f"{table.title} ({claim})."), columns, tuple(rows)
     )
 
 
