@@ -77,7 +77,7 @@ def learning_curves(
         axes.set_axis_off()
     for place, (axes, task) in enumerate(zip(panels, shown.values(), strict=False)):
         _panel(axes, study, task, data[data.task == task.name], labels, log=log)
-        axes.set_ylabel("" if place % columns else "reward")
+        axes.set_ylabel("" if place % columns else "reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(shown) else "")
     letters(panels[: len(shown)])
     _legend(figure, labels)

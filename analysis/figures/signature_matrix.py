@@ -20,20 +20,20 @@ from analysis.study import Study
 from coartic import Task
 
 SIGNATURES = {
-    "first subtask against initial": "first subtask",
-    "total against initial": "total",
-    "subtask against isolated reach": "against isolated reach",
-    "hand entropy": "hand entropy",
-    "hand as in isolation": "hand as in isolation",
+    "first subtask against initial": "first subtask (ticks)",
+    "total against initial": "total (ticks)",
+    "subtask against isolated reach": "against isolated reach (ticks)",
+    "hand entropy": "hand entropy (bit)",
+    "hand as in isolation": "hand as in isolation (share)",
     "preshaping of the other arm": "preshaping",
-    "travel of the other arm": "other arm's travel",
+    "travel of the other arm": "other arm's travel (rad)",
     "base reversals": "base reversals",
-    "turning angle": "turning angle",
+    "turning angle": "turning angle (rad)",
     "hand path SPARC": "SPARC",
     "hand path log dimensionless jerk": "log jerk",
     "ΔV z": "ΔV z",
     "context distance": "context distance",
-    "context dependence": "context dependence",
+    "context dependence": "context dependence (SD)",
     "motor-equivalent part": "motor-equivalent",
     "non-motor-equivalent part": "moves the hand",
 }
@@ -98,7 +98,7 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
     left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
-    above, right, tall = 1.12, 0.55, 0.19  # inches
+    above, right, tall = 1.38, 0.7, 0.19  # inches
     side = min((TWO - left - right) / len(columns), 0.6)
     width, height = left + side * len(columns) + right, above + tall * len(labels) + 0.06
     figure = Figure(figsize=(width, height))

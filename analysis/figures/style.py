@@ -28,7 +28,7 @@ TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
 SMALL, NORMAL = 7.0, 8.0  # pt
 INK, PAPER = "#000000", "#ffffff"
-GREY = "#8a8a8a"
+GREY = "#7a7a7a"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
     "#0072b2",
     "#56b4e9",
@@ -192,6 +192,11 @@ def dagger(tasks: Iterable[Task]) -> str:
 def number(value: float, digits: int = 0) -> str:
     """A number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """A share in whole per cent."""
+    return f"{share:.0%}".replace("%", " %")
 
 
 def grid(panels: int, tall: float, legend: float) -> tuple[int, int, float]:

@@ -38,7 +38,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         draw_goals(axes, task)
         twice = [other.label for other in tasks].count(task.label) > 1
         name = task.name if twice else task.label
-        axes.set_title(_title(task, name), fontsize=NORMAL, wrap=True)
+        axes.set_title(_title(task, name), fontsize=NORMAL)
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)

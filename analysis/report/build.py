@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
 
 import pandas as pd
 
@@ -24,24 +21,38 @@ from analysis.report import tables
 from analysis.report.document import (
     Block,
     Bullets,
+    Column,
     DataTable,
     Document,
     FigureBlock,
     PlayerBlock,
     Prose,
+    Row,
     Section,
 )
+from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
-from analysis.report.text import typographic
+from analysis.report.summary import tasks_table, verdicts, without_variants
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import write_report
 from analysis.results import Results
 from analysis.study import Study
+from analysis.table import Table
 
 MOST_TASKS = 8
 """More would make a report that nobody reads."""
+CLAIMS = "claims-register"
+"""Id of the section of the claims."""
+_FIGURES = {
+    "Figure 4": "tasks",
+    "Figure 5": "configurations-one-armed",
+    "Figure 6": "configurations-two-armed-1",
+    "Figure 7": "configurations-two-armed-2",
+    "Figure 8": "learned-reward",
+}
+"""Ours by the paper's."""
 
 
 @dataclass(frozen=True)
@@ -71,17 +82,19 @@ def build(study: Study) -> Report:
 
     sections = [
         _summary(study, judged, scores),
+        _section("tasks-drawn", "Tasks", shown("tasks")),
         _section("paper", "Published and ours", [
             *shown("published", "learned-reward"),
             *_tables(tables.published_table(study), tables.exhaustive_table(study)),
             *shown("recruitment"),
         ]),
+        _claims(study, judged, set(by_id)),
         _section("movements", "Movements", [
-            *shown("tasks"),
             PlayerBlock(
                 "player", "Movements, tick by tick",
                 "Of each method the run nearest its median reward, beside the initial solution. "
-                "Open squares: left arm; closed circles: right arm.",
+                "Open squares: left arm; closed circles: right arm; thick: the arm at work; "
+                "filled goals are hit.",
                 player_json(study),
             ),
             *shown("configurations"),
@@ -90,7 +103,6 @@ def build(study: Study) -> Report:
         _methods(study, pairs, scores, shown("profiles")),
         _cost(study, shown("frontier")),
         _signatures(study, shown("context"), shown("signatures")),
-        _claims(study, judged),
         _section("more-figures", "More figures", shown("")),
         _section("limitations", "Limitations", [Bullets(limitations(study))]),
         _about(study, figures, numbers),
@@ -139,55 +151,20 @@ def _lead(results: Results) -> str:
 def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
-    items = [
+    facts = (
         f"{len(results.tasks)} tasks, {len({c.label for c in results.cells})} methods with their "
         f"variants, {len(results.cells)} cells; "
         + (
             f"{failed} of {len(results.runs)} runs have no solution."
             if failed
             else "every run has a solution."
-        ),
-    ]
-    for task in results.tasks:
-        best = study.optima.get((task, "free"))
-        rows = [
-            (row["reward"], label)
-            for (name, label), row in study.methods.items()
-            if name == task and label.startswith("dual-process/") and " " not in label
-            and label.removeprefix("dual-process/") in ("EC1", "EC2", "EC3", "EC4")
-            and not math.isnan(row["reward"])
-        ]  # fmt: skip
-        if not rows:
-            continue
-        reward, label = max(rows)
-        text = (
-            f"{task}: the learner's best condition is {label.rpartition('/')[2]}, "
-            f"{typographic(f'{reward:.1f}')}"
         )
-        if best is not None and best.reward:
-            gap = (best.reward - reward) / -best.reward
-            proof = "proven" if best.proven else "best known"
-            known = typographic(str(best.reward))
-            text += f"; the optimum is {known} ({proof}), {100 * gap:.1f} % away"
-        items.append(f"{text}.")
-    paper = [entry for entry in judged if entry.claim.place]
-    for name, entries in (
-        ("Claims of the paper, independent tests", [e for e in paper if not e.claim.fitted]),
-        ("Claims that entered the tasks' reconstruction †", [e for e in paper if e.claim.fitted]),
-    ):
-        found = Counter(entry.verdict for entry in entries)
-        items.append(
-            f"{name}: {len(entries)}, of which "
-            + ", ".join(
-                f"{found[verdict]} {verdict}"
-                for verdict in ("supported", "not supported", "cannot tell")
-            )
-            + "."
-        )
+    )
+    blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study))]
+    blocks.append(verdicts(judged, CLAIMS))
     overall = tables.overall_table(study, overall_frame(scores), scores)
-    blocks: list[Block] = [Bullets(tuple(items))]
     if overall is not None:
-        blocks.append(overall)
+        blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)
 
 
@@ -199,7 +176,8 @@ def _methods(
         blocks = _tables(tables.methods_table(study, task))
         if not _many(study):
             blocks += _tables(
-                tables.pairwise_table(study, pairs, task), tables.cost_table(study, pairs, task)
+                _folded(tables.pairwise_table(study, pairs, task)),
+                _folded(tables.cost_table(study, pairs, task)),
             )
         if blocks:
             below.append(_section(f"on-{slug}-methods", task, blocks))
@@ -218,8 +196,8 @@ def _cost(study: Study, frontier: list[Block]) -> Section:
     for task, slug in tables.table_ids(study).items():
         blocks = _tables(
             tables.targets_table(study, targets, task),
-            tables.areas_table(study, areas, task),
-            tables.pareto_table(study, pareto, task),
+            _folded(tables.areas_table(study, areas, task)),
+            _folded(tables.pareto_table(study, pareto, task)),
         )
         if blocks:
             below.append(_section(f"on-{slug}-cost", task, blocks))
@@ -231,35 +209,48 @@ def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Se
     for task, slug in tables.table_ids(study).items():
         found = tables.signatures_tables(study, task)
         if found:
-            below.append(_section(f"on-{slug}-signatures", task, list(found)))
+            below.append(_section(f"on-{slug}-signatures", task, _tables(*found)))
     blocks = [*context, *_tables(tables.contexts_table(study)), *matrices]
     return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 
-def _claims(study: Study, judged: Sequence[Judged]) -> Section:
+def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Section:
     table = tables.claims_table(study, judged)
-    blocks: list[Block] = [Prose((FITTED,))]
+    blocks: list[Block] = []
     if table is not None:
-        blocks.append(table)
+        rows = tuple(replace(row, link=f"#claim-{row.key}") for row in table.rows)
+        blocks.append(replace(table, rows=rows, notes=(*table.notes, FITTED)))
     below = []
     for entry in judged:
         claim = entry.claim
         where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+        ours = _FIGURES.get(claim.figure)
+        see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
         mark = " †" if claim.fitted else ""
         lines = [
             f"{_escape(claim.statement)} *{entry.verdict}{mark}*.",
             f"Seen: {_escape(entry.evidence)}.",
-            f"Test: {_escape(claim.test)}. Place: {where}.",
+            f"Test: {_escape(claim.test)}. Place: {where}.{see}",
         ]
         content: list[Block] = [Prose(tuple(lines))]
         if entry.table is not None:
-            content.append(Bullets(tuple(
-                _escape("; ".join(f"{head} {cell}" for head, cell in zip(
-                    entry.table.columns, row, strict=True)))
-                for row in entry.table.rows
-            )))  # fmt: skip
-        below.append(_section(f"claim-{claim.id}", claim.id, content))
-    return _section("claims-register", "Claims", blocks, below)
+            content.append(_evidence(study, entry.table, claim.id))
+        title = f"{claim.id}: {entry.verdict}{mark}"
+        below.append(Section(f"claim-{claim.id}", title, tuple(content), folded=True))
+    each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(below), folded=True)
+    return _section(CLAIMS, "Claims", blocks, [each])
+
+
+def _evidence(study: Study, table: Table, claim: str) -> DataTable:
+    """A claim's numbers; rows named like a method rest on its cells."""
+    rows = []
+    for place, texts in enumerate(table.rows, 1):
+        cells = tuple(key for key in study.cells if key[1] == texts[0])
+        rows.append(Row(f"{place}: {texts[0]}", tuple(texts), cells))
+    columns = tuple(Column(f"column_{k}", head) for k, head in enumerate(table.columns, 1))
+    return DataTable(
+        f"evidence-{claim}", _escape(f"{table.title} ({claim})."), columns, tuple(rows)
+    )
 
 
 def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:
@@ -301,7 +292,11 @@ def _section(
 
 
 def _tables(*found: DataTable | None) -> list[Block]:
-    return [cast(Block, table) for table in found if table is not None]
+    return [with_legends(table) for table in found if table is not None]
+
+
+def _folded(table: DataTable | None) -> DataTable | None:
+    return None if table is None else replace(table, folded=True)
 
 
 def _figure(plot: Plot) -> FigureBlock:

@@ -102,11 +102,16 @@ class Part:
         if self.point(value):
             return NO_SPREAD
         if self.column.kind == "text":
-            return str(value) if self.kind == "value" and value not in (None, "") else NONE
+            return true_minus(str(value)) if self.kind == "value" and value else NONE
         numbers = [typographic(number) for number in self.numbers(value)]
         if not numbers:
             return NONE
         return f"[{', '.join(numbers)}]" if self.kind == "interval" else numbers[0]
+
+
+def true_minus(text: str) -> str:
+    """Text with a minus where a hyphen before a digit begins a word, in brackets or not."""
+    return re.sub(r"(?<![^\s(\[])-(?=\d)", MINUS, text)
 
 
 def parts(table: DataTable) -> list[Part]:
