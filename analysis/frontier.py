@@ -258,7 +258,8 @@ def pareto_frame(results: Results, *, seed: int = 0) -> pd.DataFrame:
         for cell in results.cells
         if not cell.method.startswith(OPTIMUM) and not locks_base(cell.runs)
     }
-    methods = methods[[key in cells for key in zip(methods.task, methods.method, strict=True)]]
+    kept = [key in cells for key in zip(methods.task, methods.method, strict=True)]
+    methods = methods[np.array(kept, dtype=bool)]  # an empty list would choose columns
     parts = []
     for task, rows in methods.groupby("task", sort=False):
         chosen = [cells[str(task), label] for label in rows.method]

@@ -6,6 +6,8 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analysis.figures import all_figures
 from analysis.figures.bars import bars, stars
@@ -13,12 +15,13 @@ from analysis.figures.configurations import configurations, paper_configurations
 from analysis.figures.context import context
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
-from analysis.figures.plot import FORMATS, save, svg_text, write
+from analysis.figures.plot import FORMATS, _settle, save, svg_text, write
 from analysis.figures.profiles import profiles
 from analysis.figures.published import published
 from analysis.figures.recruitment import recruitment
 from analysis.figures.signature_matrix import signature_matrix
-from analysis.figures.style import _KNOWN, amount, looks, number, on, short
+from analysis.figures.style import _KNOWN, RC, amount, looks, number, on, short
+from analysis.figures.svg import compact, relative
 from analysis.figures.tasks import tasks_plot
 from analysis.study import Study
 from benchmarks.suites import load_suite, select_cells
@@ -332,3 +335,89 @@ def test_numbers():
     ]  # fmt: skip
     assert number(-3.25, 1) == "−3.2"
     assert (on("#0072b2"), on("#e69f00")) == ("#fdfdfd", "#111111")
+
+
+def test_variants_of_a_task_are_told_apart():
+    task = load_task("ascending")
+    moved = task.model_copy(update={"name": "ascending.goal2_0_1"})
+    titles = [axes.get_title(loc="left").strip() for axes in tasks_plot([task, moved]).figure.axes]
+    assert titles == ["ascending", "ascending.goal2_0_1"]
+    assert tasks_plot([task]).figure.axes[0].get_title(loc="left").strip() == "Ascending"
+
+
+def drawn(path):
+    """Points of a path in absolute coordinates, with the commands that end there."""
+    tokens = re.findall(r"[A-Za-z]|-?(?:\d+\.?\d*|\.\d+)", path)
+    points, at, start, command, k = [], np.zeros(2), np.zeros(2), "", 0
+    while k < len(tokens):
+        if tokens[k].isalpha():
+            command, k = tokens[k], k + 1
+            if command in "zZ":
+                at = start
+                continue
+        if command in "hv":
+            at = at + np.array(
+                [float(tokens[k]), 0.0] if command == "h" else [0.0, float(tokens[k])]
+            )
+            k += 1
+        else:
+            count = {"m": 1, "l": 1, "q": 2, "c": 3}[command.lower()]
+            numbers = np.array(tokens[k : k + 2 * count], dtype=float).reshape(-1, 2)
+            numbers = numbers + (at if command.islower() else 0)
+            points += [tuple(p) for p in numbers[:-1]]
+            at, k = numbers[-1], k + 2 * count
+        if command in "mM":
+            start = at
+        points.append(tuple(at))
+    return np.array(points)
+
+
+@pytest.mark.parametrize("closed", ["", " z M -3.5 0.001 L 0 0.25"])
+def test_relative_paths_draw_the_same(closed):
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-400, 400, (90, 2))
+    curve = " ".join(f"{x:.6f} {y:.6f}" for x, y in places[:18])
+    for steps, some in ((100, places[:20]), (10, places)):
+        path = "M " + " L ".join(f"{x:.6f} {y:.6f}" for x, y in some)
+        path += (
+            "".join(f" C {' '.join(curve.split()[6 * k : 6 * k + 6])}" for k in range(3)) + closed
+        )
+        ours = drawn(relative(path))
+        assert np.abs(ours - drawn(path)).max() <= 0.5 / steps + 1e-9
+        assert len(relative(path)) < 0.7 * len(path)
+
+
+def test_points_on_a_straight_stretch_are_left_out():
+    assert relative("M 0 0 L 1 0 L 2.5 0 L 2.5 3 L 2.5 3 L 0 3 z") == "M0 0h2.5v3h-2.5z"
+    assert relative("M 0 0 L 2 0 L 1 0") == "M0 0h2-1"  # and back again
+
+
+def test_compact_leaves_out_what_has_no_effect():
+    text = (
+        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
+        '<!-- words --><g id="figure_1"><g>\n<path id="mark" d="M 0 0 L 5.000001 0" '
+        'style="stroke: #112233; stroke-width: 0.8"/></g>'
+        '<use xlink:href="#mark" x="1.234567" y="2" '
+        'style="fill: #445566; stroke: #112233"/></g></svg>'
+    )
+    found = compact(text)
+    assert found == (
+        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
+        '<path id="i1" d="M0 0h5" style="stroke:#112233;stroke-width:0.8"/>'
+        '<use xlink:href="#i1" x="1.23" y="2" style="fill:#445566"/></svg>'
+    )
+
+
+def test_titles_and_labels_are_within_the_picture(figures):
+    for plot in figures.plots:
+        with rc_context(RC):
+            _settle(plot.figure)
+            renderer = FigureCanvasAgg(plot.figure).get_renderer()
+            frame = plot.figure.bbox
+            for axes in plot.figure.axes:
+                for text in (axes._left_title, axes.xaxis.label, axes.yaxis.label):
+                    if text.get_text():
+                        box = text.get_window_extent(renderer)
+                        assert box.x0 >= frame.x0 - 1, (plot.id, text)
+                        assert box.y0 >= frame.y0 - 1, (plot.id, text)
+                        assert box.y1 <= frame.y1 + 1, (plot.id, text)

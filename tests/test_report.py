@@ -3,12 +3,14 @@
 import csv
 import io
 import itertools
+import json
 import math
 import re
 import shutil
 import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -25,9 +27,11 @@ from analysis.report.document import (
     Row,
     Section,
 )
-from analysis.report.html import html
+from analysis.report.html import MOST_ROWS, html
 from analysis.report.latex import latex_tables, latex_text
+from analysis.report.legends import with_legends
 from analysis.report.markdown import markdown
+from analysis.report.summary import without_variants
 from analysis.report.tables_csv import runs_csv, table_csv
 from analysis.report.text import Span, inline, number_text, parts, typographic
 from analysis.report.write import write_report
@@ -143,7 +147,7 @@ def test_numbers(value, kind, digits, ascii_text, shown):
 class Page(HTMLParser):
     """A strict reader of the page: elements must nest, and nothing may be asked for."""
 
-    EMPTY = frozenset(("meta", "link", "wbr", "path", "use"))
+    EMPTY = frozenset(("meta", "link", "wbr", "path", "use", "input"))
 
     def __init__(self, text):
         super().__init__()
@@ -204,7 +208,111 @@ def test_html_numbers_lead_to_their_runs():
     assert links == ["#runs-1", "#runs-1", "#runs-2"]
     for number, runs in ((1, ("aa-1", "aa-2")), (2, ("bb-1",))):
         listed = re.search(rf'<details id="runs-{number}">.*?</details>', text, re.S)
-        assert re.findall("<code>(.*?)</code>", listed[0]) == list(runs)
+        assert re.search("<code>(.*?)</code>", listed[0])[1].split() == list(runs)
+
+
+def test_a_cell_holds_a_value_with_its_small_print():
+    text = html(document())
+    rows = re.findall(r"<tr>.*?</tr>", text)
+    assert rows[0].count("<th") == len(TABLE.columns) + 1  # one a column, and the runs
+    assert "reward (ticks)<small>± SD [95 % interval]</small>" in rows[0]
+    assert "<td>−483.2<span> ± 5.0</span><small>[−490.1, −477.0]</small></td>" in rows[1]
+    assert "<td>−465.0<span></span></td>" in rows[2]
+
+
+def test_long_tables_are_scrolled_until_asked_for():
+    rows = tuple(replace(TABLE.rows[0], key=f"row {k}") for k in range(MOST_ROWS + 1))
+    for shown, long in ((rows[:-1], 0), (rows, 1)):
+        page = Document("t", (Section("a", "A", (replace(TABLE, rows=shown),)),),
+                        runs=document().runs)  # fmt: skip
+        text = html(page)
+        assert text.count('<input type="checkbox">') == long
+        assert text.count('<th scope="row">') == len(shown)  # all of them are there
+
+
+def test_folds_hold_their_content_and_links_lead_there():
+    table = replace(TABLE, folded=True, rows=(replace(TABLE.rows[0], link="#below"),))
+    inner = Section("below", "Below", (Prose(("Hidden words.",)),), folded=True)
+    text = html(Document("t", (Section("a", "A", (table,), (inner,)),), runs=document().runs))
+    page = Page(text)
+    folds = re.findall(r"<details><summary>.*?</details>", text, re.S)
+    assert len(folds) == 2
+    assert '<table id="methods-shelf" aria-labelledby="methods-shelf-caption">' in folds[0]
+    assert '<th scope="row"><a href="#below">' in folds[0]
+    assert folds[1].startswith('<details><summary><h3 id="below">Below</h3></summary>')
+    assert "Hidden words." in folds[1]
+    assert not page.all("caption")  # the summary names it
+    assert all("open" not in fold for fold in page.all("details")[1:])
+
+
+def test_wide_figures_stay_readable():
+    wide = SVG.replace("0 0 90 45", "0 0 500 45")
+    for svg, least in ((SVG, None), (wide, "700px")):
+        text = html(Document("t", (Section("a", "A", (FigureBlock("f", "F", "", "x", svg),)),)))
+        found = re.search(r"<svg[^>]*min-width: (\w+)", text)
+        assert (found and found[1]) == least
+        assert ('tabindex="0"' in text) == (least is not None)
+
+
+def test_marks_are_explained_once():
+    columns = (Column("method", "method †"), Column("told", "told"), Column("d", "Cliff's δ"))
+    table = DataTable("t", "T", columns, (Row("r", ("a", "GF", None)),), ("Own note.",))
+    notes = with_legends(table).notes
+    assert notes[0] == "Own note."
+    assert "*F* forward kinematics" in notes[1]
+    assert [note[0] for note in notes[2:]] == ["†", "C"]
+    assert with_legends(replace(table, notes=notes[2:])).notes[:2] == notes[2:]
+    plain = replace(TABLE, rows=())
+    assert with_legends(plain) == plain
+
+
+def test_variants_are_set_apart():
+    names = ("dual-process/EC1", "dual-process/EC1-biased", "cma-es/every", "jerk timing=fixed")
+    rows = tuple(Row(name, (name,)) for name in names)
+    table = DataTable("all", "All.", (Column("method", "method"),), rows)
+    kept, folded = without_variants(table)
+    assert [row.key for row in kept.rows] == [names[0], names[2]]
+    assert folded is not None
+    assert [row.key for row in folded.rows] == [names[1], names[3]]
+    assert (kept.folded, folded.folded, folded.id) == (False, True, "all-variants")
+    assert without_variants(kept) == (kept, None)
+
+
+def node(script):
+    if not shutil.which("node"):
+        pytest.skip("node is not installed")
+    code = (files("analysis.report") / "sort.js").read_text(encoding="utf-8")
+    done = subprocess.run(
+        ["node", "-e", code + script], capture_output=True, check=True, timeout=60
+    )
+    return json.loads(done.stdout)
+
+
+def test_sorting_reads_the_numbers_that_the_page_writes():
+    values = [-483.25, 1234567, 2.5e-7, -math.inf, 0.0385, 12, 3.0e-12, -0.5]
+    column = Column("a", "a", "number")
+    texts = [typographic(number_text(value, column)) for value in values]
+    read = node(f"console.log(JSON.stringify({json.dumps(texts)}.map(value).map(String)))")
+    assert [float(x.replace("Infinity", "inf")) for x in read] == pytest.approx(values, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words", "up", "down"),
+    [
+        (
+            ["2", "–", "−10", "<0.001", "1\u202f000\u202f000"],
+            False,
+            [2, 3, 0, 4, 1],
+            [4, 0, 3, 2, 1],
+        ),
+        (["b", "a", "", "EC10", "EC2"], True, [1, 0, 4, 3, 2], [3, 4, 0, 1, 2]),
+        (["1", "1", "0"], False, [2, 0, 1], [0, 1, 2]),  # equals stay in their order
+    ],
+)
+def test_sorting(keys, words, up, down):
+    call = "order({}, {}, {})"
+    both = [call.format(json.dumps(keys), *map(json.dumps, (words, way))) for way in (False, True)]
+    assert node(f"console.log(JSON.stringify([{', '.join(both)}]))") == [up, down]
 
 
 def test_svgs_of_one_page_keep_their_own_ids():
@@ -262,7 +370,7 @@ def test_csv_reads_back_as_the_raw_values():
 
 
 def test_latex_escapes():
-    assert latex_text("a_b & 5 % #1 {x} $") == r"a\_b \& 5 \% \#1 \{x\} \$"
+    assert latex_text("a_b & 5 % #1 {x} $") == r"a\_b \& 5~\% \#1 \{x\} \$"
     assert latex_text("−1 ± 2 ΔV †") == r"$-$1 $\pm$ 2 $\Delta$V \textdagger{}"
     assert latex_text("--- [*") == "-{}-{}- {[}{*}"
     assert latex_text("λΛ漢") == r"$\lambda$$\Lambda$[U+6F22]"
@@ -294,13 +402,13 @@ def write(folder, shown=None):
 def test_latex_compiles(tmp_path):
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty"]
+    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty"]
     if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip("booktabs and siunitx are not installed")
+        pytest.skip("booktabs, siunitx and graphicx are not installed")
     write(tmp_path / "report")
     (tmp_path / "report" / "paper.tex").write_text(
         r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}"
-        r"\usepackage{booktabs,siunitx}\begin{document}\input{tables.tex}\end{document}",
+        r"\usepackage{booktabs,siunitx,graphicx}\begin{document}\input{tables.tex}\end{document}",
         encoding="utf-8",
     )
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]

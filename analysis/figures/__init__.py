@@ -29,8 +29,11 @@ class Figures:
     """Why there is none, by what would have been drawn."""
 
 
-def all_figures(study: Study) -> Figures:
-    """Every figure with its default methods; what lacks runs is skipped with the reason."""
+def all_figures(study: Study, most_tasks: int | None = None) -> Figures:
+    """Every figure with its default methods; what lacks runs is skipped with the reason.
+
+    Figures of signatures, one a task, are skipped where there are more than ``most_tasks``.
+    """
     plots = [tasks_plot(list(study.results.tasks.values()))]
     drawn, skipped = paper_configurations(study)
     plots += drawn
@@ -44,6 +47,10 @@ def all_figures(study: Study) -> Figures:
         "frontier": frontier,
         "profiles": profiles,
     }
+    tasks = len(study.results.tasks)
+    if most_tasks is not None and tasks > most_tasks:
+        del makers["signatures"]
+        skipped["signatures"] = f"there would be one for each of {tasks} tasks"
     for name, maker in makers.items():
         try:
             found = maker(study)

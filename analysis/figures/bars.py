@@ -25,6 +25,7 @@ from analysis.figures.style import (
     heading,
     letters,
     looks,
+    percent,
     short,
     styled,
 )
@@ -71,7 +72,7 @@ def bars(
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
         axes.set_title(heading(found[name]))
-        axes.set_ylabel("learned reward" if axes is panels[0] else "")
+        axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     letters(panels)
     values = "; ".join(
         f"{row['task']}, {short(row['method'])}: {row['reward']:.1f}"
@@ -82,10 +83,10 @@ def bars(
         title="Learned reward by condition",
         caption=(
             "Mean learned reward (−1 a control tick) as a bar that rises from the initial "
-            f"solution, with its {CONFIDENCE:.0%} BCa interval over runs; grey dots: runs. Open "
-            "diamonds: published mean with its 95 % interval where an SD is printed (of all runs, "
-            "pooled where the paper reports hand sequences apart). Brackets: one-tailed bootstrap "
-            "test that the mean is higher than what stands to the left "
+            f"solution, with its {percent(CONFIDENCE)} BCa interval over runs; grey dots: runs. "
+            "Open diamonds: published mean with its 95 % interval where an SD is printed (of all "
+            "runs, pooled where the paper reports hand sequences apart). Brackets: one-tailed "
+            "bootstrap test that the mean is higher than what stands to the left "
             f"({RESAMPLES} resamples, seed {SEED}), Holm-adjusted over the figure: "
             "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
             f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(found[name] for name in labels)}"

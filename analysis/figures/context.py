@@ -115,8 +115,16 @@ def _panel(axes: Axes, data: pd.DataFrame) -> None:
     for place, row in enumerate(data.to_dict("records")):
         values = [row["other"], row["equivalent"]]
         axes.plot(values, [-place, -place], color=GREY, linewidth=0.8, zorder=1)
-        axes.plot(row["other"], -place, "s", color=VERMILLION, markerfacecolor=PAPER, markersize=4)
-        axes.plot(row["equivalent"], -place, "o", color=BLUE, markersize=4)
+        axes.plot(
+            row["other"],
+            -place,
+            "s",
+            color=VERMILLION,
+            markerfacecolor=PAPER,
+            markersize=4,
+            clip_on=False,
+        )
+        axes.plot(row["equivalent"], -place, "o", color=BLUE, markersize=4, clip_on=False)
         if not math.isnan(row["p_equivalent"]):
             axes.annotate(
                 stars(row["holm_equivalent"]), (max(values), -place), (5, -0.5),

@@ -22,6 +22,7 @@ from analysis.figures.style import (
     letters,
     log_axis,
     looks,
+    percent,
     short,
     styled,
 )
@@ -101,7 +102,7 @@ def _plot(
             axes, data[data.task == task.name], present, edge, optimum.reward if optimum else None
         )
         axes.set_title(heading(task))
-        axes.set_ylabel("" if place % columns else "best reward so far")
+        axes.set_ylabel("" if place % columns else "best reward so far (ticks)")
         axes.set_xlabel(NAMES[spend] if place + columns >= len(tasks) else "")
     panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
     letters(panels[: len(tasks)])
@@ -113,7 +114,7 @@ def _plot(
         title=f"Reward against {NAMES[spend]}",
         caption=(
             f"Best reward so far against {NAMES[spend]}: mean over runs with its "
-            f"{CONFIDENCE:.0%} bootstrap interval, pointwise, from where every run has "
+            f"{percent(CONFIDENCE)} bootstrap interval, pointwise, from where every run has "
             "a solution. Single marks: methods that do not learn by trial, at the median spend of "
             "a whole run, at the left edge where they spend nothing. Ringed: on the Pareto front "
             "of mean reward and spend of all methods of the folder, shown here or not. Dotted: "

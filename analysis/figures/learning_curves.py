@@ -77,7 +77,7 @@ def learning_curves(
         axes.set_axis_off()
     for place, (axes, task) in enumerate(zip(panels, shown.values(), strict=False)):
         _panel(axes, study, task, data[data.task == task.name], labels, log=log)
-        axes.set_ylabel("" if place % columns else "reward")
+        axes.set_ylabel("" if place % columns else "reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(shown) else "")
     letters(panels[: len(shown)])
     _legend(figure, labels)
@@ -179,7 +179,7 @@ def _panel(
     if optimum is not None:
         axes.axhline(optimum.reward, color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)))
         top = max(top, optimum.reward)
-    reach = top - floor
+    reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
     if log:
         log_axis(axes)

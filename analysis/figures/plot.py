@@ -11,8 +11,10 @@ from pathlib import Path
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from PIL import Image
 
-from analysis.figures.style import INK, PAPER, RC
+from analysis.figures.style import GREY, INK, PAPER, RC
+from analysis.figures.svg import compact
 from coartic import CoarticError
 
 FORMATS = (".png", ".svg", ".pdf")
@@ -22,6 +24,8 @@ _NO_DATE = {
     ".svg": {"Date": None},
     ".png": {"Software": None},
 }
+_COLOURS = 256
+_FAMILY = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 
@@ -51,7 +55,9 @@ def write(plot: Plot, path: Path) -> None:
         raise CoarticError(f"{path}: the name of a figure must end in {', '.join(FORMATS)}")
     with rc_context(RC):
         _settle(plot.figure)
-        plot.figure.savefig(path, dpi=DPI, metadata=_NO_DATE[ending])
+        stream = io.BytesIO()
+        plot.figure.savefig(stream, format=ending[1:], dpi=DPI, metadata=_NO_DATE[ending])
+    path.write_bytes(_smaller(stream, ending))
 
 
 def save(plot: Plot, folder: Path) -> list[Path]:
@@ -65,7 +71,7 @@ def save(plot: Plot, folder: Path) -> list[Path]:
         for path in paths:
             write(plot, path)
         table = folder / f"{plot.id}.csv"
-        plot.data.to_csv(table, index=False, lineterminator="\n")
+        plot.data.to_csv(table, index=False, lineterminator="\n", float_format="%.8g")
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror or error}") from None
     return [*paths, table]
@@ -76,40 +82,45 @@ def svg_text(plot: Plot) -> str:
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the
-    page has one. Ids begin with the plot's id, so that several can share a page. Text stays
-    text, in the page's own sans-serif where DejaVu Sans is missing.
+    page has one, and its grey is ``--grey``. Ids begin with the plot's id, so that several can
+    share a page. Text stays text, in Verdana or the page's own sans-serif where DejaVu Sans is
+    missing.
     """
     stream = io.StringIO()
     with rc_context({**RC, "svg.fonttype": "none"}):
         _settle(plot.figure)
         plot.figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
-    text = stream.getvalue()
+    text = compact(stream.getvalue())
     text = text[text.index("<svg") :]
-    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    used = set(re.findall(r'(?:href="|url\()#([^")]+)', text))
-
-    def own(match: re.Match[str]) -> str:
-        return f' id="{plot.id}-{match[1]}"' if match[1] in used else ""
-
-    text = re.sub(r' id="([^"]*)"', own, text)
-    text = re.sub(r'(href="|url\()#', rf"\g<1>#{plot.id}-", text)
-    text = re.sub(r' d="[^"]*"', _rounded, text, flags=re.DOTALL)
+    text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.
     text = text.replace(INK, "currentColor").replace(PAPER, "var(--paper, none)")
+    text = text.replace(GREY, f"var(--grey, {GREY})")
     head, body = text.split(">", 1)
     head = re.sub(r' (width|height|version|xmlns:xlink)="[^"]*"', "", head)
-    head = f'{head} fill="currentColor" role="img" aria-label="{html.escape(plot.alt)}"'
-    body = re.sub(r"\s*\n\s*", "\n", body.replace("xlink:href", "href"))
-    return f"{head}>{body}".strip() + "\n"
+    # What the backend says for all elements would go for all of the page.
+    body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
+    head += ' stroke-linejoin="round" stroke-linecap="butt"'
+    head += f' font-family="{_FAMILY}" fill="currentColor"'
+    head = f'{head} role="img" aria-label="{html.escape(plot.alt)}"'
+    return f"{head}>{body.replace('xlink:href', 'href')}".strip() + "\n"
+
+
+def _smaller(stream: io.BytesIO, ending: str) -> bytes:
+    """A picture in fewer bytes: PNGs with 256 colours, which is more than are told apart."""
+    if ending == ".svg":
+        return compact(stream.getvalue().decode()).encode()
+    if ending == ".png":
+        picture = Image.open(stream).convert("RGB")
+        picture = picture.quantize(_COLOURS, Image.Quantize.FASTOCTREE)
+        stream = io.BytesIO()
+        picture.save(stream, "PNG", optimize=True, dpi=(DPI, DPI))
+    return stream.getvalue()
 
 
 def _settle(figure: Figure) -> None:
     """Lay the figure out once, for all formats."""
     if figure.get_layout_engine() is not None:
-        figure.draw_without_rendering()
+        for _ in range(2):  # the first time does not know how tall titles are
+            figure.draw_without_rendering()
         figure.set_layout_engine("none")
-
-
-def _rounded(match: re.Match[str]) -> str:
-    """Coordinates to a hundredth of a point."""
-    return re.sub(r"-?\d+\.\d{3,}", lambda m: f"{float(m[0]):.2f}", match[0]).replace("\n", "")

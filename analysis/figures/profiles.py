@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from analysis.across_tasks import by_task, profile, scores_frame
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, missing
-from analysis.figures.style import SMALL, TWO, Look, letters, looks, short, styled
+from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, short, styled
 from analysis.statistics import CONFIDENCE
 from analysis.study import SEED, Study
 from coartic import CoarticError
@@ -79,7 +79,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
             "above the threshold, 0 the initial solution, 1 the optimum with all joints free "
             "(score profile, Agarwal et al. 2021). b: share of runs whose gap to that optimum is "
             "at most the threshold (after the performance profiles of Dolan & Moré 2002, the "
-            f"optimum in the place of the best solver). Bands: {CONFIDENCE:.0%} intervals, "
+            f"optimum in the place of the best solver). Bands: {percent(CONFIDENCE)} intervals, "
             f"pointwise, runs resampled within tasks (seed {SEED}). Learner: EC1 on tasks with "
             "one hand, EC4 on those with two."
         ),

@@ -23,6 +23,7 @@ from analysis.figures.style import (
     SMALL,
     VERMILLION,
     dagger,
+    percent,
     short,
     styled,
 )
@@ -76,13 +77,13 @@ def published(
         title="Published and ours",
         caption=(
             "Our mean learned reward less the published one, with its "
-            f"{CONFIDENCE:.0%} interval (Welch, from the printed mean, SD and runs; Student where "
-            f"no SD is printed). Grey: margin of equivalence, ±{MARGIN:.0%} of the published "
-            "reward. Filled circles: interval within the margin (equivalent); open squares: it "
-            "crosses it (undecided); diamonds: outside (different); crosses: no verdict. ↳: "
-            "runs with one hand sequence, number of our runs of all our runs in brackets, then the"
-            " published one; means pooled from several printed sequences are marked * and have no "
-            "verdict."
+            f"{percent(CONFIDENCE)} interval (Welch, from the printed mean, SD and runs; Student "
+            f"where no SD is printed). Grey: margin of equivalence, ±{percent(MARGIN)} of the "
+            "published reward. Filled circles: interval within the margin (equivalent); open "
+            "squares: it crosses it (undecided); diamonds: outside (different); crosses: no "
+            "verdict. ↳: runs with one hand sequence, number of our runs of all our runs in "
+            "brackets, then the published one; means pooled from several printed sequences are "
+            "marked * and have no verdict."
             f"{dagger(shown.values())}"
         ),
         alt=f"Differences of mean reward to the published ones, with intervals. {words}.",
@@ -172,4 +173,4 @@ def _draw(axes: Axes, data: pd.DataFrame, reconstructed: dict[str, bool]) -> Non
     # The widest interval need not hide the others: symmetric about zero at least to margins.
     reach = np.nanmax(np.abs(data[["low", "high", "difference", "margin"]].to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
-    axes.set_xlabel("ours − published (reward)", fontsize=SMALL)
+    axes.set_xlabel("ours − published (ticks; right: ours higher)", fontsize=SMALL)

@@ -121,6 +121,7 @@ def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None
     axes.set_ylim(-len(names) + 0.5, 0.5)
     axes.set_xlim(0, 1)
     axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
+    axes.set_xlabel("share of runs")
     axes.spines["left"].set_visible(False)
     axes.set_title(heading(task))
 

@@ -62,7 +62,8 @@ def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
         )
         axes.annotate(
             str(index), (x, y + task.radius), (0, 1.5), textcoords="offset points",
-            ha="center", va="bottom", fontsize=SMALL, color=color,
+            ha="center", va="bottom", fontsize=SMALL, color=color, zorder=4,
+            bbox={"boxstyle": "square,pad=0", "facecolor": PAPER, "alpha": 0.8, "linewidth": 0},
         )  # fmt: skip
 
 

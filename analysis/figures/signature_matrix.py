@@ -15,24 +15,25 @@ from matplotlib.patches import Rectangle
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, known_tasks, missing
 from analysis.figures.style import GREY, TWO, dagger, number, on, short, styled
+from analysis.slugs import slugs
 from analysis.study import Study
 from coartic import Task
 
 SIGNATURES = {
-    "first subtask against initial": "first subtask",
-    "total against initial": "total",
-    "subtask against isolated reach": "against isolated reach",
-    "hand entropy": "hand entropy",
-    "hand as in isolation": "hand as in isolation",
+    "first subtask against initial": "first subtask (ticks)",
+    "total against initial": "total (ticks)",
+    "subtask against isolated reach": "against isolated reach (ticks)",
+    "hand entropy": "hand entropy (bit)",
+    "hand as in isolation": "hand as in isolation (share)",
     "preshaping of the other arm": "preshaping",
-    "travel of the other arm": "other arm's travel",
+    "travel of the other arm": "other arm's travel (rad)",
     "base reversals": "base reversals",
-    "turning angle": "turning angle",
+    "turning angle": "turning angle (rad)",
     "hand path SPARC": "SPARC",
     "hand path log dimensionless jerk": "log jerk",
     "ΔV z": "ΔV z",
     "context distance": "context distance",
-    "context dependence": "context dependence",
+    "context dependence": "context dependence (SD)",
     "motor-equivalent part": "motor-equivalent",
     "non-motor-equivalent part": "moves the hand",
 }
@@ -50,13 +51,13 @@ def signature_matrix(
     The value of a cell is the mean over the places (goals, coordinates) of the signature.
     Raises CoarticError where no method has a signature on any of the tasks.
     """
-    plots = []
+    plots, ids = [], slugs(study.results.tasks)
     for name, task in known_tasks(study, tasks).items():
         frame = study.signatures
         labels = chosen(study, [name], methods) if (frame.task == name).any() else []
         data = _values(frame[(frame.task == name) & frame.label.isin(labels)], labels)
         if data.value.notna().any():
-            plots.append(_plot(task, data))
+            plots.append(_plot(task, ids[name], data))
     if not plots:
         raise missing(study, "no solved run on any of the tasks: there are no signatures")
     return plots
@@ -89,7 +90,7 @@ def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
     return data.assign(standardised=standard.where(data.value.isna(), standard.fillna(0.0)))
 
 
-def _plot(task: Task, data: pd.DataFrame) -> Plot:
+def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     values = data.pivot_table(
         index="method", columns="signature", values="value", sort=False, dropna=False
     )
@@ -97,7 +98,7 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
     left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
-    above, right, tall = 1.12, 0.55, 0.19  # inches
+    above, right, tall = 1.38, 0.7, 0.19  # inches
     side = min((TWO - left - right) / len(columns), 0.6)
     width, height = left + side * len(columns) + right, above + tall * len(labels) + 0.06
     figure = Figure(figsize=(width, height))
@@ -141,7 +142,7 @@ def _plot(task: Task, data: pd.DataFrame) -> Plot:
     axes.tick_params(length=0, pad=2)
     axes.spines[:].set_visible(False)
     return Plot(
-        id=f"signatures-{task.name}",
+        id=f"signatures-{slug}",
         title=f"Signatures of coarticulation: {task.label}",
         caption=(
             f"{task.label}: signatures (docs/signatures.md), each the mean over its goals or "

@@ -10,6 +10,7 @@ import itertools
 import re
 from collections.abc import Callable, Iterable
 from functools import wraps
+from string import ascii_lowercase
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from matplotlib import style
@@ -27,7 +28,7 @@ TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
 SMALL, NORMAL = 7.0, 8.0  # pt
 INK, PAPER = "#000000", "#ffffff"
-GREY = "#8a8a8a"
+GREY = "#7a7a7a"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
     "#0072b2",
     "#56b4e9",
@@ -193,6 +194,11 @@ def number(value: float, digits: int = 0) -> str:
     return f"{value:.{digits}f}".replace("-", "−")
 
 
+def percent(share: float) -> str:
+    """A share in whole per cent."""
+    return f"{share:.0%}".replace("%", " %")
+
+
 def grid(panels: int, tall: float, legend: float) -> tuple[int, int, float]:
     """Rows, columns and height in inches of panels that are ``tall`` where the page allows."""
     columns = min(2 if panels <= 6 else 3, panels)
@@ -223,6 +229,6 @@ def log_axis(axes: Axes) -> None:
 
 
 def letters(panels: Iterable[Axes]) -> None:
-    """Name panels a, b, ... before their titles."""
-    for letter, axes in zip("abcdefghijklmnop", panels, strict=False):
+    """Name panels a, b, ... z before their titles."""
+    for letter, axes in zip(ascii_lowercase, panels, strict=False):
         axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left")

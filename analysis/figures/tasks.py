@@ -36,7 +36,9 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
     for axes, task, corners in zip(panels, tasks, boxes, strict=False):
         draw_robot(axes, task, task.q0, marked=task.hands)
         draw_goals(axes, task)
-        axes.set_title(_title(task), fontsize=NORMAL, wrap=True)
+        twice = [other.label for other in tasks].count(task.label) > 1
+        name = task.name if twice else task.label
+        axes.set_title(_title(task, name), fontsize=NORMAL)
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)
@@ -66,14 +68,14 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
     )
 
 
-def _title(task: Task) -> str:
+def _title(task: Task, name: str) -> str:
     """Name, what is reconstructed, and what is locked; two lines where there is more."""
     remarks = []
     if task.reconstructed:
         remarks.append(f"{' and '.join(task.reconstructed)} reconstructed")
     if task.locked_base:
         remarks.append(f"base locked in {' and '.join(task.locked_base)}")
-    return "\n".join([task.label, "; ".join(remarks)]).strip()
+    return "\n".join([name, "; ".join(remarks)]).strip()
 
 
 def _data(tasks: Sequence[Task]) -> pd.DataFrame:

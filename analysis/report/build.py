@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
 
 import pandas as pd
 
@@ -24,23 +21,38 @@ from analysis.report import tables
 from analysis.report.document import (
     Block,
     Bullets,
+    Column,
     DataTable,
     Document,
     FigureBlock,
     PlayerBlock,
     Prose,
+    Row,
     Section,
 )
+from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
-from analysis.report.numbers import PREFIX, Number, headline_numbers, numbers_tex
+from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
-from analysis.report.text import typographic
+from analysis.report.summary import tasks_table, verdicts, without_variants
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import write_report
 from analysis.results import Results
 from analysis.study import Study
+from analysis.table import Table
 
-FOLDER = "report"
+MOST_TASKS = 8
+"""More would make a report that nobody reads."""
+CLAIMS = "claims-register"
+"""Id of the section of the claims."""
+_FIGURES = {
+    "Figure 4": "tasks",
+    "Figure 5": "configurations-one-armed",
+    "Figure 6": "configurations-two-armed-1",
+    "Figure 7": "configurations-two-armed-2",
+    "Figure 8": "learned-reward",
+}
+"""Ours by the paper's."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,7 @@ class Report:
 
 def build(study: Study) -> Report:
     """Everything a report holds. A section that the runs do not allow is left out."""
-    figures, numbers = all_figures(study), tuple(headline_numbers(study))
+    figures, numbers = all_figures(study, MOST_TASKS), tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
     judged = judge(study)
     pairs = pairwise_frame(study)
@@ -70,17 +82,19 @@ def build(study: Study) -> Report:
 
     sections = [
         _summary(study, judged, scores),
+        _section("tasks-drawn", "Tasks", shown("tasks")),
         _section("paper", "Published and ours", [
             *shown("published", "learned-reward"),
             *_tables(tables.published_table(study), tables.exhaustive_table(study)),
             *shown("recruitment"),
         ]),
+        _claims(study, judged, set(by_id)),
         _section("movements", "Movements", [
-            *shown("tasks"),
             PlayerBlock(
                 "player", "Movements, tick by tick",
                 "Of each method the run nearest its median reward, beside the initial solution. "
-                "Open squares: left arm; closed circles: right arm.",
+                "Open squares: left arm; closed circles: right arm; thick: the arm at work; "
+                "filled goals are hit.",
                 player_json(study),
             ),
             *shown("configurations"),
@@ -89,7 +103,6 @@ def build(study: Study) -> Report:
         _methods(study, pairs, scores, shown("profiles")),
         _cost(study, shown("frontier")),
         _signatures(study, shown("context"), shown("signatures")),
-        _claims(study, judged),
         _section("more-figures", "More figures", shown("")),
         _section("limitations", "Limitations", [Bullets(limitations(study))]),
         _about(study, figures, numbers),
@@ -108,7 +121,8 @@ def write(report: Report, study: Study, folder: Path) -> None:
 
     Raises CoarticError where it cannot be written.
     """
-    about = f"Headline values of {_title(study.results)}. {_lead(study.results)}"
+    about = [f"Headline values of {_title(study.results)}.", _lead(study.results)]
+    about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study.results, report.document, report.numbers),
@@ -137,50 +151,20 @@ def _lead(results: Results) -> str:
 def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
-    items = [
+    facts = (
         f"{len(results.tasks)} tasks, {len({c.label for c in results.cells})} methods with their "
         f"variants, {len(results.cells)} cells; "
-        + (f"{failed} of {len(results.runs)} runs failed." if failed else "no run failed."),
-    ]
-    for task in results.tasks:
-        best = study.optima.get((task, "free"))
-        rows = [
-            (row["reward"], label)
-            for (name, label), row in study.methods.items()
-            if name == task and label.startswith("dual-process/") and " " not in label
-            and label.removeprefix("dual-process/") in ("EC1", "EC2", "EC3", "EC4")
-            and not math.isnan(row["reward"])
-        ]  # fmt: skip
-        if not rows:
-            continue
-        reward, label = max(rows)
-        text = (
-            f"{task}: the learner's best condition is {label.rpartition('/')[2]}, "
-            f"{typographic(f'{reward:.1f}')}"
+        + (
+            f"{failed} of {len(results.runs)} runs have no solution."
+            if failed
+            else "every run has a solution."
         )
-        if best is not None and best.reward:
-            gap = (best.reward - reward) / -best.reward
-            proof = "proven" if best.proven else "best known"
-            text += f"; the optimum is {typographic(str(best.reward))} ({proof}), {gap:.1%} away"
-        items.append(f"{text}.")
-    paper = [entry for entry in judged if entry.claim.place]
-    for name, entries in (
-        ("Claims of the paper, independent tests", [e for e in paper if not e.claim.fitted]),
-        ("Claims that entered the tasks' reconstruction †", [e for e in paper if e.claim.fitted]),
-    ):
-        found = Counter(entry.verdict for entry in entries)
-        items.append(
-            f"{name}: {len(entries)}, of which "
-            + ", ".join(
-                f"{found[verdict]} {verdict}"
-                for verdict in ("supported", "not supported", "cannot tell")
-            )
-            + "."
-        )
-    overall = tables.overall_table(overall_frame(scores), scores)
-    blocks: list[Block] = [Bullets(tuple(items))]
+    )
+    blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study))]
+    blocks.append(verdicts(judged, CLAIMS))
+    overall = tables.overall_table(study, overall_frame(scores), scores)
     if overall is not None:
-        blocks.append(overall)
+        blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)
 
 
@@ -189,18 +173,21 @@ def _methods(
 ) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
-        blocks = _tables(
-            tables.methods_table(study, task),
-            tables.pairwise_table(study, pairs, task),
-            tables.cost_table(study, pairs, task),
-        )
+        blocks = _tables(tables.methods_table(study, task))
+        if not _many(study):
+            blocks += _tables(
+                _folded(tables.pairwise_table(study, pairs, task)),
+                _folded(tables.cost_table(study, pairs, task)),
+            )
         if blocks:
-            below.append(_section(f"methods-on-{slug}", task, blocks))
+            below.append(_section(f"on-{slug}-methods", task, blocks))
     reading = Bullets(tables.reading_of_methods(study))
     return _section("methods", "Methods side by side", [*profiles, reading], below)
 
 
 def _cost(study: Study, frontier: list[Block]) -> Section:
+    if _many(study):
+        return _section("cost", "Reward and what it costs", frontier)
     results, steps = study.results, study.steps
     targets = for_both_arms(targets_frame, results, steps)
     areas = for_both_arms(area_frame, results, steps)
@@ -209,11 +196,11 @@ def _cost(study: Study, frontier: list[Block]) -> Section:
     for task, slug in tables.table_ids(study).items():
         blocks = _tables(
             tables.targets_table(study, targets, task),
-            tables.areas_table(study, areas, task),
-            tables.pareto_table(study, pareto, task),
+            _folded(tables.areas_table(study, areas, task)),
+            _folded(tables.pareto_table(study, pareto, task)),
         )
         if blocks:
-            below.append(_section(f"cost-on-{slug}", task, blocks))
+            below.append(_section(f"on-{slug}-cost", task, blocks))
     return _section("cost", "Reward and what it costs", frontier, below)
 
 
@@ -222,50 +209,80 @@ def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Se
     for task, slug in tables.table_ids(study).items():
         found = tables.signatures_tables(study, task)
         if found:
-            below.append(_section(f"signatures-on-{slug}", task, list(found)))
+            below.append(_section(f"on-{slug}-signatures", task, _tables(*found)))
     blocks = [*context, *_tables(tables.contexts_table(study)), *matrices]
-    return _section("signatures-of-coarticulation", "Signatures of coarticulation", blocks, below)
+    return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 
-def _claims(study: Study, judged: Sequence[Judged]) -> Section:
+def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Section:
     table = tables.claims_table(study, judged)
-    blocks: list[Block] = [Prose((FITTED,))]
+    blocks: list[Block] = []
     if table is not None:
-        blocks.append(table)
+        rows = tuple(replace(row, link=f"#claim-{row.key}") for row in table.rows)
+        blocks.append(replace(table, rows=rows, notes=(*table.notes, FITTED)))
     below = []
     for entry in judged:
         claim = entry.claim
         where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+        ours = _FIGURES.get(claim.figure)
+        see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
         mark = " †" if claim.fitted else ""
         lines = [
             f"{_escape(claim.statement)} *{entry.verdict}{mark}*.",
             f"Seen: {_escape(entry.evidence)}.",
-            f"Test: {_escape(claim.test)}. Place: {where}.",
+            f"Test: {_escape(claim.test)}. Place: {where}.{see}",
         ]
         content: list[Block] = [Prose(tuple(lines))]
         if entry.table is not None:
-            content.append(Bullets(tuple(
-                _escape("; ".join(f"{head} {cell}" for head, cell in zip(
-                    entry.table.columns, row, strict=True)))
-                for row in entry.table.rows
-            )))  # fmt: skip
-        below.append(_section(f"claim-{claim.id}", claim.id, content))
-    return _section("claims-register", "Claims", blocks, below)
+            content.append(_evidence(study, entry.table, claim.id))
+        title = f"{claim.id}: {entry.verdict}{mark}"
+        below.append(Section(f"claim-{claim.id}", title, tuple(content), folded=True))
+    each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(below), folded=True)
+    return _section(CLAIMS, "Claims", blocks, [each])
+
+
+def _evidence(study: Study, table: Table, claim: str) -> DataTable:
+    """A claim's numbers; rows named like a method rest on its cells."""
+    rows = []
+    for place, texts in enumerate(table.rows, 1):
+        cells = tuple(key for key in study.cells if key[1] == texts[0])
+        rows.append(Row(f"{place}: {texts[0]}", tuple(texts), cells))
+    columns = tuple(Column(f"column_{k}", head) for k, head in enumerate(table.columns, 1))
+    return DataTable(
+        f"evidence-{claim}", _escape(f"{table.title} ({claim})."), columns, tuple(rows)
+    )
 
 
 def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:
-    count = sum(1 for number in numbers for _ in number.macros())
+    count = sum(1 for number in numbers for _ in number.companions())
     example = next((n.macro for n in numbers if n.cells), f"{PREFIX}...")
     items = [
         "Every number of a table leads to its runs (last column); every table is in `tables/` as "
         "CSV and LaTeX, every figure in `figures/` as PDF, SVG, PNG and CSV (the data behind it).",
-        f"`numbers.tex` has {count} macros, such as `\\\\{example}`.",
+        f"`numbers.tex` has {count} macros, such as `\\{example}`.",
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "
         "performs a run again; `coartic cite` prints what to cite.",
-        *(f"No figure {_escape(name)}: {_escape(why)}" for name, why in figures.skipped.items()),
+        *map(_escape, macro_names(study).renamed()),
+        *(
+            f"No figure {_escape(name)}: {_escape(why.removeprefix(f'{study.results.folder}: '))}."
+            for name, why in figures.skipped.items()
+        ),
+        *([_few(study)] if _many(study) else []),
     ]
     return _section("about", "Tracing and citing", [Bullets(tuple(items))])
+
+
+def _many(study: Study) -> bool:
+    return len(study.results.tasks) > MOST_TASKS
+
+
+def _few(study: Study) -> str:
+    return (
+        f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has no "
+        "tables of pairs, targets, areas and Pareto sets by task, and no figures of signatures; "
+        "`coartic analyse` writes all of them as CSV."
+    )
 
 
 def _section(
@@ -275,7 +292,11 @@ def _section(
 
 
 def _tables(*found: DataTable | None) -> list[Block]:
-    return [cast(Block, table) for table in found if table is not None]
+    return [with_legends(table) for table in found if table is not None]
+
+
+def _folded(table: DataTable | None) -> DataTable | None:
+    return None if table is None else replace(table, folded=True)
 
 
 def _figure(plot: Plot) -> FigureBlock:

@@ -95,6 +95,8 @@ class Row:
     """What the row's values were computed from."""
     cells_by_column: Mapping[str, tuple[CellKey, ...]] = field(default_factory=dict)
     """By column name, what a value was computed from where it is something else."""
+    link: str = ""
+    """Address within the page that the row's name leads to."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ class DataTable:
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
     """Below the table, in inline markup."""
+    folded: bool = False
+    """Whether a page shows its caption alone until more is asked for."""
 
     def __post_init__(self) -> None:
         _check_id(self.id)
@@ -182,6 +186,8 @@ class Section:
     title: str
     blocks: tuple[Block, ...] = ()
     sections: tuple[Section, ...] = ()
+    folded: bool = False
+    """Whether a page shows its title alone until more is asked for."""
 
     def __post_init__(self) -> None:
         _check_id(self.id)

@@ -9,7 +9,7 @@ import re
 import unicodedata
 
 from analysis.report.document import DataTable, Document, Value
-from analysis.report.text import Part, inline, parts
+from analysis.report.text import NO_SPREAD, Part, inline, parts
 from analysis.table import NONE
 
 _ESCAPES = {
@@ -115,8 +115,9 @@ def latex_table(table: DataTable) -> str:
 
 def latex_text(text: str) -> str:
     """Plain text in LaTeX; characters that T1 lacks are written by their code."""
-    # Two hyphens in a row would become a dash.
-    return re.sub("-(?=-)", "-{}", "".join(map(_character, text)))
+    # Two hyphens in a row would become a dash; no line begins with a per cent sign.
+    characters = "".join(map(_character, text))
+    return re.sub("-(?=-)", "-{}", re.sub(r"(?<=\d) (?=\\%)", "~", characters))
 
 
 def _character(character: str) -> str:
@@ -174,6 +175,8 @@ def _cell(part: Part, value: Value) -> str:
     numbers = part.numbers(value)
     if not numbers:
         return f"{{{latex_text(NONE)}}}"
+    if part.point(value):
+        return f"{{{NO_SPREAD}}}"
     if part.kind == "interval":
         return f"{{[{_inline(numbers[0])}, {_inline(numbers[1])}]}}"
     return numbers[0] if _NUMBER.fullmatch(numbers[0]) else f"{{{_inline(numbers[0])}}}"

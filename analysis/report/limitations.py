@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from analysis.published import RUNS, TRIALS
 from analysis.sample_size import POWER, smallest_difference
+from analysis.statistics import FEWEST
 from analysis.study import Study
 
 _LEARNER = "dual-process/"
@@ -51,44 +51,55 @@ def _failures(study: Study) -> Iterator[str]:
     failed = runs[runs.status != "ok"]
     if not len(failed):
         yield f"*Failures.* None: all {len(runs)} runs have a solution, executed and scored."
-    groups = failed.groupby(["task", "method", "variant", "status"], sort=False)
-    for key, own in groups:
-        task, method, variant, status = map(str, key)
-        label = f"{method} {variant}".strip()
-        total = len(study.cells[task, label].runs)
+    for key, own in failed.groupby(["task", "status"], sort=False):
+        task, status = map(str, key)
+        labels = (own.method + " " + own.variant).str.strip()
+        cells = ", ".join(
+            f"`{_code(str(label))}` ({count} of {len(study.cells[task, str(label)].runs)})"
+            for label, count in labels.value_counts(sort=False).items()
+        )
+        others = ", and other reasons" if own.reason.nunique() > 1 else ""
         yield (
-            f"*Failures.* {task}, `{_code(label)}`: {len(own)} of {total} runs are {status} "
-            f"({_escape(str(own.reason.iloc[0]))}). Means are over the others."
+            f"*Failures.* {task}: {len(own)} runs are {status} "
+            f"({_escape(str(own.reason.iloc[0]))}{others}): {cells}. Means are over runs that "
+            "have a solution."
         )
     for (task, label), cell in study.cells.items():
         lost, made = int(cell.runs.failed_trials.sum()), int(cell.runs.trials.sum())
         if lost and lost >= 0.01 * made:
             yield (
                 f"*Failed trials.* {task}, `{_code(label)}`: {lost} of {made} trials "
-                f"({lost / made:.0%}) did not hit every goal and taught nothing."
+                f"({_percent(lost / made)}) did not hit every goal and taught nothing."
             )
 
 
 def _versions(study: Study) -> Iterator[str]:
     runs = study.results.runs
-    commits = sorted(set(runs.commit.astype(str)))
-    changed = [commit for commit in commits if commit.endswith("+")]
+    known = runs.commit.dropna().astype(str)
+    commits = sorted(set(known.str.rstrip("+")))
+    changed = sorted({commit.rstrip("+") for commit in known if commit.endswith("+")})
+    codes = runs.groupby("method").code.nunique()
     if len(commits) > 1:
+        same = "; the code behind each method's results is the same in all of them"
         yield (
             f"*Mixed versions.* Runs were made at {len(commits)} commits "
-            f"({', '.join(f'`{commit[:12]}`' for commit in commits)}); the code behind each "
-            "method's results is the same in all of them."
+            f"({', '.join(f'`{commit[:12]}`' for commit in commits)})"
+            f"{same if (codes <= 1).all() else ''}."
+        )
+    if len(known) < len(runs):
+        yield (
+            f"*Unknown commit.* {len(runs) - len(known)} runs were made outside a checkout; each "
+            "run names the hash of the code behind it."
         )
     if changed:
         yield (
             "*Uncommitted changes.* The checkout was changed when runs were made at "
-            + ", ".join(f"`{commit.rstrip('+')[:12]}`" for commit in changed)
+            + ", ".join(f"`{commit[:12]}`" for commit in changed)
             + "; each run names the hash of the code behind it."
         )
     packages = runs.packages.nunique()
     if packages > 1:
         yield f"*Mixed versions.* Runs were made with {packages} sets of library versions."
-    codes = runs.groupby("method").code.nunique()
     for method in codes[codes > 1].index:
         yield f"*Mixed code.* Runs of `{_code(str(method))}` were made by {codes[method]} codes."
 
@@ -113,13 +124,13 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
         ticks = smallest_difference(sd, sd, len(rewards))
         found.append(
             f"{task} {label.removeprefix(_LEARNER)} {ticks:.1f} ticks "
-            f"({ticks / -best.reward:.1%}, n = {len(rewards)})"
+            f"({_percent(ticks / -best.reward, 1)}, n = {len(rewards)})"
         )
     if found:
         yield (
             f"*Number of runs.* Between two samples like these a one-tailed t-test at 5 % finds, "
-            f"with probability {POWER:.0%}, a difference of: {'; '.join(found)}. Smaller ones may "
-            "be missed."
+            f"with probability {_percent(POWER)}, a difference of: {'; '.join(found)}. "
+            "Smaller ones may be missed."
         )
     few = sorted({len(cell.runs) for cell in learner.values() if len(cell.runs) < RUNS})
     if few:
@@ -127,18 +138,34 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
             f"*Number of runs.* The paper has {RUNS} runs a cell; here are {few[0]}"
             f"{'' if len(few) == 1 else f' to {few[-1]}'}."
         )
+    sizes = [len(cell.good) for cell in study.cells.values()]
+    once = specification["runs"] > 1 and 1 in [len(cell.runs) for cell in study.cells.values()]
     yield (
-        f"*One seed.* All runs derive from seed {specification['seed']}; methods that draw "
-        "nothing at random were run once and have no spread. 95 % BCa intervals of 20 such runs "
-        "cover 91 to 95 % (simulated; docs/statistics.md), of fewer runs less."
+        f"*One seed.* All runs derive from seed {specification['seed']}"
+        + (
+            "; methods that draw nothing at random were run once and have no spread"
+            if once
+            else ""
+        )
+        + "."
+        + (
+            " 95 % BCa intervals of means of 20 runs cover 91 to 95 % (simulated; "
+            "docs/statistics.md), of fewer runs less."
+            if any(size >= FEWEST for size in sizes)
+            else " No cell has the three runs that an interval takes."
+        )
     )
 
 
 def _optima(study: Study) -> Iterator[str]:
+    without = [task for task in study.results.tasks if (task, "free") not in study.optima]
+    if without:
+        yield (
+            f"*No optimum.* None is known of {', '.join(without)}: no gaps, targets or scores "
+            "there."
+        )
     for task in study.results.tasks:
         known = {arm: study.optima.get((task, arm)) for arm in ("free", "still")}
-        if known["free"] is None:
-            yield f"*No optimum.* None is known of {task}: it has no gaps, targets or scores."
         for arm, best in known.items():
             if best is not None and not best.proven:
                 bound = "" if best.bound is None else f"; none above {best.bound} is proven"
@@ -151,11 +178,12 @@ def _optima(study: Study) -> Iterator[str]:
 def _timing(study: Study) -> Iterator[str]:
     runs, environment = study.results.runs, study.results.manifest["environment"]
     cold = runs[~runs.warm.astype(bool)]
-    share = len(cold) / len(runs) if len(runs) else math.nan
+    share = len(cold) / len(runs)
     yield (
         f"*Times.* Taken on {environment['processor'] or 'an unnamed processor'} with "
-        f"{environment['cores']} cores, several runs at a time, one thread each; {share:.0%} of "
-        "the runs were the first of their method in their process and hold its warming up. "
+        f"{environment['cores']} cores, one thread a run, runs side by side as far as asked "
+        f"for; {_percent(share)} of the runs were the first of their method in their process "
+        "and hold its warming up. "
         "Times compare within a folder; counts of evaluations compare between machines."
     )
 
@@ -170,6 +198,10 @@ def _model(study: Study) -> Iterator[str]:
             "*Arms.* No collisions, of the arms with each other or with anything else, are "
             "modelled; the paper mentions none."
         )
+
+
+def _percent(share: float, digits: int = 0) -> str:
+    return f"{100 * share:.{digits}f} %"
 
 
 def _escape(text: str) -> str:

@@ -61,7 +61,7 @@ def _spans(text: str) -> str:
     marks = {"emphasis": "*{}*", "code": "`{}`"}
     return "".join(
         f"[{_plain(span.text)}]({span.address})"
-        if span.style == "link"
+        if span.style == "link" and not span.address.startswith("#")  # it has no such places
         else marks[span.style].format(span.text if span.style == "code" else _plain(span.text))
         if span.style in marks
         else _plain(span.text)

@@ -2,7 +2,8 @@
 
 A value with macro ``\\coarticAscendingECOneReward`` has companions ``...Low`` and ``...High``
 (95 % interval), ``...SD``, ``...N`` (runs) and ``...Full`` (value, interval and runs as text), as
-far as there are any.
+far as there are any. A value without ``...N`` has as many runs as its cell's reward. Cells with
+parameters that differ from the method's defaults have their reward only.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.methods import solve_times
 from analysis.published import published_cell, published_initial
 from analysis.results import CellRuns
 from analysis.statistics import Inference, difference_of_means, mean, probability_of_improvement
@@ -53,22 +55,52 @@ class Number:
     """How value and interval were obtained."""
     cells: tuple[Cell, ...] = ()
     """What it was computed from; none for what the paper prints and for known optima."""
+    of: str = ""
+    """What the meaning is said of, such as a method on a task."""
 
-    def macros(self) -> Iterator[tuple[str, str]]:
-        """Macros with the text that each stands for: a number, or a sentence's worth."""
-        yield self.macro, self.text(self.value)
+    def companions(self) -> Iterator[tuple[str, str]]:
+        """What follows the macro's name, first nothing, with the text that it stands for."""
+        yield "", self.text(self.value)
         if not math.isnan(self.sd):
-            yield f"{self.macro}SD", self.text(self.sd)
+            yield "SD", self.text(self.sd)
         if not math.isnan(self.low):
-            yield f"{self.macro}Low", self.text(self.low)
-            yield f"{self.macro}High", self.text(self.high)
+            yield "Low", self.text(self.low)
+            yield "High", self.text(self.high)
         if self.n is not None:
-            yield f"{self.macro}N", str(self.n)
+            yield "N", str(self.n)
+        if not math.isnan(self.low):
+            yield "Full", self.full(str)
+
+    def full(self, show: Callable[[str], str], n: str = "n") -> str:
+        """Value, interval and runs; ``show`` writes a number, ``n`` their symbol."""
+        value, low, high = (show(self.text(x)) for x in (self.value, self.low, self.high))
+        runs = "" if self.n is None else f"{n} = {self.n}"
+        # A point would look like certainty.
+        if self.low == self.high:
+            return f"{value} (no spread{f', {runs}' if runs else ''})"
+        return f"{value} [{low}, {high}]{f' ({runs})' if runs else ''}"
 
     def text(self, value: float) -> str:
         """A value with this number's decimals; never minus zero."""
         shown = f"{value:.{self.digits}f}"
         return shown.lstrip("-") if float(shown) == 0 else shown
+
+
+@dataclass(frozen=True)
+class Names:
+    """Tasks and labels in letters alone, all different."""
+
+    tasks: dict[str, str]
+    labels: dict[str, str]
+
+    def renamed(self) -> list[str]:
+        """A sentence for each name that another one would have in letters."""
+        return [
+            f"{name} is {word} in macros, as another name is {words(name)}."
+            for names in (self.tasks, self.labels)
+            for name, word in names.items()
+            if word != words(name)
+        ]
 
 
 def words(name: str) -> str:
@@ -77,150 +109,186 @@ def words(name: str) -> str:
     The paper's conditions are named without their family: ``dual-process/EC1`` is ``ECOne``.
     """
     name = re.sub(r"(?<=\d)[.](?=\d)", " point ", name.removeprefix(_LEARNER))
+    name = re.sub(r"(?<=[_=])-(?=\d)", " minus ", name)
     parts = re.findall(r"[A-Za-z]+|\d", name)
     return "".join(_DIGITS[int(p)] if p.isdigit() else p[0].upper() + p[1:] for p in parts)
 
 
-def headline_numbers(study: Study) -> list[Number]:
-    """Every headline value of a results folder. Raises ValueError where two names collide."""
-    found = [
-        *_tasks(study),
-        *itertools.chain.from_iterable(
-            _cell(study, key, cell) for key, cell in study.cells.items() if len(cell.good)
-        ),
-        *_conditions(study),
-        *_hands(study),
-        *_signatures(study),
-    ]
-    names = [name for number in found for name, _ in number.macros()]
-    twice = (
-        {name for name in names if names.count(name) > 1} if len(set(names)) < len(names) else ()
+def macro_names(study: Study) -> Names:
+    """Names of tasks and labels, ``...Alt`` where an earlier one has the same letters."""
+    return Names(
+        _distinct(study.results.tasks), _distinct(dict.fromkeys(label for _, label in study.cells))
     )
-    if twice:
-        raise ValueError(f"macros with the same name: {', '.join(sorted(twice))}")
-    return found
 
 
-def numbers_tex(numbers: Iterable[Number], about: str) -> str:
+def headline_numbers(study: Study) -> list[Number]:
+    """Every headline value of a results folder, no two with a macro of the same name."""
+    names = macro_names(study)
+    found = [
+        *_tasks(study, names),
+        *itertools.chain.from_iterable(
+            _cell(study, names, cell) for cell in study.cells.values() if len(cell.good)
+        ),
+        *_conditions(study, names),
+        *_hands(study, names),
+        *_signatures(study, names),
+    ]
+    taken: set[str] = set()
+    numbers = []
+    for number in found:
+        # Names of task and method run together: a + b-c and a-b + c are both ABC.
+        while any(number.macro + suffix in taken for suffix, _ in number.companions()):
+            number = replace(number, macro=f"{number.macro}Alt")
+        taken.update(number.macro + suffix for suffix, _ in number.companions())
+        numbers.append(number)
+    return numbers
+
+
+def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
     """The macros as a LaTeX file. Numbers go through ``\\coarticnum``, which may be redefined."""
     lines = [
-        *(f"% {line}" for line in about.splitlines()),
+        *(f"% {line}" for line in about),
+        "% Intervals are at 95 %; `coartic trace MACRO` says how they were made, of which runs.",
         "% Redefine \\coarticnum to print numbers your way, with siunitx for example:",
         "%   \\newcommand{\\coarticnum}[1]{\\num{#1}}   before \\input",
         f"\\providecommand{{\\{PREFIX}num}}[1]{{\\ensuremath{{#1}}}}",
     ]
+    of = ""
     for number in numbers:
         unit = f", {number.unit}" if number.unit else ""
-        lines.append(f"% {number.meaning}{unit}" + (f"; {number.how}" if number.how else ""))
-        for name, text in number.macros():
-            lines.append(f"\\newcommand{{\\{name}}}{{\\{PREFIX}num{{{text}}}}}")
-        if not math.isnan(number.low):
-            lines.append(f"\\newcommand{{\\{number.macro}Full}}{{{_full(number)}}}")
+        how = f"; {number.how}" if number.how and math.isnan(number.low) else ""
+        if number.of != of:
+            of = number.of
+            lines.append(f"% {of}:")
+        lines.append(f"% {number.meaning}{unit}{how}")
+        for suffix, text in number.companions():
+            content = number.full(_tex, "$n$") if suffix == "Full" else _tex(text)
+            lines.append(f"\\newcommand{{\\{number.macro}{suffix}}}{{{content}}}")
     return "\n".join(lines) + "\n"
 
 
-def _full(number: Number) -> str:
-    def tex(value: float) -> str:
-        return f"\\{PREFIX}num{{{number.text(value)}}}"
+def _tex(number: str) -> str:
+    return f"\\{PREFIX}num{{{number}}}"
 
-    text = f"{tex(number.value)} [{tex(number.low)}, {tex(number.high)}]"
-    if number.n is not None:
-        text += f" ($n = {number.n}$)"
-    return text
+
+def _distinct(names: Iterable[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name in names:
+        word = words(name)
+        while word in found.values():
+            word += "Alt"
+        found[name] = word
+    return found
+
+
+def _how(found: Inference) -> str:
+    """The method where it gave an interval, else why there is none."""
+    if math.isnan(found.low):
+        return "one run" if found.n == (1,) else found.note or found.method
+    return "; ".join(filter(None, (found.method, found.note)))
 
 
 def _number(
-    macro: str, meaning: str, found: Inference, cells: tuple[Cell, ...], digits: int, unit: str
-) -> Number:
+    macro: str, meaning: str, of: str, found: Inference, cells: tuple[Cell, ...], digits: int,
+    unit: str,
+) -> Number:  # fmt: skip
     return Number(
         PREFIX + macro, meaning, found.estimate, digits, unit, found.low, found.high,
-        n=sum(found.n), how="; ".join(filter(None, (found.method, found.note))), cells=cells,
+        n=sum(found.n), how=_how(found), cells=cells, of=of,
     )  # fmt: skip
 
 
-def _tasks(study: Study) -> Iterator[Number]:
+def _tasks(study: Study, names: Names) -> Iterator[Number]:
     for task in study.results.tasks:
         for arm in ("free", "still"):
             best = study.optima.get((task, arm))
             if best is None:
                 continue
-            meaning = f"best reward known of {task}, other arm {arm}"
+            meaning = f"best reward known, other arm {arm}"
             how = "proven" if best.proven else "not proven"
-            macro = f"{PREFIX}{words(task)}Optimum{'' if arm == 'free' else 'Still'}"
-            yield Number(macro, meaning, best.reward, 0, "ticks", how=how)
+            macro = f"{PREFIX}{names.tasks[task]}Optimum{'' if arm == 'free' else 'Still'}"
+            yield Number(macro, meaning, best.reward, 0, "ticks", how=how, of=task)
         printed = published_initial(task)
         if printed is not None:
-            meaning = f"published reward of the initial solution of {task}"
+            meaning = "published reward of the initial solution"
             how = "derived from other printed numbers" if printed[2] else "printed"
             yield Number(
-                f"{PREFIX}{words(task)}PublishedInitialReward", meaning, printed[1], 0, "ticks",
-                how=how,
+                f"{PREFIX}{names.tasks[task]}PublishedInitialReward", meaning, printed[1], 0,
+                "ticks", how=how, of=task,
             )  # fmt: skip
 
 
-def _cell(study: Study, key: Cell, cell: CellRuns) -> Iterator[Number]:
-    task, label = key
-    name = words(task) + words(label)
+def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
+    task, label = key = cell.task, cell.label
+    name = names.tasks[task] + names.labels[label]
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
     found = mean(rewards, seed=SEED)
     who = f"{label} on {task}"
     spread = float(np.std(rewards, ddof=1)) if len(rewards) > 1 else math.nan
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
     yield Number(
-        f"{PREFIX}{name}Reward", f"mean learned reward, {who}{solved}", found.estimate, 1,
+        f"{PREFIX}{name}Reward", f"mean learned reward{solved}", found.estimate, 1,
         "ticks", found.low, found.high, spread, len(rewards),
-        "; ".join(filter(None, (found.method, found.note))), (key,),
+        _how(found), (key,), who,
     )  # fmt: skip
-    row = study.methods[key]
+    if cell.variant:
+        return
+    row, free = study.methods[key], study.optima.get((task, "free"))
     for column, macro, arm in (("gap", "Gap", "free"), ("gap_still", "GapStill", "still")):
         if math.isnan(row[column]):
             continue
         best = study.optima[task, arm].reward
-        gap = f"gap to the optimum with the other arm {arm}, {who}"
+        if arm == "still" and free is not None and best == free.reward:
+            continue
+        gap = f"gap to the optimum{', other arm still' if arm == 'still' else ''}"
         for suffix, share, unit in (
             ("", 1.0, "ticks"),
-            ("Percent", 100 / -best if best else math.nan, "per cent of the optimum"),
+            ("Percent", 100 / -best if best else math.nan, "% of the optimum"),
         ):
             if not math.isnan(share):
                 yield Number(
                     f"{PREFIX}{name}{macro}{suffix}", gap, (best - found.estimate) * share, 1,
                     unit, (best - found.high) * share, (best - found.low) * share,
-                    n=len(rewards), how=found.method, cells=(key,),
+                    how=_how(found), cells=(key,), of=who,
                 )  # fmt: skip
-    for what, meaning, value, digits, unit in (
-        ("Trials", "physical trials of a run", row["trials"], 0, "trials"),
+    evaluations = cell.runs.forward_kinematics + cell.runs.jacobians
+    for what, meaning, values, digits, unit in (
+        ("Trials", "physical trials of a run", cell.runs.trials, 0, "trials"),
         (
             "Evaluations",
             "forward kinematics and Jacobians of a run",
-            row["forward_kinematics"] + row["jacobians"],
+            evaluations,
             0,
             "evaluations",
         ),
-        ("SolveSeconds", "wall time of solving", row["solve_s"], 3, "s"),
+        ("SolveSeconds", "wall time of solving", solve_times(cell.good), 3, "s"),
     ):
-        if not math.isnan(value):
+        known = values.dropna()
+        if len(known):
             yield Number(
-                f"{PREFIX}{name}{what}", f"{meaning}, {who}", value, digits, unit,
-                n=len(cell.good), how="median over runs", cells=(key,),
+                f"{PREFIX}{name}{what}", f"median of {meaning}", float(known.median()),
+                digits, unit, n=len(known) if len(known) != len(rewards) else None,
+                cells=(key,), of=who,
             )  # fmt: skip
     if label.startswith(_LEARNER):
         initial = cell.good.initial_reward.dropna().unique()
         if len(initial) == 1:
             yield Number(
-                f"{PREFIX}{name}InitialReward", f"reward of the initial solution, {who}",
-                float(initial[0]), 0, "ticks", how="deterministic", cells=(key,),
+                f"{PREFIX}{name}InitialReward", "reward of the initial solution",
+                float(initial[0]), 0, "ticks", how="deterministic", cells=(key,), of=who,
             )  # fmt: skip
         printed = published_cell(task, label.removeprefix(_LEARNER))
         if printed is not None and printed.summary is not None:
             summary = printed.summary
             yield Number(
-                f"{PREFIX}{name}PublishedReward", f"published mean reward, {who}", summary.mean,
+                f"{PREFIX}{name}PublishedReward", "published mean reward", summary.mean,
                 1, "ticks", sd=math.nan if summary.sd is None else summary.sd, n=summary.runs,
                 how="derived from other printed numbers" if summary.derived else "printed",
+                of=who,
             )  # fmt: skip
 
 
-def _conditions(study: Study) -> Iterator[Number]:
+def _conditions(study: Study, names: Names) -> Iterator[Number]:
     """Each condition of the learner against the others of its task that explore less."""
     by_task: dict[str, list[str]] = {}
     for task, label in study.cells:
@@ -232,48 +300,56 @@ def _conditions(study: Study) -> Iterator[Number]:
             a, b = (study.cells[key].good.reward.to_numpy(dtype=np.float64) for key in cells)
             if not len(a) or not len(b):
                 continue
-            name = f"{words(task)}{words(higher)}Minus{words(lower)}"
+            name = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"
             what = f"{higher} less {lower} on {task}"
             apart = difference_of_means(a, b, seed=SEED)
             yield _number(
-                f"{name}Reward", f"difference of mean rewards, {what}", apart, cells, 1, "ticks"
+                f"{name}Reward", "difference of mean rewards", what, apart, cells, 1, "ticks"
             )
             better = probability_of_improvement(a, b, seed=SEED)
             yield _number(
-                f"{name}Improvement", f"probability of improvement, {what}", better, cells, 2, ""
+                f"{name}Improvement", "probability of improvement", what, better, cells, 2, ""
             )
 
 
-def _hands(study: Study) -> Iterator[Number]:
+def _hands(study: Study, names: Names) -> Iterator[Number]:
     """How many of the learner's runs found each hand sequence."""
+    tasks = study.results.tasks
     for key, cell in study.cells.items():
         task, label = key
-        if not label.startswith(_LEARNER) or len(study.results.tasks[task].hands) < 2:
+        if not label.startswith(_LEARNER) or cell.variant or len(tasks[task].hands) < 2:
             continue
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
             yield Number(
-                f"{PREFIX}{words(task)}{words(label)}Hands{hands}",
-                f"runs that learned {hands}, {label} on {task}", float(count), 0, "runs",
+                f"{PREFIX}{names.tasks[task]}{names.labels[label]}Hands{hands}",
+                f"runs that learned {hands}", float(count), 0, "runs",
                 how=f"of {len(cell.good)} with a solution", cells=(key,),
+                of=f"{label} on {task}",
             )  # fmt: skip
 
 
-def _signatures(study: Study) -> Iterator[Number]:
+def _signatures(study: Study, names: Names) -> Iterator[Number]:
     frame = study.signatures
-    frame = frame[frame.signature.isin(list(_SIGNATURES)) & frame.value.notna()]
-    for (task, label, signature), rows in frame.groupby(
-        ["task", "label", "signature"], sort=False
-    ):
+    frame = frame[
+        frame.signature.isin(list(_SIGNATURES)) & frame.value.notna() & (frame.variant == "")
+    ]
+    for key, rows in frame.groupby(["task", "label", "signature"], sort=False):
+        if len(rows) > 1:  # several places: a table's, not a headline
+            continue
+        task, label, signature = map(str, key)
         row = rows.iloc[0]
         where = str(row["where"])
         other = re.search(r"against ([^,]+)", where)
-        cells = [(str(task), str(label))]
+        cells = [(task, label)]
         if other is not None:
-            cells.append((other[1], str(label)))
-        what, unit = _SIGNATURES[str(signature)]
+            cells.append((other[1], label))
+        what, unit = _SIGNATURES[signature]
+        n = int(row["n"])
+        place = f" ({where})" if where else ""
         yield Number(
-            f"{PREFIX}{words(str(task))}{words(str(label))}{what}",
-            f"{signature} ({where}), {label} on {task}", float(row["value"]), 2, unit,
-            float(row["low"]), float(row["high"]), n=int(row["n"]),
-            how="docs/signatures.md", cells=tuple(cells),
+            f"{PREFIX}{names.tasks[task]}{names.labels[label]}{what}",
+            f"{signature}{place}", float(row["value"]), 2, unit,
+            float(row["low"]), float(row["high"]),
+            n=n if n != len(study.cells[task, label].good) else None,
+            how="docs/signatures.md", cells=tuple(cells), of=f"{label} on {task}",
         )  # fmt: skip

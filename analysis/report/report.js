@@ -1,5 +1,5 @@
 "use strict";
-/* The choice of light or dark, kept in the browser where it allows that. */
+/* The choice of light or dark, kept in the browser where it allows that; folds. */
 (() => {
   const root = document.documentElement;
   const button = document.getElementById("theme");
@@ -31,5 +31,13 @@
     if (target) target.scrollIntoView();
   };
   window.addEventListener("hashchange", reveal);
+
+  /* What is folded is printed as well, but for the lists of runs. */
+  let folded = [];
+  window.addEventListener("beforeprint", () => {
+    folded = [...document.querySelectorAll("main details:not([open])")].filter((at) => !at.closest(".runs"));
+    folded.forEach((at) => { at.open = true; });
+  });
+  window.addEventListener("afterprint", () => folded.forEach((at) => { at.open = false; }));
   if (window.location.hash) reveal();
 })();

@@ -10,6 +10,7 @@ from typing import Literal
 from analysis.report.document import Column, DataTable, Estimate, Value
 from analysis.table import NONE
 
+NO_SPREAD = "no spread"
 MINUS, NARROW_SPACE, TIMES = "−", "\N{NARROW NO-BREAK SPACE}", "×"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MARKUP = re.compile(
@@ -89,14 +90,28 @@ class Part:
             return ()
         return tuple(number_text(number, self.column) for number in known)
 
+    def point(self, value: Value) -> bool:
+        """Whether it shows an interval that is a point: no spread, which is not certainty."""
+        return (
+            self.kind == "interval" and isinstance(value, Estimate)
+            and value.low is not None and value.low == value.high
+        )  # fmt: skip
+
     def text(self, value: Value) -> str:
         """A value in words and typographic numbers."""
+        if self.point(value):
+            return NO_SPREAD
         if self.column.kind == "text":
-            return str(value) if self.kind == "value" and value not in (None, "") else NONE
+            return true_minus(str(value)) if self.kind == "value" and value else NONE
         numbers = [typographic(number) for number in self.numbers(value)]
         if not numbers:
             return NONE
         return f"[{', '.join(numbers)}]" if self.kind == "interval" else numbers[0]
+
+
+def true_minus(text: str) -> str:
+    """Text with a minus where a hyphen before a digit begins a word, in brackets or not."""
+    return re.sub(r"(?<![^\s(\[])-(?=\d)", MINUS, text)
 
 
 def parts(table: DataTable) -> list[Part]:

@@ -11,15 +11,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.report.document import CellKey, DataTable, Document, Row
+from analysis.report.document import DataTable, Document, Row
 from analysis.report.numbers import Number
 from analysis.report.text import parts
 from analysis.results import Results
 from analysis.table import NONE
-from coartic import CoarticError
+from coartic import CoarticError, builtin_tasks
 
 FILE = "trace.json"
-FORMAT = 1
+FORMAT = 2
+_COMPANIONS = {
+    "SD": "SD over runs of: ",
+    "Low": "lower end of the interval of: ",
+    "High": "upper end of the interval of: ",
+    "N": "number of runs of: ",
+}
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Source:
     run_ids: tuple[str, ...]
     commits: tuple[str, ...]
     command: str
-    """Makes the cell's runs anew."""
+    """Makes the cell's runs anew; empty where it takes files of the user's own."""
 
 
 @dataclass(frozen=True)
@@ -46,34 +52,46 @@ class Trace:
     specification: str
     """SHA-256 of the suite's specification."""
     environment: dict[str, Any]
-    folder: Path
-    """The results folder."""
+    folder: Path | None
+    """The results folder, where the report lies in it."""
 
 
 def trace_json(results: Results, document: Document, numbers: Iterable[Number]) -> str:
-    """Every macro and table cell with the cells it rests on, and the runs of those."""
-    runs = results.runs
-    cells: dict[str, Any] = {}
+    """Every macro and table cell with the cells it rests on, and the runs of those.
+
+    Cells are named by their place in the list ``cells``. The same results give the same text,
+    wherever they lie: of paths in the command that asked for them only the last part is kept.
+    """
+    commits = results.runs.set_index("run_id").commit.astype(object).fillna("unknown")
     labels = {(cell.task, cell.label): cell for cell in results.cells}
-    for key in document.runs:
-        cell = labels[key]
-        own = runs[runs.run_id.isin(document.runs[key])]
-        cells[_join(key)] = {
-            "method": cell.method,
-            "runs": list(document.runs[key]),
-            "commits": sorted(set(own.commit.astype(str))),
-        }
+    places = {key: place for place, key in enumerate(document.runs)}
+    environment = results.manifest["environment"]
+    command = [Path(part).name if Path(part).is_absolute() else part
+               for part in environment["command"]]  # fmt: skip
     content = {
         "format": FORMAT,
         "suite": _suite(results),
         "specification": specification_hash(results),
-        "environment": results.manifest["environment"],
-        "cells": cells,
+        "environment": {**environment, "command": command},
+        "cells": [
+            {
+                "task": task,
+                "label": label,
+                "method": labels[task, label].method,
+                "runs": list(runs),
+                "commits": sorted(set(commits[list(runs)])),
+            }
+            for (task, label), runs in document.runs.items()
+        ],
         "macros": {
-            name: {"text": text, "meaning": number.meaning, "how": number.how}
-            | {"cells": [_join(key) for key in number.cells]}
+            number.macro: {
+                "texts": dict(number.companions()),
+                "meaning": number.meaning,
+                "of": number.of,
+                "how": number.how,
+                "cells": [places[key] for key in number.cells],
+            }
             for number in numbers
-            for name, text in number.macros()
         },
         "tables": {
             table.id: {
@@ -81,10 +99,10 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
                 "columns": [column.name for column in table.columns],
                 "rows": {
                     row.key: {
-                        "text": _texts(table, row),
-                        "cells": [_join(key) for key in row.cells],
+                        "texts": _texts(table, row),
+                        "cells": [places[key] for key in row.cells],
                         "cells_by_column": {
-                            name: [_join(key) for key in keys]
+                            name: [places[key] for key in keys]
                             for name, keys in row.cells_by_column.items()
                         },
                     }
@@ -99,7 +117,11 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
 
 def specification_hash(results: Results) -> str:
     """SHA-256 of a suite's specification: tasks, methods, parameters, seed, run ids."""
-    text = json.dumps(results.manifest["specification"], sort_keys=True, separators=(",", ":"))
+    return _hash(results.manifest["specification"])
+
+
+def _hash(specification: dict[str, Any]) -> str:
+    text = json.dumps(specification, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -131,27 +153,42 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
         content = json.loads((home / FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise CoarticError(f"{home / FILE} cannot be read: {error}") from None
-    if content.get("format") != FORMAT:
+    again = f"make the report again with `coartic report {home.parent}`"
+    form = content.get("format") if isinstance(content, dict) else None
+    if form != FORMAT:
         raise CoarticError(
-            f"{home / FILE} has format {content.get('format')}, this version reads {FORMAT}; "
-            f"make the report again with `coartic report {home.parent}`"
+            f"{home / FILE} has format {form}, this version reads {FORMAT}; {again}"
         )
-    name = name.removeprefix("\\")
-    if name in content["macros"]:
+    try:
+        return _find(content, home, name.removeprefix("\\"), where)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        raise CoarticError(f"{home / FILE} is damaged ({error!r}); {again}") from None
+
+
+def _find(content: dict[str, Any], home: Path, name: str, where: Sequence[str]) -> Trace:
+    macros = {
+        macro + suffix: (macro, suffix)
+        for macro, entry in content["macros"].items()
+        for suffix in entry["texts"]
+    }
+    if name in macros:
         if where:
             raise CoarticError(f"{name} is a macro: it has no rows and columns")
-        entry = content["macros"][name]
-        found = name, entry["text"], entry["meaning"], entry["how"], entry["cells"]
+        macro, suffix = macros[name]
+        entry = content["macros"][macro]
+        text, how, keys = entry["texts"][suffix], entry["how"], entry["cells"]
+        title, meaning = name, _meaning(entry, suffix)
     elif name in content["tables"]:
-        found = _table_cell(content["tables"][name], name, where)
+        title, text, meaning, keys = _table_cell(content["tables"][name], name, where)
+        how = ""
     else:
-        known = [*content["macros"], *content["tables"]]
+        known = [*macros, *content["tables"]]
         raise CoarticError(f"no macro or table {name!r} in {home}{_nearest(name, known)}")
-    title, text, meaning, how, keys = found
     return Trace(
         title, text, meaning, how,
-        tuple(_source(content, key, home.parent) for key in keys),
-        content["specification"], content["environment"], home.parent,
+        tuple(_source(content, content["cells"][key]) for key in keys),
+        content["specification"], content["environment"],
+        _results_folder(home.parent, content["specification"]),
     )  # fmt: skip
 
 
@@ -165,7 +202,7 @@ def trace_text(found: Trace) -> str:
         f"{found.name} = {found.text}",
         found.meaning,
         *([f"how: {found.how}"] if found.how else []),
-        f"results: {found.folder}",
+        f"results: {found.folder or 'not beside this report; its FOLDER has the specification'}",
         f"specification: {found.specification}",
         f"asked for by: {shlex.join(found.environment['command'])}",
         f"code: coartic {found.environment['coartic']}, commit {shown}, model code "
@@ -180,7 +217,8 @@ def trace_text(found: Trace) -> str:
             "",
             f"{source.task} x {source.label}: {len(source.run_ids)} runs, made at commit "
             + ", ".join(source.commits),
-            f"reproduce: {source.command}",
+            *([f"anew: {source.command}"] if source.command else []),
+            f"one: coartic reproduce RUN --in {shlex.quote(str(found.folder or 'FOLDER'))}",
             *(f"  {run}" for run in source.run_ids),
         ]
     return "\n".join(lines)
@@ -188,7 +226,7 @@ def trace_text(found: Trace) -> str:
 
 def _table_cell(
     table: dict[str, Any], name: str, where: Sequence[str]
-) -> tuple[str, str, str, str, list[str]]:
+) -> tuple[str, str, str, list[int]]:
     rows, columns = table["rows"], table["columns"]
     if len(where) != 2:
         raise CoarticError(
@@ -202,22 +240,37 @@ def _table_cell(
         raise CoarticError(f"table {name} has no column {column!r}{_nearest(column, columns)}")
     entry = rows[row]
     cells = entry["cells_by_column"].get(column, entry["cells"])
-    text = entry["text"][columns.index(column)]
-    return f"{name} [{row}, {column}]", text, table["caption"], "", cells
+    text = entry["texts"][columns.index(column)]
+    return f"{name} [{row}, {column}]", text, table["caption"], cells
 
 
-def _source(content: dict[str, Any], key: str, folder: Path) -> Source:
-    cell, suite = content["cells"][key], content["suite"]
-    task, _, label = key.partition("|")
-    command = [
-        "coartic run", suite["name"], f"--tasks {task}", f"--methods {cell['method']}",
-        f"--runs {suite['runs']}", f"--seed {suite['seed']}", "--out FOLDER",
-    ]  # fmt: skip
-    if suite["trials"] is not None:
-        command.insert(-2, f"--trials {suite['trials']}")
-    if len(cell["runs"]) == 1:
-        command = [f"coartic reproduce {cell['runs'][0]} --in {folder}"]
-    return Source(task, label, tuple(cell["runs"]), tuple(cell["commits"]), " ".join(command))
+def _meaning(entry: dict[str, Any], suffix: str) -> str:
+    of = f", {entry['of']}" if entry["of"] else ""
+    return f"{_COMPANIONS.get(suffix, '')}{entry['meaning']}{of}"
+
+
+def _source(content: dict[str, Any], cell: dict[str, Any]) -> Source:
+    suite, command = content["suite"], ""
+    files = [name for name in content["environment"]["command"] if name.endswith((".toml", ".py"))]
+    if cell["task"] in builtin_tasks() and not files:
+        options = {"tasks": cell["task"], "methods": cell["method"]}
+        options |= {name: suite[name] for name in ("runs", "trials", "seed")}
+        command = f"coartic run {suite['name']} " + "".join(
+            f"--{name} {value} " for name, value in options.items() if value is not None
+        ) + "--out NEW"  # fmt: skip
+    return Source(
+        cell["task"], cell["label"], tuple(cell["runs"]), tuple(cell["commits"]), command
+    )
+
+
+def _results_folder(folder: Path, specification: str) -> Path | None:
+    """The folder if it holds the results that a report with this specification is of."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        same = _hash(manifest["specification"]) == specification
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return folder if same else None
 
 
 def _suite(results: Results) -> dict[str, Any]:
@@ -236,10 +289,6 @@ def _texts(table: DataTable, row: Row) -> list[str]:
         if part.kind == "value" or text != NONE:
             shown[part.index].append(f"± {text}" if part.kind == "sd" else text)
     return [" ".join(texts) for texts in shown]
-
-
-def _join(key: CellKey) -> str:
-    return "|".join(key)
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:

@@ -1,0 +1,74 @@
+"""What the report's tables share: names of tasks, values of cells, empty tables."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.slugs import slugs
+from analysis.statistics import mean
+from analysis.study import SEED, Study
+
+
+def table_ids(study: Study) -> dict[str, str]:
+    """Names of tasks as tables' ids have them."""
+    return slugs(study.results.tasks)
+
+
+def table(
+    name: str,
+    caption: str,
+    columns: tuple[Column, ...],
+    rows: list[Row],
+    notes: tuple[str, ...] = (),
+) -> DataTable | None:
+    """A table, or None where it would have no rows."""
+    return DataTable(name, caption, columns, tuple(rows), notes) if rows else None
+
+
+def value_of(row: dict[Any, Any], source: str | tuple[str, str, str], column: Column) -> Value:
+    """A row's entry as ``column`` takes it; of three names: value, low and high."""
+    if isinstance(source, tuple):
+        value, low, high = (float(row[name]) for name in source)
+        return with_interval(value, low, high)
+    value = row[source]
+    if column.kind == "text":
+        return None if pd.isna(value) or value == "" else str(value)
+    return None if pd.isna(value) else value.item() if hasattr(value, "item") else value
+
+
+def mean_of(rewards: Any) -> Estimate | None:
+    """Mean with SD and BCa interval, as far as there are any."""
+    if not len(rewards):
+        return None
+    found = mean(rewards, seed=SEED)
+    sd = float(np.std(rewards, ddof=1)) if len(rewards) > 1 else None
+    if math.isnan(found.low):
+        return Estimate(found.estimate, sd)
+    return Estimate(found.estimate, sd, found.low, found.high)
+
+
+def with_interval(value: float, low: float, high: float) -> Value:
+    """A value with its interval where it has one; None for NaN."""
+    if math.isnan(value):
+        return None
+    return Estimate(value) if math.isnan(low) else Estimate(value, None, low, high)
+
+
+def finite(value: float) -> float | None:
+    """None for NaN."""
+    return None if math.isnan(value) else float(value)
+
+
+def counts(hands: pd.Series) -> str | None:
+    """``LRLR 17, RRLR 3``, the commonest first; None for none."""
+    return ", ".join(f"{name} {count}" for name, count in hands.value_counts().items()) or None
+
+
+def marked(study: Study, task: str) -> str:
+    """A task's name, with † where it is reconstructed."""
+    return f"{task} †" if study.results.tasks[task].reconstructed else task

@@ -1,0 +1,22 @@
+"""Names of tasks as the names of figures, tables and sections have them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+
+def slugs(names: Iterable[str]) -> dict[str, str]:
+    """Small letters, digits and dashes, all different: ``A_b`` is ``a-b``, ``a.b`` then ``a-b-2``.
+
+    A minus sign after an underscore is spelled out: ``goal_-1`` is ``goal-minus1``.
+    """
+    found: dict[str, str] = {}
+    for name in names:
+        signed = re.sub(r"(?<=[_=])-(?=\d)", "minus", name.lower())
+        base = re.sub(r"[^a-z0-9]+", "-", signed).strip("-")
+        slug, number = base, 2
+        while slug in found.values():
+            slug, number = f"{base}-{number}", number + 1
+        found[name] = slug
+    return found

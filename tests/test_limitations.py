@@ -1,0 +1,161 @@
+"""What a report says it cannot show: every sentence where it is true, none where it is not."""
+
+import json
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from analysis.report.limitations import limitations
+from analysis.study import Study
+from coartic import load_task
+
+from .test_traces import results, study  # noqa: F401 (fixtures)
+
+
+def said(of):
+    return {text.partition("*")[2].partition(".*")[0]: text for text in limitations(of)}
+
+
+def changed(of, column, values):
+    """The study with a column of its runs replaced in some rows, by their number."""
+    runs = of.results.runs.copy()
+    for row, value in values.items():
+        runs.loc[row, column] = value
+    return Study(replace(of.results, runs=runs))
+
+
+def of_tasks(of, *tasks):
+    """The study as if its folder had these tasks only."""
+    manifest = json.loads(json.dumps(of.results.manifest))
+    specification = manifest["specification"]
+    specification["tasks"] = {task.name: task.model_dump(mode="json") for task in tasks}
+    specification["cells"] = [
+        cell for cell in specification["cells"] if cell["task"] in specification["tasks"]
+    ]
+    runs = of.results.runs
+    runs = runs[runs.task.isin(list(specification["tasks"]))]
+    return Study(replace(of.results, manifest=manifest, runs=runs))
+
+
+@pytest.fixture
+def clean(study):  # noqa: F811
+    """One one-armed task, all at one clean commit."""
+    one = of_tasks(study, load_task("ascending"))
+    runs = one.results.runs.assign(commit="a" * 40)
+    return Study(replace(one.results, runs=runs))
+
+
+def test_a_clean_folder(clean):
+    found = said(clean)
+    assert list(found) == ["Failures", "Trials", "Number of runs", "One seed", "Times", "Model"]
+    assert found["Failures"].endswith(f"None: all {len(clean.results.runs)} runs have a solution, "
+                                      "executed and scored.")  # fmt: skip
+    assert "run once" in found["One seed"]
+    assert "The paper has 20 runs a cell; here are 4." in " ".join(limitations(clean))
+
+
+def test_reconstructed_and_chosen_tasks(study, clean):  # noqa: F811
+    found = said(study)
+    assert "two-armed-1" in found["Reconstructed"]
+    assert "goals (" in found["Reconstructed"]
+    assert "Arms" in found
+    assert not {"Reconstructed", "Not the paper's", "Arms"} & set(said(clean))
+    own = load_task("ascending").model_copy(
+        update={"provenance": {**load_task("two-armed-1").provenance}}
+    )
+    entry = {"goals": own.provenance["goals"].model_copy(update={"status": "chosen"})}
+    own = own.model_copy(update={"provenance": entry})
+    assert "ascending: goals chosen" in said(of_tasks(study, own))["Not the paper's"]
+
+
+def test_failures(clean):
+    rows = clean.cells["ascending", "dual-process/EC1"].runs.index
+    broken = changed(clean, "status", dict.fromkeys(rows[:2], "crashed"))
+    broken = changed(broken, "reason", {rows[0]: "exit *7*", rows[1]: "exit 8"})
+    text = said(broken)["Failures"]
+    assert "ascending: 2 runs are crashed (exit \\*7\\*, and other reasons): " in text
+    assert "`dual-process/EC1` (2 of 4)" in text
+    assert "None" not in text
+    slow = changed(broken, "status", {rows[1]: "timeout"})
+    assert len([t for t in limitations(slow) if t.startswith("*Failures.*")]) == 2
+
+
+def test_failed_trials(clean):
+    rows = clean.cells["ascending", "dual-process/EC1"].runs.index
+    assert "Failed trials" not in said(changed(clean, "failed_trials", {rows[0]: 5}))
+    text = said(changed(clean, "failed_trials", {rows[0]: 6}))["Failed trials"]
+    assert "6 of 600 trials (1 %)" in text
+
+
+def test_mixed_versions(clean):
+    rows = list(clean.results.runs.index)
+    mixed = changed(clean, "commit", {rows[0]: "b" * 40})
+    text = said(mixed)["Mixed versions"]
+    assert "2 commits (`aaaaaaaaaaaa`, `bbbbbbbbbbbb`); the code behind" in text
+    dirty = said(changed(clean, "commit", {rows[0]: "a" * 40 + "+"}))
+    assert "Mixed versions" not in dirty
+    assert "`aaaaaaaaaaaa`" in dirty["Uncommitted changes"]
+    assert (
+        "1 runs were made outside"
+        in said(changed(clean, "commit", {rows[0]: pd.NA}))["Unknown commit"]
+    )
+    assert (
+        "2 sets of library versions"
+        in said(changed(clean, "packages", {rows[0]: "x"}))["Mixed versions"]
+    )
+    codes = said(changed(mixed, "code", {rows[0]: "x"}))
+    assert "Mixed code" in codes
+    assert "the same in all" not in codes["Mixed versions"]
+
+
+def test_trials_and_runs_as_in_the_paper(clean):
+    runs = clean.results.runs.copy()
+    runs.loc[runs.method == "dual-process/EC1", "trials"] = 10_000
+    texts = limitations(Study(replace(clean.results, runs=runs)))
+    assert not any(text.startswith("*Trials.*") for text in texts)
+    learner = runs[runs.method == "dual-process/EC1"]
+    many = pd.concat([runs, *[learner.assign(run_id=f"x{k}" + learner.run_id) for k in range(4)]])
+    texts = limitations(Study(replace(clean.results, runs=many)))
+    assert not any("The paper has 20 runs" in text for text in texts)
+    assert any("n = 20" in text for text in texts)
+
+
+def test_few_runs(clean):
+    manifest = json.loads(json.dumps(clean.results.manifest))
+    manifest["specification"]["runs"] = 1
+    runs = clean.results.runs
+    one = Study(replace(clean.results, manifest=manifest, runs=runs[runs.run == 0]))
+    found = said(one)
+    assert "No cell has the three runs" in found["One seed"]
+    assert "run once" not in found["One seed"]
+    assert "t-test" not in " ".join(limitations(one))
+
+
+def test_optima(study, clean):  # noqa: F811
+    assert not {"No optimum", "Optimum not proven"} & set(said(clean))
+    own = load_task("ascending").model_copy(update={"radius": 0.2})
+    assert "known of ascending: no gaps" in said(of_tasks(study, own))["No optimum"]
+    # A search of one's own that proves nothing.
+    runs = of_tasks(study, own).results.runs
+    plan = runs.method == "trajectory-optimisation/path-length"
+    search = runs[plan].assign(
+        method="optimum/multistart", parameters='{"other_arm": "free"}', run_id="y"
+    )
+    found = of_tasks(study, own)
+    searched = Study(replace(found.results, runs=pd.concat([runs, search])))
+    text = said(searched)["Optimum not proven"]
+    assert f"other arm free: {search.reward.iloc[0]} is the best of the searches." in text
+    bound = Study(replace(found.results, runs=pd.concat([runs, search.assign(proven_bound=-10)])))
+    assert "none above -10 is proven" in said(bound)["Optimum not proven"]
+
+
+def test_warming_up(clean):
+    assert (
+        "0 % of the runs"
+        in said(Study(replace(clean.results, runs=clean.results.runs.assign(warm=True))))["Times"]
+    )
+    assert (
+        "100 % of the runs"
+        in said(Study(replace(clean.results, runs=clean.results.runs.assign(warm=False))))["Times"]
+    )

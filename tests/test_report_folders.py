@@ -1,0 +1,242 @@
+"""Reports of all sorts of folders, by the command line; and their names."""
+
+import json
+import re
+import shutil
+
+import pandas as pd
+import pytest
+
+import analysis.report.build
+import analysis.report.numbers
+from analysis.report.build import build, write
+from analysis.report.numbers import Names, headline_numbers, macro_names, words
+from analysis.report.trace import find_report, trace
+from analysis.slugs import slugs
+from analysis.study import Study
+from benchmarks.suites import Cell, load_suite, select_cells
+from coartic import CoarticError, builtin_tasks
+
+from .strategies import tiny_task
+from .test_cli import call
+from .test_harness import KNOWN, run_and_write
+from .test_traces import SVG, compiled, report_of, with_environment
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Reports without figures, which take long and have tests of their own."""
+    monkeypatch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
+    monkeypatch.setattr(
+        analysis.report.build, "save",
+        lambda plot, folder: (folder / f"{plot.id}.svg").write_text(SVG, encoding="utf-8"),
+    )  # fmt: skip
+
+
+def test_letters_alone():
+    for name, expected in (
+        ("two-armed-1", "TwoArmedOne"),
+        ("dual-process/EC1 noise_sd=0.02", "ECOneNoiseSdZeroPointZeroTwo"),
+        ("ascending.goal2_0_-1.5", "AscendingGoalTwoZeroMinusOnePointFive"),
+        ("A_b", "AB"),
+        ("7", "Seven"),
+    ):
+        assert words(name) == expected
+
+
+def test_slugs():
+    names = ["shelf-2", "shelf.2", "Shelf_2", "shelf-2-2", "a_-1", "a_1", "X"]
+    found = slugs(names)
+    assert list(found) == names
+    assert len(set(found.values())) == len(names)
+    assert all(re.fullmatch("[a-z0-9]+(-[a-z0-9]+)*", slug) for slug in found.values())
+    assert (found["a_-1"], found["a_1"]) == ("a-minus1", "a-1")
+
+
+class Plan:
+    """What :func:`macro_names` reads of a study."""
+
+    def __init__(self, cells):
+        self.results = self
+        self.tasks = dict.fromkeys(task for task, _ in cells)
+        self.cells = dict.fromkeys(cells)
+
+
+def test_names_of_the_largest_suite_need_no_help():
+    cells = select_cells(load_suite("comparison"), KNOWN)
+    names = macro_names(Plan([(cell.task.name, cell.label) for cell in cells]))
+    assert len(names.labels) > 50
+    assert set(names.tasks) == set(builtin_tasks())
+    assert names.renamed() == []
+    joined = [names.tasks[c.task.name] + names.labels[c.label] for c in cells]
+    assert len(set(joined)) == len(cells)
+    assert all(name.isalpha() and name.isascii() for name in joined)
+
+
+def test_names_that_are_the_same_in_letters():
+    names = macro_names(Plan([("shelf-2", "a/b"), ("shelf.2", "a-b"), ("Shelf_2", "a/b")]))
+    assert names.tasks == {"shelf-2": "ShelfTwo", "shelf.2": "ShelfTwoAlt",
+                           "Shelf_2": "ShelfTwoAltAlt"}  # fmt: skip
+    assert names.labels == {"a/b": "AB", "a-b": "ABAlt"}
+    assert "shelf.2 is ShelfTwoAlt in macros, as another name is ShelfTwo." in names.renamed()
+
+
+@pytest.fixture(scope="module")
+def odd(tmp_path_factory):
+    """Tasks of somebody's own, with names that are the same in letters; one run a cell."""
+    found = [
+        Cell(tiny_task(name=name), KNOWN[method])
+        for name in ("shelf-2", "shelf.2", "A_b", "on-A_b", "tasks", "optimum")
+        for method in ("dual-process/EC4", "corrective-alone/given")
+    ]
+    folder = tmp_path_factory.mktemp("odd") / "results"
+    run_and_write(folder, found, runs=1, trials=30)
+    return with_environment(folder)
+
+
+def test_odd_names_one_run_and_no_optimum(odd, tmp_path):
+    of = Study(odd)
+    folder = report_of(of, tmp_path / "report")
+    page = (folder / "report.md").read_text(encoding="utf-8")
+    assert "None is known of shelf-2, shelf.2, A\\_b" in page.replace("A_b", "A\\_b")
+    tex = (folder / "numbers.tex").read_text(encoding="utf-8")
+    assert "% shelf.2 is ShelfTwoAlt in macros" in tex
+    assert "shelf.2 is ShelfTwoAlt in macros" in page
+    for name, task in (("ShelfTwo", "shelf-2"), ("ShelfTwoAlt", "shelf.2"), ("AB", "A_b")):
+        found = trace(folder, f"coartic{name}ECFourReward")
+        assert [(source.task, len(source.run_ids)) for source in found.sources] == [(task, 1)]
+        assert found.sources[0].command == ""  # the task's file is not here
+    assert not re.search("Gap|Low|SD", tex.partition("providecommand")[2])
+    compiled(folder)
+
+
+def test_macros_that_run_together_are_told_apart(odd, monkeypatch):
+    """As task a with method b-c and task a-b with method c would: all ABC."""
+    of = Study(odd)
+    labels = macro_names(of).labels
+    same = Names(dict.fromkeys(odd.tasks, "X"), labels)
+    monkeypatch.setattr(analysis.report.numbers, "macro_names", lambda of: same)
+    numbers = headline_numbers(of)
+    names = [number.macro + suffix for number in numbers for suffix, _ in number.companions()]
+    assert len(names) == len(set(names))
+    rewards = [n for n in numbers if re.fullmatch("coarticXECFourReward(Alt)*", n.macro)]
+    assert [n.macro.count("Alt") for n in rewards] == list(range(6))
+    assert [n.cells[0][0] for n in rewards] == list(odd.tasks)
+
+
+def test_failed_runs(tmp_path, undrawn):
+    known = select_cells(load_suite("paper"), KNOWN, tasks=["ascending"])
+    folder = tmp_path / "results"
+    run_and_write(folder, known, runs=3, trials=30)
+    table = pd.read_parquet(folder / "runs.parquet")
+    failed = table.assign(
+        status="crashed", reason="exit code 9", reward=None, hands=None, trials=None
+    )
+    for rows in (1, 3):  # some, then all
+        mixed = pd.concat([failed.head(rows), table.tail(3 - rows)])
+        mixed.to_parquet(folder / "runs.parquet")
+        of = Study(with_environment(folder))
+        made = build(of)
+        write(made, of, tmp_path / "report")
+        page = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+        assert f"{rows} of 3 runs have no solution" in page
+        assert f"{rows} runs are crashed (exit code 9)" in page
+        named = {number.macro: number for number in made.numbers}
+        if rows == 1:
+            assert named["coarticAscendingECOneReward"].n == 2
+        else:
+            assert "coarticAscendingECOneReward" not in named
+
+
+def test_the_commands(monkeypatch, capsys, tmp_path, odd, undrawn):
+    folder = tmp_path / "res ults"
+    shutil.copytree(odd.folder, folder)
+    code, out, _ = call(monkeypatch, capsys, "report", folder)
+    assert code == 0
+    assert str(folder / "report" / "report.html") in out
+    macro = "coarticShelfTwoECFourReward"
+    for place in (tmp_path, folder, folder / "report"):
+        code, out, _ = call(monkeypatch, capsys, "trace", macro, "--in", place)
+        assert code == 0
+        assert out.startswith(f"{macro} = -")
+        assert f"results: {folder}" in out
+        assert f"--in '{folder}'" in out
+    run = out.split()[-1]
+    assert (folder / "records" / f"{run}.json").is_file()
+    row = ("methods-a-b", "dual-process/EC4", "reward")
+    code, out, _ = call(monkeypatch, capsys, "trace", *row, "--in", folder)
+    assert code == 0
+    assert "A_b x dual-process/EC4: 1 runs" in out
+    for arguments, words_ in (
+        ([macro + "s"], f"did you mean {macro}"),
+        (["methods-a-c", "x", "y"], "did you mean methods-a-b"),
+        ([row[0], "dual-process/EC5", "reward"], "did you mean dual-process/EC4"),
+        ([row[0], row[1], "rewards"], "did you mean reward"),
+        ([row[0]], "name a row and a column"),
+    ):
+        code, out, error = call(monkeypatch, capsys, "trace", *arguments, "--in", folder)
+        assert (code, out) == (2, "")
+        assert words_ in error
+        assert "Traceback" not in error
+
+
+def refused(monkeypatch, capsys, *arguments):
+    code, out, error = call(monkeypatch, capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert error.startswith("error: ")
+    assert "Traceback" not in error
+    return error
+
+
+def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file").write_text("x")
+    assert "not a results folder" in refused(monkeypatch, capsys, "report", tmp_path / "empty")
+    for name in ("file", "nowhere"):
+        assert str(tmp_path / name) in refused(monkeypatch, capsys, "report", tmp_path / name)
+    assert "no report in" in refused(monkeypatch, capsys, "trace", "a", "--in", tmp_path / "empty")
+    # A report folder that is none.
+    thesis = tmp_path / "thesis"
+    thesis.mkdir()
+    (thesis / "thesis.tex").write_text("years of work")
+    error = refused(monkeypatch, capsys, "report", odd.folder, "--out", thesis)
+    assert "is no report" in error
+    assert [path.name for path in thesis.iterdir()] == ["thesis.tex"]
+    # A file where a folder should be: what a disk that is read only answers, for root too.
+    error = refused(monkeypatch, capsys, "report", odd.folder, "--out", tmp_path / "file" / "r")
+    assert "cannot write" in error
+
+
+@pytest.mark.parametrize("name", ["runs", "solutions", "learning", "sequences", "manifest"])
+def test_damaged_folders(name, monkeypatch, capsys, tmp_path, odd, undrawn):
+    folder = tmp_path / "results"
+    shutil.copytree(odd.folder, folder, ignore=shutil.ignore_patterns("records"))
+    path = folder / (f"{name}.json" if name == "manifest" else f"{name}.parquet")
+    path.write_bytes(path.read_bytes()[:40])
+    assert path.stem in refused(monkeypatch, capsys, "report", folder)
+    path.unlink()
+    assert path.stem in refused(monkeypatch, capsys, "report", folder)
+    assert not (folder / "report").exists()
+
+
+def test_many_tasks_make_a_short_report(monkeypatch, odd, undrawn):
+    monkeypatch.setattr(analysis.report.build, "MOST_TASKS", 5)
+    document = build(Study(odd)).document
+    assert {table.id.partition("-")[0] for table in document.tables()} <= {
+        "methods", "main", "other", "contexts", "claims", "exhaustive", "across",
+    }  # fmt: skip
+    assert not [figure for figure in document.figures() if figure.id.startswith("signatures")]
+    assert "With more than 5 tasks (here 6)" in json.dumps(
+        [block.items for block in document.sections[-1].blocks]
+    )
+
+
+def test_which_report_is_meant(tmp_path):
+    with pytest.raises(CoarticError, match="no report"):
+        find_report(tmp_path)
+    for name in ("a", "b"):
+        (tmp_path / name / "report").mkdir(parents=True)
+        (tmp_path / name / "report" / "trace.json").write_text("{}")
+    with pytest.raises(CoarticError, match="2 reports below"):
+        find_report(tmp_path)
+    assert find_report(tmp_path / "a") == tmp_path / "a" / "report"

@@ -1,0 +1,498 @@
+"""Numbers of a report, followed back to the records and computed again from those alone."""
+
+import json
+import random
+import re
+import shutil
+import statistics as plain
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import analysis.report.build
+from analysis import statistics
+from analysis.report.build import build, write
+from analysis.report.trace import FILE, trace
+from analysis.results import load_results
+from analysis.study import Study
+from benchmarks.provenance import environment
+from benchmarks.suites import Cell
+from coartic import CoarticError, corrective_trial, execute, load_task
+from coartic.frames import movements_from
+
+from .test_harness import KNOWN, run_and_write
+
+TASKS = {"Ascending": "ascending", "Descending": "descending", "TwoArmedOne": "two-armed-1"}
+LABELS = {
+    "ECFourNoiseSdZeroPointOne": "dual-process/EC4 noise_sd=0.1",
+    "ECOne": "dual-process/EC1",
+    "ECThree": "dual-process/EC3",
+    "ECFour": "dual-process/EC4",
+    "CorrectiveAloneGiven": "corrective-alone/given",
+    "TrajectoryOptimisationPathLength": "trajectory-optimisation/path-length",
+    "RandomSearchPure": "random-search/pure",
+}
+# docs/model.md and the paper.
+OPTIMUM = {"ascending": -292, "descending": -304, "two-armed-1": -465}
+OPTIMUM_STILL = {"ascending": -292, "descending": -304, "two-armed-1": -490}
+PUBLISHED = {
+    ("ascending", "EC1"): (-303.0, 2.9),
+    ("descending", "EC1"): (-314.0, 1.9),
+    ("two-armed-1", "EC3"): (-502.0, 3.4),
+    ("two-armed-1", "EC4"): (-484.0, 2.0),
+}
+PUBLISHED_INITIAL = {"ascending": -319, "descending": -333, "two-armed-1": -675}
+SIGNATURES = {
+    "ContextDistance": "context distance",
+    "ContextDependence": "context dependence",
+    "NonMotorEquivalent": "non-motor-equivalent part",
+    "MotorEquivalent": "motor-equivalent part",
+}
+
+
+def with_environment(folder):
+    """The harness' helper leaves out what the command line writes into the manifest."""
+    path = folder / "manifest.json"
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    manifest["environment"] = environment() | {
+        "command": ["coartic", "run", "paper", "--out", "/home/somebody/results/x"]
+    }
+    path.write_text(json.dumps(manifest), encoding="utf-8")
+    return load_results(folder)
+
+
+def cells():
+    found = [
+        Cell(load_task(task), KNOWN[method])
+        for task, methods in (
+            ("ascending", ["dual-process/EC1", "trajectory-optimisation/path-length"]),
+            ("descending", ["dual-process/EC1", "corrective-alone/given"]),
+            ("two-armed-1", ["dual-process/EC3", "dual-process/EC4", "corrective-alone/given",
+                             "random-search/pure"]),
+        )
+        for method in methods
+    ]  # fmt: skip
+    return [*found, Cell(found[-1].task, KNOWN["dual-process/EC4"], (("noise_sd", 0.1),))]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("traces") / "results"
+    run_and_write(folder, cells(), runs=4, trials=150)
+    return with_environment(folder)
+
+
+@pytest.fixture(scope="module")
+def study(results):
+    return Study(results)
+
+
+LATEX = r"""\documentclass{article}
+\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
+\usepackage{booktabs,siunitx,graphicx}
+\hfuzz=1pt
+\input{numbers.tex}
+\begin{document}
+%s
+\input{tables.tex}
+\end{document}
+"""
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
+
+
+def report_of(study, folder):
+    """A report whose figures are empty: drawing takes long, and has tests of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
+        patch.setattr(
+            analysis.report.build, "save",
+            lambda plot, folder: (folder / f"{plot.id}.svg").write_text(SVG, encoding="utf-8"),
+        )  # fmt: skip
+        write(build(study), study, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def home(study):
+    return report_of(study, study.results.folder / "report")
+
+
+def compiled(folder, body=""):
+    """The log of a document with all macros and tables; skips where LaTeX is missing."""
+    if not shutil.which("pdflatex"):
+        pytest.skip("pdflatex is not installed")
+    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty", "geometry.sty"]
+    if subprocess.run(styles, capture_output=True, check=False).returncode:
+        pytest.skip("booktabs, siunitx, graphicx or geometry is not installed")
+    (folder / "paper.tex").write_text(LATEX % body, encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=120)
+    log = done.stdout.decode(errors="replace")
+    assert done.returncode == 0, log[-2000:]
+    return log
+
+
+class Records:
+    """The records of a folder, read without the project's code."""
+
+    def __init__(self, folder):
+        self.by_cell = {}
+        for path in sorted((folder / "records").glob("*.json")):
+            record = json.loads(path.read_text(encoding="utf-8").split("\n", 1)[1])
+            specification = record["specification"]
+            label = specification["method"]
+            if specification["parameters"].get("noise_sd", 0.05) != 0.05:
+                label += f" noise_sd={specification['parameters']['noise_sd']}"
+            key = specification["task"]["name"], label
+            self.by_cell.setdefault(key, []).append(record)
+        for records in self.by_cell.values():
+            records.sort(key=lambda record: record["run"])
+
+    def rewards(self, key):
+        return [record["score"]["reward"] for record in self.by_cell[key]]
+
+    def spent(self, key, *names):
+        return [sum(record["meter"][name] for name in names) for record in self.by_cell[key]]
+
+    def seconds(self, key):
+        records = [r for r in self.by_cell[key] if r["timing"]["warm"]] or self.by_cell[key]
+        return [r["meter"]["solve_s"] or r["timing"]["wall_s"] for r in records]
+
+    def first_subtask(self, key):
+        """Ticks of the first goal beyond those of the task's initial solution."""
+        task = load_task(key[0])
+        first = corrective_trial(task, task.initial_hands).ticks_by_goal()[0]
+        return [r["score"]["ticks_by_goal"][0] - first for r in self.by_cell[key]]
+
+    def posture(self, key):
+        """Mean configuration in which the first goal is hit."""
+        import pandas as pd
+
+        task, found = load_task(key[0]), []
+        for record in self.by_cell[key]:
+            movements = movements_from(task, pd.DataFrame(record["solution"]), pd.DataFrame())
+            found.append(execute(task, movements).configurations[0])
+        return np.mean(found, axis=0)
+
+
+@pytest.fixture(scope="module")
+def records(results):
+    return Records(results.folder)
+
+
+def spread(values):
+    return plain.stdev(values)
+
+
+def recomputed(study, records, name):
+    """What a macro stands for, and the cells that it comes from."""
+    name = name.removeprefix("coartic")
+    word = next(word for word in TASKS if name.startswith(word))
+    task, rest = TASKS[word], name.removeprefix(word)
+    known = {"Optimum": OPTIMUM, "OptimumStill": OPTIMUM_STILL,
+             "PublishedInitialReward": PUBLISHED_INITIAL}  # fmt: skip
+    if rest in known:
+        return float(known[rest][task]), []
+    first = next(word for word in LABELS if rest.startswith(word))
+    key, rest = (task, LABELS[first]), rest.removeprefix(first)
+    rewards = records.rewards(key)
+    if rest.startswith("Minus"):
+        second = next(word for word in LABELS if rest.removeprefix("Minus").startswith(word))
+        rest = rest.removeprefix(f"Minus{second}")
+        others = records.rewards((task, LABELS[second]))
+        kind, companion = re.fullmatch("(Reward|Improvement)(Low|High|N|Full|)", rest).groups()
+        if kind == "Reward":
+            value = plain.mean(rewards) - plain.mean(others)
+            found = statistics.difference_of_means(rewards, others, seed=0)
+        else:
+            value = plain.mean((a > b) + (a == b) / 2 for a in rewards for b in others)
+            found = statistics.probability_of_improvement(rewards, others, seed=0)
+        own = {"": value, "N": len(rewards) + len(others), "Low": found.low, "High": found.high}
+        if companion == "Full":
+            own["Full"] = (value, found.low, found.high, own["N"])
+        return own[companion], [key, (task, LABELS[second])]
+    if rest.startswith("Published"):
+        mean, sd = PUBLISHED[task, key[1].rpartition("/")[2]]
+        return {"PublishedReward": mean, "PublishedRewardSD": sd, "PublishedRewardN": 20}[rest], []
+    if hands := re.fullmatch("Hands([LR]+)", rest):
+        counts = [record["score"]["hands"] for record in records.by_cell[key]]
+        return counts.count(hands[1]), [key]
+    kind, companion = re.fullmatch(r"(\w+?)(SD|Low|High|N|Full|)", rest).groups()
+    if kind in ("Reward", "Gap", "GapPercent", "GapStill", "GapStillPercent"):
+        found = statistics.mean(rewards, seed=0)
+        own = {"": plain.mean(rewards), "Low": found.low, "High": found.high}
+        if kind.startswith("Gap"):
+            best = (OPTIMUM_STILL if "Still" in kind else OPTIMUM)[task]
+            share = -100 / best if "Percent" in kind else 1
+            own = {"": (best - own[""]) * share, "Low": (best - own["High"]) * share,
+                   "High": (best - own["Low"]) * share}  # fmt: skip
+            own["Full"] = (own[""], own["Low"], own["High"])
+        else:
+            own |= {"N": len(rewards), "SD": spread(rewards) if len(rewards) > 1 else None}
+            own["Full"] = (own[""], own["Low"], own["High"], own["N"])
+        return own[companion], [key]
+    if kind in SIGNATURES:
+        frame = study.signatures
+        row = frame[(frame.task == task) & (frame.label == key[1])
+                    & (frame.signature == SIGNATURES[kind])].iloc[0]  # fmt: skip
+        both = [key, ("descending", key[1])]
+        if kind == "ContextDistance" and not companion:
+            apart = float(np.linalg.norm(records.posture(key) - records.posture(both[1])))
+            assert apart == pytest.approx(row["value"])
+        return row[{"": "value", "N": "n", "Low": "low", "High": "high"}[companion]], both
+    if kind == "FirstSubtask":
+        values = records.first_subtask(key)
+        own = {"": plain.mean(values)}
+        if companion:
+            from scipy import stats
+
+            half = stats.t.ppf(0.975, len(values) - 1) * spread(values) / len(values) ** 0.5
+            own |= {"Low": own[""] - half, "High": own[""] + half}
+            own["Full"] = (own[""], own["Low"], own["High"])
+        return own[companion], [key]
+    if rest == "InitialReward":
+        return records.by_cell[key][0]["details"]["initial_reward"], [key]
+    values = {
+        "Trials": lambda: records.spent(key, "trials"),
+        "Evaluations": lambda: records.spent(key, "forward_kinematics", "jacobians"),
+        "SolveSeconds": lambda: records.seconds(key),
+    }[rest.removesuffix("N")]()
+    return len(values) if rest.endswith("N") else plain.median(values), [key]
+
+
+def check_macro(home, study, records, name):
+    found = trace(home, name)
+    value, keys = recomputed(study, records, name)
+    shown = [float(part) for part in re.findall(r"-?\d+\.?\d*", found.text)]
+    values = value if isinstance(value, tuple) else (value,)
+    if isinstance(value, tuple) and value[1] == value[2]:
+        assert "no spread" in found.text
+        values = (value[0], *value[3:])
+    decimals = len(found.text.partition(" ")[0].partition(".")[2])
+    assert len(shown) == len(values), (name, found.text, value)
+    for got, wanted in zip(shown, values, strict=True):
+        assert abs(got - wanted) <= 0.5 * 10.0**-decimals + 1e-9, (name, found.text, value)
+    assert all(name in found.meaning for key in keys[:1] for name in key), found.meaning
+    check_sources(found, records, keys)
+
+
+def check_sources(found, records, keys):
+    assert [(source.task, source.label) for source in found.sources] == keys, found.name
+    for source in found.sources:
+        expected = [record["run_id"] for record in records.by_cell[source.task, source.label]]
+        assert list(source.run_ids) == expected, found.name
+
+
+def check_cell(home, records, table, row, column):
+    """A cell of a table that has something to do with rewards, spends or hands."""
+    found = trace(home, table, (row, column))
+    task = next((name for name in TASKS.values() if table.endswith(name)), row.split(" ")[0])
+    pair = [(task, label) for label in row.split(" - ")]
+    key = (task, row.removeprefix(f"{task} "))
+    shown = found.text.replace("\N{MINUS SIGN}", "-").replace("\N{NARROW NO-BREAK SPACE}", "")
+    first = shown.split(" ")[0]
+    if table.startswith("compared"):
+        a, b = map(records.rewards, pair)
+        better = plain.mean((x > y) + (x == y) / 2 for x in a for y in b)
+        value = {"difference": plain.mean(a) - plain.mean(b), "improvement": better,
+                 "delta": 2 * better - 1}[column]  # fmt: skip
+    elif table.startswith("costs"):
+        names = {"trials": ["trials"], "movement_ticks": ["movement_ticks"],
+                 "solve_s": None, "difference": ()}[column]  # fmt: skip
+        if names is None:
+            a, b = map(records.seconds, pair)
+            value = plain.median(b) / plain.median(a)
+        elif names:
+            a, b = (plain.median(records.spent(cell, *names)) for cell in pair)
+            value = b / a
+        else:
+            a, b = map(records.rewards, pair)
+            value = plain.mean(a) - plain.mean(b)
+    elif column in ("hands", "told"):
+        own = records.by_cell[key]
+        if column == "told":
+            letters = {"goals": "G", "forward kinematics": "F", "Jacobian": "J",
+                       "corrective process": "A", "reward by trial": "T", "kinematic model": "K",
+                       "reward as a formula": "R", "secondary objectives": "S"}  # fmt: skip
+            assert shown == "".join(letters[k] for k in letters if k in own[0]["told"])
+        else:
+            hands = [record["score"]["hands"] for record in own]
+            for name in set(hands):
+                assert name in shown
+                assert len(hands) == 1 or f"{name} {hands.count(name)}" in shown
+        check_sources(found, records, [key])
+        return
+    else:
+        pair = [key]
+        rewards = records.rewards(key)
+        value = {
+            "reward": lambda: plain.mean(rewards),
+            "ours": lambda: plain.mean(rewards),
+            "runs": lambda: len(rewards),
+            "solved": lambda: len(rewards),
+            "initial": lambda: records.by_cell[key][0]["details"]["initial_reward"],
+            "gap": lambda: OPTIMUM[task] - plain.mean(rewards),
+            "gap_share": lambda: 100 * (OPTIMUM[task] - plain.mean(rewards)) / -OPTIMUM[task],
+            "solve_s": lambda: plain.median(records.seconds(key)),
+        }.get(column, lambda: plain.median(records.spent(key, column)))()
+        if column in ("reward", "ours") and len(rewards) > 1:
+            sd = spread(rewards)
+            assert f"± {sd:.1f}" in shown, (found.name, shown, sd)
+            interval = statistics.mean(rewards, seed=0)
+            if sd:
+                assert shown.endswith(f"[{interval.low:.1f}, {interval.high:.1f}]")
+    if first == "–":
+        assert value == 0, (found.name, value)
+    else:
+        digits = len(first.partition(".")[2])
+        assert abs(float(first) - value) <= 0.5 * 10.0**-digits + 1e-9, (found.name, shown, value)
+    check_sources(found, records, pair)
+
+
+COLUMNS = {
+    "methods": "reward solved runs gap gap_share hands told trials movement_ticks "
+    "forward_kinematics jacobians solve_s",
+    "compared": "difference improvement delta",
+    "costs": "difference trials movement_ticks solve_s",
+    "published-and-ours": "ours runs initial hands",
+}
+
+
+def macros_of(home):
+    text = (home / "numbers.tex").read_text(encoding="utf-8")
+    return re.findall(r"^\\newcommand\{\\(\w+)\}", text, re.M)
+
+
+def table_cells(home):
+    tables = json.loads((home / FILE).read_text(encoding="utf-8"))["tables"]
+    return [
+        (name, row, column)
+        for name, table in tables.items()
+        for start, columns in COLUMNS.items()
+        if name.startswith(start)
+        for row in table["rows"]
+        for column in columns.split()
+    ]
+
+
+def test_ten_numbers_at_random(home, study, records):
+    draw = random.Random(2013)
+    for name in draw.sample(macros_of(home), 5):
+        check_macro(home, study, records, name)
+    for cell in draw.sample(table_cells(home), 5):
+        check_cell(home, records, *cell)
+
+
+def test_every_macro_is_what_the_records_say(home, study, records):
+    names = macros_of(home)
+    assert len(names) == len(set(names)) > 100
+    assert all(name.isalpha() and name.isascii() for name in names)
+    for name in names:
+        check_macro(home, study, records, name)
+
+
+def test_tables_are_what_the_records_say(home, records):
+    cells = table_cells(home)
+    assert {cell[0] for cell in cells} >= {"methods-ascending", "compared-two-armed-1"}
+    for cell in cells:
+        check_cell(home, records, *cell)
+
+
+def test_the_tex_file_has_the_texts_that_are_traced(home):
+    text = (home / "numbers.tex").read_text(encoding="utf-8")
+    for name, shown in re.findall(r"^\\newcommand\{\\(\w+)\}\{(.*)\}", text, re.M):
+        plain_text = re.sub(r"\\coarticnum\{([^}]*)\}", r"\1", shown).replace("$n$", "n")
+        assert plain_text == trace(home, name).text
+
+
+@pytest.mark.parametrize("what", ["text", "cells", "run", "table text", "table cells"])
+def test_a_wrong_number_would_be_found(what, home, study, records, tmp_path):
+    content = json.loads((home / FILE).read_text(encoding="utf-8"))
+    name = "coarticTwoArmedOneECThreeReward"
+    macro = content["macros"][name]
+    row = content["tables"]["methods-two-armed-1"]["rows"]["dual-process/EC3"]
+    other = content["macros"]["coarticTwoArmedOneECFourReward"]["cells"]
+    cell = ("methods-two-armed-1", "dual-process/EC3", "reward")
+    (tmp_path / "report").mkdir()
+
+    def check():
+        (tmp_path / "report" / FILE).write_text(json.dumps(content), encoding="utf-8")
+        check_macro(tmp_path / "report", study, records, name)
+        check_cell(tmp_path / "report", records, *cell)
+
+    check()
+    if what == "text":
+        macro["texts"][""] = f"{float(macro['texts']['']) + 0.2:.1f}"
+    elif what == "cells":
+        macro["cells"] = other
+    elif what == "run":
+        content["cells"][macro["cells"][0]]["runs"][0] = records.by_cell[
+            "two-armed-1", "dual-process/EC4"
+        ][0]["run_id"]
+    elif what == "table text":
+        row["texts"][1] = row["texts"][1].replace("± ", "± 1")
+    else:
+        row["cells"] = other
+    with pytest.raises(AssertionError):
+        check()
+
+
+def test_latex_takes_every_macro_and_table(home, tmp_path):
+    folder = tmp_path / "report"
+    shutil.copytree(home, folder)
+    text = (folder / "numbers.tex").read_text(encoding="utf-8")
+    macros = re.findall(r"^\\newcommand\{\\(\w+)\}", text, re.M)
+    assert len(macros) > 100
+    log = compiled(folder, "\n\n".join(f"\\{name}" for name in macros))
+    for fault in ("Overfull", "Undefined", "Missing character", "multiply defined"):
+        assert fault not in log, re.findall(f".*{fault}.*", log)
+    again = text.replace("\\providecommand", "\\newcommand{\\coarticnum}[1]{\\num{#1}}%", 1)
+    (folder / "numbers.tex").write_text(again, encoding="utf-8")
+    compiled(folder, f"\\{macros[-1]}")
+
+
+def test_variants_have_their_reward_only(home):
+    variant = [name for name in macros_of(home) if "NoiseSdZeroPointOne" in name]
+    assert sorted(variant) == [
+        f"coarticTwoArmedOneECFourNoiseSdZeroPointOneReward{rest}"
+        for rest in ("", "Full", "High", "Low", "N", "SD")
+    ]
+
+
+def test_a_report_does_not_know_where_it_lies(study, home, tmp_path):
+    again = Study(load_results(study.results.folder))
+    report_of(again, tmp_path / "elsewhere")
+    first, second = (
+        {p.relative_to(folder).as_posix(): p.read_bytes()
+         for p in sorted(folder.rglob("*")) if p.is_file()}
+        for folder in (home, tmp_path / "elsewhere")
+    )  # fmt: skip
+    assert list(first) == list(second)
+    assert [name for name in first if first[name] != second[name]] == []
+    secrets = [str(study.results.folder), str(tmp_path), "/home/somebody", str(Path.cwd())]
+    for name, content in first.items():
+        assert not [s for s in secrets if s.encode() in content], name
+    # In the results folder it is found; elsewhere only its plan is known.
+    assert trace(home, "coarticAscendingOptimum").folder == study.results.folder
+    assert trace(tmp_path / "elsewhere", "coarticAscendingOptimum").folder is None
+
+
+def test_what_a_report_does_not_have(home, tmp_path):
+    for arguments, words in (
+        (("coarticAscendingECOneRewrd",), "did you mean coarticAscendingECOneReward"),
+        (("methods-ascendin",), "did you mean methods-ascending"),
+        (("methods-ascending", ("dual-proces/EC1", "reward")), "did you mean dual-process/EC1?"),
+        (("methods-ascending", ("dual-process/EC1", "rewrd")), "did you mean reward"),
+        (("methods-ascending",), "name a row and a column"),
+        (("coarticAscendingECOneReward", ("a", "b")), "is a macro"),
+    ):
+        with pytest.raises(CoarticError, match=re.escape(words)):
+            trace(home, *arguments)
+    for text in ("", "[]", "{}", '{"format":2}', '{"format":2,"macros":{"a":1},"tables":{}}'):
+        (tmp_path / FILE).write_text(text)
+        with pytest.raises(CoarticError, match=re.escape(FILE)):
+            trace(tmp_path, "a")
