@@ -6,12 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
 from analysis.sample_size import POWER, smallest_difference
 from analysis.statistics import FEWEST
 from analysis.study import Study
-
-_LEARNER = "dual-process/"
 
 
 def limitations(study: Study) -> tuple[str, ...]:
@@ -38,8 +37,8 @@ def _reconstructed(study: Study) -> Iterator[str]:
             )
             yield (
                 f"*Reconstructed.* {name}: not printed in the paper but inferred from what is: "
-                f"{_escape(what)}. Rewards on it, and claims that entered the choice (marked †), "
-                "depend on that."
+                f"{_escape(what)}. Rewards on it, and claims that rest on it (marked †), depend on "
+                "that."
             )
         chosen = sorted(key for key, entry in task.provenance.items() if entry.status == "chosen")
         if chosen:
@@ -106,7 +105,7 @@ def _versions(study: Study) -> Iterator[str]:
 
 def _numbers_of_runs(study: Study) -> Iterator[str]:
     specification = study.results.manifest["specification"]
-    learner = {key: cell for key, cell in study.cells.items() if key[1].startswith(_LEARNER)}
+    learner = {key: cell for key, cell in study.cells.items() if key[1].startswith(LEARNER)}
     if any((cell.runs.trials != TRIALS).any() for cell in learner.values()):
         yield (
             f"*Trials.* The paper's runs have {TRIALS} trials; runs with another number are "
@@ -119,11 +118,11 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
         if len(rewards) < 2 or best is None or not best.reward or cell.variant:
             continue
         sd = float(np.std(rewards, ddof=1))
-        if sd == 0 or label.removeprefix(_LEARNER) not in ("EC1", "EC2", "EC3", "EC4"):
+        if sd == 0 or label.removeprefix(LEARNER) not in ("EC1", "EC2", "EC3", "EC4"):
             continue
         ticks = smallest_difference(sd, sd, len(rewards))
         found.append(
-            f"{task} {label.removeprefix(_LEARNER)} {ticks:.1f} ticks "
+            f"{task} {label.removeprefix(LEARNER)} {ticks:.1f} ticks "
             f"({_percent(ticks / -best.reward, 1)}, n = {len(rewards)})"
         )
     if found:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.methods import solve_times
+from analysis.methods import LEARNER, solve_times
 from analysis.published import published_cell, published_initial
 from analysis.results import CellRuns
 from analysis.statistics import Inference, difference_of_means, mean, probability_of_improvement
@@ -27,7 +27,6 @@ Cell = tuple[str, str]
 """Task and label."""
 
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
-_LEARNER = "dual-process/"
 _SIGNATURES = {
     "first subtask against initial": ("FirstSubtask", "ticks"),
     "context distance": ("ContextDistance", "length unit, rad"),
@@ -108,7 +107,7 @@ def words(name: str) -> str:
 
     The paper's conditions are named without their family: ``dual-process/EC1`` is ``ECOne``.
     """
-    name = re.sub(r"(?<=\d)[.](?=\d)", " point ", name.removeprefix(_LEARNER))
+    name = re.sub(r"(?<=\d)[.](?=\d)", " point ", name.removeprefix(LEARNER))
     name = re.sub(r"(?<=[_=])-(?=\d)", " minus ", name)
     parts = re.findall(r"[A-Za-z]+|\d", name)
     return "".join(_DIGITS[int(p)] if p.isdigit() else p[0].upper() + p[1:] for p in parts)
@@ -270,14 +269,14 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
                 digits, unit, n=len(known) if len(known) != len(rewards) else None,
                 cells=(key,), of=who,
             )  # fmt: skip
-    if label.startswith(_LEARNER):
+    if label.startswith(LEARNER):
         initial = cell.good.initial_reward.dropna().unique()
         if len(initial) == 1:
             yield Number(
                 f"{PREFIX}{name}InitialReward", "reward of the initial solution",
                 float(initial[0]), 0, "ticks", how="deterministic", cells=(key,), of=who,
             )  # fmt: skip
-        printed = published_cell(task, label.removeprefix(_LEARNER))
+        printed = published_cell(task, label.removeprefix(LEARNER))
         if printed is not None and printed.summary is not None:
             summary = printed.summary
             yield Number(
@@ -292,7 +291,7 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
     """Each condition of the learner against the others of its task that explore less."""
     by_task: dict[str, list[str]] = {}
     for task, label in study.cells:
-        if label.startswith(_LEARNER) and label.removeprefix(_LEARNER) in ("EC2", "EC3", "EC4"):
+        if label.startswith(LEARNER) and label.removeprefix(LEARNER) in ("EC2", "EC3", "EC4"):
             by_task.setdefault(task, []).append(label)
     for task, labels in by_task.items():
         for lower, higher in itertools.combinations(sorted(labels), 2):
@@ -317,7 +316,7 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
     tasks = study.results.tasks
     for key, cell in study.cells.items():
         task, label = key
-        if not label.startswith(_LEARNER) or cell.variant or len(tasks[task].hands) < 2:
+        if not label.startswith(LEARNER) or cell.variant or len(tasks[task].hands) < 2:
             continue
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
             yield Number(
