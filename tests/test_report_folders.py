@@ -223,7 +223,7 @@ def test_many_tasks_make_a_short_report(monkeypatch, odd, undrawn):
     monkeypatch.setattr(analysis.report.build, "MOST_TASKS", 5)
     document = build(Study(odd)).document
     assert {table.id.partition("-")[0] for table in document.tables()} <= {
-        "methods", "main", "other", "contexts", "claims", "exhaustive", "across",
+        "methods", "main", "other", "contexts", "claims", "exhaustive", "across", "tasks",
     }  # fmt: skip
     assert not [figure for figure in document.figures() if figure.id.startswith("signatures")]
     assert "With more than 5 tasks (here 6)" in json.dumps(

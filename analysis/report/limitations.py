@@ -37,8 +37,8 @@ def _reconstructed(study: Study) -> Iterator[str]:
             )
             yield (
                 f"*Reconstructed.* {name}: not printed in the paper but inferred from what is: "
-                f"{_escape(what)}. Rewards on it, and claims that rest on it (marked †), depend on "
-                "that."
+                f"{_escape(what)}. Rewards on it, and claims that rest on it (marked †), depend "
+                "on that."
             )
         chosen = sorted(key for key, entry in task.provenance.items() if entry.status == "chosen")
         if chosen:
