@@ -94,7 +94,7 @@ def check_columns(path: Path, table: pd.DataFrame) -> None:
         if column not in table.columns:
             damaged(path, f"it has no column {column!r}")
     for column in NUMBERS[name]:
-        if len(table) and not is_numeric_dtype(table[column]):
+        if table[column].notna().any() and not is_numeric_dtype(table[column]):
             damaged(path, f"column {column!r} does not hold numbers")
 
 
