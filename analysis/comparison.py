@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.equivalence import MARGIN, difference
+from analysis.inference.equivalence import MARGIN, difference
+from analysis.inference.statistics import CONFIDENCE
 from analysis.methods import methods_notes, methods_tables
 from analysis.published import (
     RUNS,
@@ -23,7 +24,6 @@ from analysis.published import (
     published_initial,
 )
 from analysis.results import CellRuns, Results
-from analysis.statistics import CONFIDENCE
 from analysis.table import NONE, Table, interval, tally
 
 Rewards = Sequence[float] | NDArray[np.float64]

@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.frontier.progress import Progress, progress
 from analysis.methods import methods_frame
 from analysis.optimum import Optimum, optima
-from analysis.progress import Progress, progress
 from analysis.results import CellRuns, Results
 from analysis.signatures import signatures_frame
 from analysis.signatures.cell import Cell, cells_of

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.statistics import Inference
+from analysis.inference.statistics import Inference
 
 NONE = "–"
 

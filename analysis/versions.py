@@ -16,10 +16,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.equivalence import MARGIN, bootstrap_equivalence
-from analysis.methods import solve_times
-from analysis.results import CellRuns, Results, load_results
-from analysis.statistics import (
+from analysis.inference.equivalence import MARGIN, bootstrap_equivalence
+from analysis.inference.statistics import (
     FEWEST,
     bootstrap_test,
     difference_of_means,
@@ -27,6 +25,8 @@ from analysis.statistics import (
     paired_by_seed,
     paired_difference,
 )
+from analysis.methods import solve_times
+from analysis.results import CellRuns, Results, load_results
 from analysis.table import NONE, Table
 from coartic import CoarticError
 
@@ -155,9 +155,9 @@ def cells_frame(first: Results, second: Results) -> pd.DataFrame:
     mean of B less that of A with its 95 % BCa interval (``low``, ``high``), ``paired`` by seed
     where at least three are shared; ``p`` is of the two-sided bootstrap test, ``p_adjusted``
     after Holm over all cells tested. ``verdict`` is ``identical`` (every run), ``equivalent``,
-    ``undecided`` or ``different`` (:class:`analysis.equivalence.Equivalence`, ``margin`` in
-    ticks), ``no interval`` (fewer than three runs) or ``not compared`` (``remarks`` say why).
-    ``SPENT_*`` are medians over runs, time in s.
+    ``undecided`` or ``different`` (:class:`~analysis.inference.equivalence.Equivalence`,
+    ``margin`` in ticks), ``no interval`` (fewer than three runs) or ``not compared``
+    (``remarks`` say why). ``SPENT_*`` are medians over runs, time in s.
     """
     here, there = _cells(first), _cells(second)
     tasks = _differing_tasks(first, second)

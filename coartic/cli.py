@@ -295,19 +295,19 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
-    from analysis.across_tasks import scores_frame
     from analysis.claims import claims_frame, claims_page, judge
-    from analysis.comparisons import comparisons_page
-    from analysis.frontier import (
+    from analysis.frontier.frames import (
         anytime_frame,
         area_frame,
         for_both_arms,
         pareto_frame,
         targets_frame,
     )
-    from analysis.frontier_page import frontier_page
-    from analysis.overall import combined, overall_frame, profiles_frame
-    from analysis.pairwise import pairwise_frame
+    from analysis.frontier.page import frontier_page
+    from analysis.inference.across_tasks import scores_frame
+    from analysis.pairs.overall import combined, overall_frame, profiles_frame
+    from analysis.pairs.page import comparisons_page
+    from analysis.pairs.pairwise import pairwise_frame
     from analysis.results import load_results
     from analysis.signatures.page import signatures_page
     from analysis.study import Study

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis import across_tasks, statistics
-from analysis.overall import profiles_frame
+from analysis.inference import across_tasks, statistics
+from analysis.pairs.overall import profiles_frame
 from tests.test_comparison import fake_results
 
 

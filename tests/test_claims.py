@@ -20,8 +20,8 @@ from analysis.claims import (
     judge,
 )
 from analysis.claims.reach import shortest_reach
+from analysis.inference.statistics import Inference, bootstrap_test, mean
 from analysis.results import Results
-from analysis.statistics import Inference, bootstrap_test, mean
 from analysis.study import Study
 from analysis.table import interval
 from benchmarks.methods import registry

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.equivalence import bootstrap_equivalence, difference, shares
+from analysis.inference.equivalence import bootstrap_equivalence, difference, shares
 from analysis.published import Summary
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import bootstrap
 
-from analysis.frontier import (
+from analysis.frontier.frames import (
     anytime_frame,
     area_frame,
     dominated,
@@ -18,8 +18,8 @@ from analysis.frontier import (
     pareto_frame,
     targets_frame,
 )
-from analysis.frontier_page import areas_tables, frontier_page, pareto_tables, targets_tables
-from analysis.progress import SPENDS, by_trial, progress
+from analysis.frontier.page import areas_tables, frontier_page, pareto_tables, targets_tables
+from analysis.frontier.progress import SPENDS, by_trial, progress
 from analysis.results import Results
 from coartic import load_task
 

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.across_tasks import scores_frame
-from analysis.comparisons import comparisons_page
+from analysis.inference.across_tasks import scores_frame
+from analysis.inference.sample_size import power, runs_needed
 from analysis.optimum import optima
-from analysis.overall import NEAR, combined, everywhere, overall_frame, profiles_frame
-from analysis.pairwise import COLUMNS, pairs, pairwise_frame
+from analysis.pairs.overall import NEAR, combined, everywhere, overall_frame, profiles_frame
+from analysis.pairs.page import comparisons_page
+from analysis.pairs.pairwise import COLUMNS, pairs, pairwise_frame
 from analysis.results import Results
-from analysis.sample_size import power, runs_needed
 from analysis.study import Study
 from benchmarks.methods import registry
 from benchmarks.suites import Cell

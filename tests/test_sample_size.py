@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.sample_size import power, runs_needed, smallest_difference
+from analysis.inference.sample_size import power, runs_needed, smallest_difference
 
 
 @pytest.mark.parametrize(

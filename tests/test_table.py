@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from analysis import statistics
+from analysis.inference import statistics
 from analysis.table import interval, short, tally
 
 

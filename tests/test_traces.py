@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import analysis.report.build
-from analysis import statistics
+from analysis.inference import statistics
 from analysis.report.build import build, write
 from analysis.report.trace import FILE, trace
 from analysis.results import load_results

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.equivalence import MARGIN
+from analysis.inference.equivalence import MARGIN
 from analysis.versions import cells_frame, compare_versions, load_pair
 from benchmarks.methods import registry
 from benchmarks.suites import Cell

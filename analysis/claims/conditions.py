@@ -9,7 +9,7 @@ from scipy import stats
 
 from analysis.claims.data import ONE, TWO, Data
 from analysis.claims.register import Claim, Finding
-from analysis.statistics import (
+from analysis.inference.statistics import (
     Inference,
     bootstrap_test,
     difference_of_means,

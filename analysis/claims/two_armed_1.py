@@ -19,9 +19,9 @@ from analysis.claims.shares import (
     nearly_all,
     not_nearly_all,
 )
+from analysis.inference.statistics import FEWEST, bootstrap_test, mean
 from analysis.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
-from analysis.statistics import FEWEST, bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval, tally
 from coartic.robot import Array

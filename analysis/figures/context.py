@@ -27,8 +27,8 @@ from analysis.figures.style import (
     short,
     styled,
 )
+from analysis.inference.statistics import holm
 from analysis.signatures.frame import CONTEXT
-from analysis.statistics import holm
 from analysis.study import Study
 
 MOST = 6

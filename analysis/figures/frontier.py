@@ -26,10 +26,10 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.frontier import anytime_frame, pareto_frame
+from analysis.frontier.frames import anytime_frame, pareto_frame
+from analysis.frontier.progress import SPENDS
+from analysis.inference.statistics import CONFIDENCE
 from analysis.optimum import METHODS as OPTIMUM
-from analysis.progress import SPENDS
-from analysis.statistics import CONFIDENCE
 from analysis.study import Study
 from coartic import Task
 
@@ -53,7 +53,7 @@ def frontier(
 
     Methods that plan are a point at all that they spend; those that spend nothing of a kind
     stand at the left edge. Raises CoarticError where there is nothing to draw and ValueError
-    for a spend that is not one of :data:`analysis.progress.SPENDS`.
+    for a spend that is not one of :data:`analysis.frontier.progress.SPENDS`.
     """
     unknown = [spend for spend in spends if spend not in SPENDS]
     if unknown:

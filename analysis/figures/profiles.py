@@ -9,11 +9,11 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.across_tasks import by_task, profile, scores_frame
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, missing
 from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, short, styled
-from analysis.statistics import CONFIDENCE
+from analysis.inference.across_tasks import by_task, profile, scores_frame
+from analysis.inference.statistics import CONFIDENCE
 from analysis.study import SEED, Study
 from coartic import CoarticError
 from coartic.robot import Array

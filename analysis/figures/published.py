@@ -11,7 +11,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.equivalence import MARGIN, difference
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, has, known_tasks, missing, solved
 from analysis.figures.style import (
@@ -27,8 +26,9 @@ from analysis.figures.style import (
     short,
     styled,
 )
+from analysis.inference.equivalence import MARGIN, difference
+from analysis.inference.statistics import CONFIDENCE
 from analysis.published import TRIALS, Summary, published_cell
-from analysis.statistics import CONFIDENCE
 from analysis.study import Study
 
 _MARKS = {

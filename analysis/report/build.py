@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.across_tasks import scores_frame
 from analysis.claims import judge
 from analysis.claims.page import FITTED
 from analysis.claims.register import Judged
 from analysis.figures import Figures, Plot, all_figures
 from analysis.figures.plot import save, svg_text
-from analysis.frontier import area_frame, for_both_arms, pareto_frame, targets_frame
-from analysis.overall import combined, overall_frame
-from analysis.pairwise import pairwise_frame
+from analysis.frontier.frames import area_frame, for_both_arms, pareto_frame, targets_frame
+from analysis.inference.across_tasks import scores_frame
+from analysis.pairs.overall import combined, overall_frame
+from analysis.pairs.pairwise import pairwise_frame
 from analysis.report import tables
 from analysis.report.document import (
     Block,

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from analysis.inference.sample_size import POWER, smallest_difference
+from analysis.inference.statistics import FEWEST
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
-from analysis.sample_size import POWER, smallest_difference
-from analysis.statistics import FEWEST
 from analysis.study import Study
 
 

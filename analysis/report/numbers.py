@@ -16,10 +16,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.inference.statistics import (
+    Inference,
+    difference_of_means,
+    mean,
+    probability_of_improvement,
+)
 from analysis.methods import LEARNER, solve_times
 from analysis.published import published_cell, published_initial
 from analysis.results import CellRuns
-from analysis.statistics import Inference, difference_of_means, mean, probability_of_improvement
 from analysis.study import SEED, Study
 
 PREFIX = "coartic"

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.claims.register import Judged, Verdict
+from analysis.inference.statistics import mean
 from analysis.methods import LEARNER
 from analysis.published import published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.statistics import mean
 from analysis.study import SEED, Study
 
 _CONDITION = re.compile(r"dual-process/EC[1-4]")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.statistics import CONFIDENCE
+from analysis.inference.statistics import CONFIDENCE
 
 
 class Interval(NamedTuple):

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from analysis.inference.statistics import CONFIDENCE
 from analysis.signatures.permutation import orders, p_values
-from analysis.statistics import CONFIDENCE
 from coartic import Task
 from coartic.robot import Array
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.statistics import holm
+from analysis.inference.statistics import holm
 from analysis.study import Study
 from analysis.table import NONE, Table
 from coartic import Task

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.inference.statistics import mean
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.slugs import slugs
-from analysis.statistics import mean
 from analysis.study import SEED, Study
 
 

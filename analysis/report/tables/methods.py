@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.methods import methods_notes
-from analysis.overall import NEAR
+from analysis.pairs.overall import NEAR
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
 from analysis.report.text import typographic

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.comparison import published_of
-from analysis.equivalence import MARGIN, difference
+from analysis.inference.equivalence import MARGIN, difference
 from analysis.published import TRIALS, Summary, published_exhaustive, published_initial
 from analysis.report.document import Column, DataTable, Estimate, Row
 from analysis.report.tables.common import counts, marked, mean_of, table, with_interval

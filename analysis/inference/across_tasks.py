@@ -20,9 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from analysis.optimum import optima
-from analysis.results import Results
-from analysis.statistics import (
+from analysis.inference.statistics import (
     CONFIDENCE,
     RESAMPLES,
     Inference,
@@ -31,6 +29,8 @@ from analysis.statistics import (
     middle_mean,
     sample,
 )
+from analysis.optimum import optima
+from analysis.results import Results
 from coartic.initial import initial_hands
 from coartic.robot import Array
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.frontier import LABELS, OTHER_ARMS, TIME_TOLERANCE
+from analysis.frontier.frames import LABELS, OTHER_ARMS, TIME_TOLERANCE
+from analysis.frontier.progress import SPENDS
+from analysis.inference.statistics import CONFIDENCE
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import Optimum, optima
-from analysis.progress import SPENDS
 from analysis.results import Results
-from analysis.statistics import CONFIDENCE
 from analysis.table import NONE, Table, short
 
 SHOWN = ("trials", "forward_kinematics")
@@ -75,7 +75,7 @@ _NOTES = (
 
 
 def targets_tables(frame: pd.DataFrame, spend: str) -> list[tuple[Table, list[str]]]:
-    """:func:`analysis.frontier.targets_frame` over one spend, a table per task and other arm.
+    """:func:`~analysis.frontier.frames.targets_frame` over one spend, a table per task and arm.
 
     A cell is: runs that reached the target of all runs, median spend [95 % interval]; the
     median is greater than the horizon where too few reached it within that. Methods none of
@@ -105,7 +105,7 @@ def targets_tables(frame: pd.DataFrame, spend: str) -> list[tuple[Table, list[st
 
 
 def areas_tables(frame: pd.DataFrame) -> list[Table]:
-    """:func:`analysis.frontier.area_frame` as a table per task and other arm."""
+    """:func:`analysis.frontier.frames.area_frame` as a table per task and other arm."""
     frame = frame[~frame.method.str.startswith(OPTIMUM)]
     tables = []
     for (name, arm), rows in frame.groupby(["task", "other_arm"], sort=False):
@@ -122,7 +122,7 @@ def areas_tables(frame: pd.DataFrame) -> list[Table]:
 
 
 def pareto_tables(frame: pd.DataFrame) -> list[Table]:
-    """The methods on some front of :func:`analysis.frontier.pareto_frame`, a table per task."""
+    """Methods on a front of :func:`~analysis.frontier.frames.pareto_frame`, a table per task."""
     tables = []
     for name, rows in frame.groupby("task", sort=False):
         on_one = rows.told_share > 1 - SURE

@@ -25,12 +25,9 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from analysis.frontier import SHARES
-from analysis.methods import LEARNER, TOLD
-from analysis.optimum import METHODS as OPTIMUM
-from analysis.results import CellRuns
-from analysis.sample_size import runs_needed, smallest_difference
-from analysis.statistics import (
+from analysis.frontier.frames import SHARES
+from analysis.inference.sample_size import runs_needed, smallest_difference
+from analysis.inference.statistics import (
     Inference,
     bootstrap_test,
     cliffs_delta,
@@ -42,6 +39,9 @@ from analysis.statistics import (
     probability_of_improvement,
     sign_flip_test,
 )
+from analysis.methods import LEARNER, TOLD
+from analysis.optimum import METHODS as OPTIMUM
+from analysis.results import CellRuns
 from analysis.study import SEED, Study
 from coartic.exploration import CONDITIONS
 from coartic.robot import Array

@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.frontier import SHARES
-from analysis.overall import NEAR, everywhere
-from analysis.statistics import LEVEL, RESAMPLES, Inference
+from analysis.frontier.frames import SHARES
+from analysis.inference.statistics import LEVEL, RESAMPLES, Inference
+from analysis.pairs.overall import NEAR, everywhere
 from analysis.study import Study
 from analysis.table import NONE, Table, interval, short
 
@@ -20,8 +20,8 @@ _KINDS = {"conditions": 0, "method": 1, "variant": 2}
 def comparisons_page(
     study: Study, pairs: pd.DataFrame, overall: pd.DataFrame, scores: pd.DataFrame
 ) -> str:
-    """Markdown of :func:`analysis.pairwise.pairwise_frame` and
-    :func:`analysis.overall.overall_frame`; ``scores`` is what the latter was made of."""
+    """Markdown of :func:`analysis.pairs.pairwise.pairwise_frame` and
+    :func:`analysis.pairs.overall.overall_frame`; ``scores`` is what the latter was made of."""
     specification = study.results.manifest["specification"]
     parts = [
         "# Methods against each other",

@@ -1,8 +1,8 @@
 """Reward against what it costs: anytime curves, times to a target, Pareto sets.
 
 Spends are trials, control ticks, forward-kinematics evaluations and solve time
-(:data:`analysis.progress.SPENDS`); Pareto sets also count Jacobians and information.
-``steps`` is what :func:`analysis.progress.progress` read, for those who need it more than
+(:data:`analysis.frontier.progress.SPENDS`); Pareto sets also count Jacobians and information.
+``steps`` is what :func:`analysis.frontier.progress.progress` read, for those who need it more than
 once.
 """
 
@@ -17,13 +17,13 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
+from analysis.frontier.progress import SPENDS, Progress, progress
+from analysis.inference.statistics import CONFIDENCE
+from analysis.inference.survival import kaplan_meier_median
 from analysis.methods import STILL, methods_frame, solve_times
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import locks_base, optima
-from analysis.progress import SPENDS, Progress, progress
 from analysis.results import CellRuns, Results
-from analysis.statistics import CONFIDENCE
-from analysis.survival import kaplan_meier_median
 from coartic.robot import Array
 
 SHARES = (0.05, 0.02, 0.01)
@@ -179,7 +179,7 @@ def targets_frame(
     ``target`` (the reward that this takes), ``runs``, ``reached`` (how many runs),
     ``reached_low`` and ``reached_high`` (exact 95 % interval of the probability to reach it,
     Clopper & Pearson, 1934), ``median`` spend to reach it with the interval ``low`` to ``high``
-    (:func:`analysis.survival.kaplan_meier_median`), and ``horizon``.
+    (:func:`analysis.inference.survival.kaplan_meier_median`), and ``horizon``.
 
     The median is over all runs, infinite where half of them did not reach the target; so
     are limits that the runs do not bound. Runs that could have gone on are right-censored,
@@ -187,7 +187,7 @@ def targets_frame(
     would make censoring depend on the outcome: worse trials take more ticks. Lin et al.,
     1997, on costs.) What was reached behind the horizon counts in ``reached`` only. A run
     could have gone on if its budget of trials stopped it (:attr:`Progress.stopped
-    <analysis.progress.Progress.stopped>`). Runs that ended by themselves never reach a
+    <analysis.frontier.progress.Progress.stopped>`). Runs that ended by themselves never reach a
     target that they missed: a planner's, an exhaustive search's that tried all it had, one
     without a solution. The horizon is infinite where all runs ended by themselves. Runs
     whose time is not taken have no part in those over time.

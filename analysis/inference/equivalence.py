@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
-from analysis.published import Summary
-from analysis.statistics import (
+from analysis.inference.statistics import (
     CONFIDENCE,
     FEWEST,
     RESAMPLES,
@@ -29,6 +28,7 @@ from analysis.statistics import (
     standard_error,
     studentised_null,
 )
+from analysis.published import Summary
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -141,9 +141,9 @@ def bootstrap_equivalence(
 def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:
     """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
 
-    Newcombe's interval (:func:`analysis.statistics.difference_of_shares`). ``p`` is half the
-    error rate at which the interval just touches the margin, 1 where the shares themselves
-    differ by the margin or more.
+    Newcombe's interval (:func:`~analysis.inference.statistics.difference_of_shares`). ``p`` is
+    half the error rate at which the interval just touches the margin, 1 where the shares
+    themselves differ by the margin or more.
     """
     margin = _positive(margin)
     found = difference_of_shares(first, second)

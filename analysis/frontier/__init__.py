@@ -1,0 +1,1 @@
+"""Reward against what it costs: anytime curves, targets, Pareto sets."""

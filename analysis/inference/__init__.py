@@ -1,0 +1,1 @@
+"""Statistics: estimates, tests, equivalence, sizes of samples, several tasks together."""
