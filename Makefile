@@ -11,7 +11,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := paper comparison $(if $(FULL),optimum locus)
 
-.PHONY: benchmark test check format speed setup clean
+.PHONY: benchmark test check format speed example setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -35,6 +35,10 @@ format: $(READY)
 
 speed: $(READY)
 	$(BIN)/python -m benchmarks.speed
+
+example: $(READY)  # the report in the repository, of what make benchmark left
+	$(BIN)/coartic report $(OUT)/comparison --out benchmarks/example
+	rm -f benchmarks/example/figures/*.pdf benchmarks/example/figures/*.png benchmarks/example/figures/*.csv
 
 setup: $(READY)
 
