@@ -226,11 +226,12 @@ def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Sectio
         where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
         ours = _FIGURES.get(claim.figure)
         see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
+        quote = f": “{_escape(claim.quote)}”" if claim.quote else ""
         mark = " †" if claim.fitted else ""
         lines = [
             f"{_escape(claim.statement)} *{entry.verdict}{mark}*.",
             f"Seen: {_escape(entry.evidence)}.",
-            f"Test: {_escape(claim.test)}. Place: {where}.{see}",
+            f"Test: {_escape(claim.test)}. Place: {where}{quote}.{see}",
         ]
         content: list[Block] = [Prose(tuple(lines))]
         if entry.table is not None:

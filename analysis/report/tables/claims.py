@@ -21,6 +21,7 @@ def claims_table(study: Study, judged: Sequence[Judged]) -> DataTable | None:
                 entry.claim.statement,
                 entry.verdict + (" †" if entry.claim.fitted else ""),
                 finite(entry.adjusted_p),
+                finite(entry.adjusted_contrary_p),
                 ", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
             ),
             tuple(dict.fromkeys(by_run[run] for run in entry.run_ids)),
@@ -35,7 +36,13 @@ def claims_table(study: Study, judged: Sequence[Judged]) -> DataTable | None:
             Column("statement", "statement", printed=False),
             Column("verdict", "verdict"),
             Column("adjusted_p", "adjusted p", "p", digits=4),
+            Column("adjusted_contrary_p", "of the contrary", "p", digits=4),
             Column("place", "place in the paper", printed=False),
         ),
         rows,
+        (
+            "Supported: what the claim says is seen, and its p (the largest of its tests) is "
+            "below 5 % after Holm's correction over the claims; not supported: the contrary's is, or "
+            "what can be counted is not there. No p: counted, or nothing to test.",
+        ),
     )
