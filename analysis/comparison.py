@@ -174,8 +174,9 @@ def _notes(results: Results) -> list[str]:
         "the published reward, different where it lies outside, undecided otherwise; the "
         "verdict shows the margin in ticks and as a share of what learning gained in the paper. "
         "Rewards are not normally distributed, as the paper says of its own, so the intervals "
-        "are approximate, most of all where runs settle on several hand sequences; a mean over "
-        "those gets no verdict. Intervals are for each row alone, not adjusted for their number.",
+        "are approximate, most of all where runs settle on several hand sequences; the table by "
+        "hand sequence says more of those. Intervals are for each row alone, not adjusted for "
+        "their number.",
     ]
     if any(_starred(cell) for cell in results.cells):
         notes.append("\\* derived from other printed numbers, not printed itself.")
@@ -270,12 +271,8 @@ def _difference_text(rewards: Rewards, published: Summary | None) -> str:
 
 
 def _verdict(task: str, rewards: Rewards, published: Summary | None) -> str:
-    """The verdict, with the margin in ticks and as a share of the published learning.
-
-    None for a mean over hand sequences that the paper reports apart: its distribution
-    has several peaks, and the table by hand sequence says more.
-    """
-    if published is None or published.derived or len(rewards) == 0:
+    """The verdict, with the margin in ticks and as a share of the published learning."""
+    if published is None or len(rewards) == 0:
         return NONE
     found, initial = difference(rewards, published), published_initial(task)
     margin = f"±{found.margin:.1f}"

@@ -48,7 +48,10 @@ def clean(study):  # noqa: F811
 
 def test_a_clean_folder(clean):
     found = said(clean)
-    assert list(found) == ["Failures", "Trials", "Number of runs", "One seed", "Times", "Model"]
+    assert list(found) == [
+        "Learned reward", "Failures", "Trials", "Number of runs", "One seed", "Times", "Model",
+        "One posture",
+    ]  # fmt: skip
     assert found["Failures"].endswith(f"None: all {len(clean.results.runs)} runs have a solution, "
                                       "executed and scored.")  # fmt: skip
     assert "run once" in found["One seed"]
@@ -85,7 +88,28 @@ def test_failed_trials(clean):
     rows = clean.cells["ascending", "dual-process/EC1"].runs.index
     assert "Failed trials" not in said(changed(clean, "failed_trials", {rows[0]: 5}))
     text = said(changed(clean, "failed_trials", {rows[0]: 6}))["Failed trials"]
-    assert "6 of 600 trials (1 %)" in text
+    assert "ascending, `dual-process/EC1` 6 of 600 (1 %)" in text
+
+
+def test_learned_reward_beside_its_replay(clean):
+    runs = clean.cells["ascending", "dual-process/EC1"].good
+    text = said(clean)["Learned reward"]
+    learned, replayed = (f"{column.mean():.1f}" for column in (runs.reward, runs.replay_reward))
+    assert f"ascending EC1 {learned} ({replayed})".replace("-", "−") in text
+    assert runs.replay_reward.mean() <= runs.reward.mean()
+    missing = changed(clean, "replay_reward", {runs.index[0]: None})
+    assert "Learned reward" not in said(missing)
+
+
+def test_what_is_not_as_printed(clean):
+    """-303 is printed: runs that get -319 and less differ, runs that get -303 do not."""
+    rows = clean.cells["ascending", "dual-process/EC1"].runs.index
+    trials = changed(clean, "trials", dict.fromkeys(rows, 10_000))
+    poor = changed(trials, "reward", {row: -319 - k for k, row in enumerate(rows)})
+    assert "ascending EC1: learned reward −320.5, published −303.0" in said(poor)["Not reproduced"]
+    good = changed(trials, "reward", {row: -303 + k % 2 for k, row in enumerate(rows)})
+    assert "Not reproduced" not in said(good)
+    assert "Not reproduced" not in said(changed(poor, "trials", dict.fromkeys(rows, 150)))
 
 
 def test_mixed_versions(clean):

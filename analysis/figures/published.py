@@ -83,7 +83,7 @@ def published(
             "squares: it crosses it (undecided); diamonds: outside (different); crosses: no "
             "verdict. ↳: runs with one hand sequence, number of our runs of all our runs in "
             "brackets, then the published one; means pooled from several printed sequences are "
-            "marked * and have no verdict."
+            "marked *."
             f"{dagger(shown.values())}"
         ),
         alt=f"Differences of mean reward to the published ones, with intervals. {words}.",
@@ -134,7 +134,7 @@ def _row(
     if not len(rewards):
         return row | dict.fromkeys(("difference", "low", "high"), math.nan) | {"verdict": ""}
     found = difference(rewards, paper)
-    verdict = "" if math.isnan(found.low) or paper.derived else found.verdict
+    verdict = "" if math.isnan(found.low) else found.verdict
     return row | {
         "difference": found.estimate,
         "low": found.low,

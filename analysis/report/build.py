@@ -34,7 +34,7 @@ from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
-from analysis.report.summary import tasks_table, verdicts, without_variants
+from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import write_report
 from analysis.results import Results
@@ -161,7 +161,12 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
         )
     )
     blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study))]
-    blocks.append(verdicts(judged, CLAIMS))
+    unlike = unlike_printed(study)
+    counted = verdicts(judged, CLAIMS)
+    if unlike:
+        note = f"Not as printed: {'; '.join(unlike)} ([table](#published-and-ours))."
+        counted = Bullets((*counted.items, note))
+    blocks.append(counted)
     overall = tables.overall_table(study, overall_frame(scores), scores)
     if overall is not None:
         blocks += _tables(*without_variants(overall))

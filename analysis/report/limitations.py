@@ -10,13 +10,17 @@ from analysis.inference.sample_size import POWER, smallest_difference
 from analysis.inference.statistics import FEWEST
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
+from analysis.report.summary import unlike_printed
+from analysis.report.text import typographic
 from analysis.study import Study
 
 
 def limitations(study: Study) -> tuple[str, ...]:
     """One limitation an item, in the report's inline markup, the gravest first."""
     return (
+        *_unlike(study),
         *_reconstructed(study),
+        *_learned(study),
         *_failures(study),
         *_versions(study),
         *_numbers_of_runs(study),
@@ -24,6 +28,31 @@ def limitations(study: Study) -> tuple[str, ...]:
         *_timing(study),
         *_model(study),
     )
+
+
+def _unlike(study: Study) -> Iterator[str]:
+    found = unlike_printed(study)
+    if found:
+        yield f"*Not reproduced.* {'; '.join(found)}."
+
+
+def _learned(study: Study) -> Iterator[str]:
+    """What a learned reward is, beside what a learner would do without its noise."""
+    parts = []
+    for (task, label), cell in study.cells.items():
+        replays = cell.good.replay_reward.dropna()
+        if label.startswith(LEARNER) and not cell.variant and len(replays) == len(cell.good) > 0:
+            parts.append(
+                f"{task} {label.removeprefix(LEARNER)} {_number(float(cell.good.reward.mean()))} "
+                f"({_number(float(replays.mean()))})"
+            )
+    if parts:
+        yield (
+            "*Learned reward.* The best of a run's trials, exploration noise and chance of hands "
+            "included: how we read the paper (docs/model.md). One noiseless trial with what is "
+            f"kept gets, in brackets: {'; '.join(parts)}. Both depend on the noise and ε of the "
+            "paper's conditions."
+        )
 
 
 def _reconstructed(study: Study) -> Iterator[str]:
@@ -63,13 +92,18 @@ def _failures(study: Study) -> Iterator[str]:
             f"({_escape(str(own.reason.iloc[0]))}{others}): {cells}. Means are over runs that "
             "have a solution."
         )
+    parts = []
     for (task, label), cell in study.cells.items():
         lost, made = int(cell.runs.failed_trials.sum()), int(cell.runs.trials.sum())
         if lost and lost >= 0.01 * made:
-            yield (
-                f"*Failed trials.* {task}, `{_code(label)}`: {lost} of {made} trials "
-                f"({_percent(lost / made)}) did not hit every goal and taught nothing."
+            digits = 1 if 0.995 <= lost / made < 1 else 0
+            parts.append(
+                f"{task}, `{_code(label)}` {lost} of {made} ({_percent(lost / made, digits)})"
             )
+    if parts:
+        yield (
+            f"*Failed trials.* They did not hit every goal and taught nothing: {'; '.join(parts)}."
+        )
 
 
 def _versions(study: Study) -> Iterator[str]:
@@ -192,11 +226,16 @@ def _model(study: Study) -> Iterator[str]:
         "*Model.* A kinematic robot: no masses, no noise of sensors or muscles, one tick per "
         "control step of constant length in joint space. What is said of movements is said of it."
     )
+    yield "*One posture.* Every task starts from one posture, the same in every run."
     if any(len(task.hands) > 1 for task in study.results.tasks.values()):
         yield (
             "*Arms.* No collisions, of the arms with each other or with anything else, are "
             "modelled; the paper mentions none."
         )
+
+
+def _number(value: float) -> str:
+    return typographic(f"{value:.1f}")
 
 
 def _percent(share: float, digits: int = 0) -> str:

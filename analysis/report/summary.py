@@ -11,10 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.claims.register import Judged, Verdict
+from analysis.comparison import published_of
+from analysis.inference.equivalence import difference
 from analysis.inference.statistics import mean
 from analysis.methods import LEARNER
-from analysis.published import published_cell
+from analysis.published import TRIALS, published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
+from analysis.report.text import typographic
 from analysis.study import SEED, Study
 
 _CONDITION = re.compile(r"dual-process/EC[1-4]")
@@ -81,6 +84,8 @@ def tasks_table(study: Study) -> DataTable | None:
         tuple(rows),
         (
             "Rewards are means over runs, −1 for every control tick: the nearer 0, the better. "
+            "Learned: the best of a run's trials, exploration noise included (a noiseless "
+            "replay of what is kept gets a little less, see Limitations). "
             "Initial: the corrective process alone. Published: mean ± SD of the same condition. "
             "Optimum: with all joints free. Gap: from the learned reward to it, as a share of it.",
         ),
@@ -107,10 +112,31 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
         found = Counter(entry.verdict for entry in entries)
         counts = ", ".join(f"{found[verdict]} {verdict}" for verdict in _VERDICTS)
         items.append(f"[{len(entries)} claims of the paper](#{claims}), {name}: {counts}.")
+    refuted = [entry for entry in paper if entry.verdict == "not supported"]
+    if refuted:
+        names = ", ".join(f"[{e.claim.id}](#claim-{e.claim.id})" for e in refuted)
+        items.append(f"Not supported here: {names}.")
     beyond = len(judged) - len(paper)
     if beyond:
         items.append(f"[{beyond} comparisons](#{claims}) that the paper does not make: measured.")
     return Bullets(tuple(items))
+
+
+def unlike_printed(study: Study) -> list[str]:
+    """The paper's cells whose learned reward differs from the printed one, in words."""
+    found = []
+    for cell in study.results.cells:
+        paper, rewards = published_of(cell), cell.good.reward.to_numpy(dtype=np.float64)
+        if paper is None or paper.summary is None or not len(rewards):
+            continue
+        apart = difference(rewards, paper.summary)
+        if (cell.good.trials == TRIALS).all() and apart.verdict == "different":
+            found.append(
+                f"{cell.task} {cell.label.removeprefix(LEARNER)}: learned reward "
+                f"{typographic(f'{rewards.mean():.1f}')}, published "
+                f"{typographic(f'{paper.summary.mean:.1f}')}"
+            )
+    return found
 
 
 def without_variants(table: DataTable) -> tuple[DataTable, DataTable | None]:
