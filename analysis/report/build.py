@@ -35,6 +35,7 @@ from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
+from analysis.report.text import escaped
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import write_report
 from analysis.results import Results
@@ -231,12 +232,12 @@ def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Sectio
         where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
         ours = _FIGURES.get(claim.figure)
         see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
-        quote = f": “{_escape(claim.quote)}”" if claim.quote else ""
+        quote = f": “{escaped(claim.quote)}”" if claim.quote else ""
         mark = " †" if claim.fitted else ""
         lines = [
-            f"{_escape(claim.statement)} *{entry.verdict}{mark}*.",
-            f"Seen: {_escape(entry.evidence)}.",
-            f"Test: {_escape(claim.test)}. Place: {where}{quote}.{see}",
+            f"{escaped(claim.statement)} *{entry.verdict}{mark}*.",
+            f"Seen: {escaped(entry.evidence)}.",
+            f"Test: {escaped(claim.test)}. Place: {where}{quote}.{see}",
         ]
         content: list[Block] = [Prose(tuple(lines))]
         if entry.table is not None:
@@ -255,7 +256,7 @@ def _evidence(study: Study, table: Table, claim: str) -> DataTable:
         rows.append(Row(f"{place}: {texts[0]}", tuple(texts), cells))
     columns = tuple(Column(f"column_{k}", head) for k, head in enumerate(table.columns, 1))
     return DataTable(
-        f"evidence-{claim}", _escape(f"{table.title} ({claim})."), columns, tuple(rows)
+        f"evidence-{claim}", escaped(f"{table.title} ({claim})."), columns, tuple(rows)
     )
 
 
@@ -263,7 +264,8 @@ def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section
     count = sum(1 for number in numbers for _ in number.companions())
     example = next((n.macro for n in numbers if n.cells), f"{PREFIX}...")
     items = [
-        "Every number of a table leads to its runs (last column); every table is in `tables/` as "
+        "Every row of a table leads to its runs: by the last column of `report.html`, and by "
+        "`tables/runs.csv`. Every table is in `tables/` as "
         "CSV and LaTeX, every figure in `figures/` as PDF, SVG, PNG and CSV (the data behind it).",
         f"`numbers.tex` has {count} macros, such as `\\{example}`.",
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
@@ -271,7 +273,7 @@ def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section
         "performs a run again; `coartic cite` prints what to cite.",
         *map(_escape, macro_names(study).renamed()),
         *(
-            f"No figure {_escape(name)}: {_escape(why.removeprefix(f'{study.results.folder}: '))}."
+            f"No figure {escaped(name)}: {escaped(why.removeprefix(f'{study.results.folder}: '))}."
             for name, why in figures.skipped.items()
         ),
         *([_few(study)] if _many(study) else []),
@@ -306,10 +308,4 @@ def _folded(table: DataTable | None) -> DataTable | None:
 
 
 def _figure(plot: Plot) -> FigureBlock:
-    return FigureBlock(plot.id, plot.title, _escape(plot.caption), plot.alt, svg_text(plot))
-
-
-def _escape(text: str) -> str:
-    for mark in "\\*`[":
-        text = text.replace(mark, "\\" + mark)
-    return text
+    return FigureBlock(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot))

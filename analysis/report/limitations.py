@@ -11,7 +11,7 @@ from analysis.inference.statistics import FEWEST
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
 from analysis.report.summary import unlike_printed
-from analysis.report.text import typographic
+from analysis.report.text import escaped, typographic
 from analysis.study import Study
 
 
@@ -66,7 +66,7 @@ def _reconstructed(study: Study) -> Iterator[str]:
             )
             yield (
                 f"*Reconstructed.* {name}: not printed in the paper but inferred from what is: "
-                f"{_escape(what)}. Rewards on it, and claims that rest on it (marked †), depend "
+                f"{escaped(what)}. Rewards on it, and claims that rest on it (marked †), depend "
                 "on that."
             )
         chosen = sorted(key for key, entry in task.provenance.items() if entry.status == "chosen")
@@ -89,7 +89,7 @@ def _failures(study: Study) -> Iterator[str]:
         others = ", and other reasons" if own.reason.nunique() > 1 else ""
         yield (
             f"*Failures.* {task}: {len(own)} runs are {status} "
-            f"({_escape(str(own.reason.iloc[0]))}{others}): {cells}. Means are over runs that "
+            f"({escaped(str(own.reason.iloc[0]))}{others}): {cells}. Means are over runs that "
             "have a solution."
         )
     parts = []
@@ -240,12 +240,6 @@ def _number(value: float) -> str:
 
 def _percent(share: float, digits: int = 0) -> str:
     return f"{100 * share:.{digits}f} %"
-
-
-def _escape(text: str) -> str:
-    for mark in "\\*`[":
-        text = text.replace(mark, "\\" + mark)
-    return text
 
 
 def _code(text: str) -> str:

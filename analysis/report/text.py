@@ -53,6 +53,13 @@ def inline(text: str) -> list[Span]:
     return [*spans, Span("text", plain)] if plain else spans
 
 
+def escaped(text: str) -> str:
+    """Plain text as inline markup that shows it as it is."""
+    for mark in "\\*`[":
+        text = text.replace(mark, "\\" + mark)
+    return text
+
+
 @dataclass(frozen=True)
 class Part:
     """A column as it is shown: values, their SDs or their intervals."""
