@@ -271,7 +271,7 @@ def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "
         "performs a run again; `coartic cite` prints what to cite.",
-        *map(_escape, macro_names(study).renamed()),
+        *map(escaped, macro_names(study).renamed()),
         *(
             f"No figure {escaped(name)}: {escaped(why.removeprefix(f'{study.results.folder}: '))}."
             for name, why in figures.skipped.items()
