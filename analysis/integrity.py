@@ -85,10 +85,10 @@ def check_manifest(path: Path, manifest: Any) -> None:
     for cell in specification["cells"]:
         if not isinstance(cell, dict) or not {"task", "method", "variant"} <= set(cell):
             damaged(path, "a cell of its specification lacks task, method or variant")
-        for kind in ("task", "method"):
-            if cell[kind] not in specification[f"{kind}s"]:
+        for what in ("task", "method"):
+            if cell[what] not in specification[f"{what}s"]:
                 damaged(
-                    path, f"its specification has no {kind} {cell[kind]!r}, which a cell names"
+                    path, f"its specification has no {what} {cell[what]!r}, which a cell names"
                 )
     for name, method in specification["methods"].items():
         for key in DECLARED:
