@@ -1,4 +1,4 @@
-"""What to cite: the software, the paper, and the works behind methods and analysis."""
+"""What to cite: the software, the paper, and the works behind methods, solvers and analysis."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
+from typing import Any
 
 from coartic import CoarticError, __version__
 
@@ -39,6 +40,13 @@ METHODS: dict[str, tuple[str, ...]] = {
     "optimum/branch-and-bound": ("mccormick1976", "goulart2024"),
 }
 """Keys of ``references.bib`` by the beginning of a built-in method's id; the longest counts."""
+_NONLINEAR = ("wachter2006", "andersson2019")  # baselines/trajectory_problem.py
+SOLVERS: dict[str, tuple[str, ...]] = {
+    "nullspace-qp/": ("diamond2016", "arnstrom2022"),  # by default
+    "trajectory-optimisation/": _NONLINEAR,
+    "optimum/": _NONLINEAR,
+}
+"""Keys of the works behind what poses and solves a method's programmes, beside the above."""
 ANALYSIS: tuple[str, ...] = (
     *("efron1993", "davison1997", "cliff1993", "agarwal2021", "newcombe2006", "holm1979"),
     *("chung2013", "schuirmann1987", "dolan2002", "kaplan1958", "brookmeyer1982"),
@@ -124,8 +132,16 @@ def references() -> dict[str, Reference]:
     return parse(file.read_text(encoding="utf-8"), "references.bib")
 
 
-def software() -> Reference:
-    """This software in its present version; the facts are CITATION.cff's."""
+def software(environment: Mapping[str, Any] | None = None) -> Reference:
+    """This software; the facts are CITATION.cff's.
+
+    Version and commit are those of a manifest's ``environment``; without one, of this version.
+    """
+    environment = environment or {}
+    note = f"Version {environment.get('coartic') or __version__}"
+    commit = environment.get("commit")
+    if commit:
+        note += f", commit {commit['id']}{' with changes' * commit['dirty']}"
     return Reference(
         "coartic",
         "misc",
@@ -135,23 +151,38 @@ def software() -> Reference:
             "acquisition",
             "year": "2026",
             "howpublished": "Computer software",
-            "note": f"Version {__version__}",
+            "note": note,
         },
     )
 
 
 def keys_of(method: str) -> tuple[str, ...] | None:
     """Keys of a built-in method, first the most telling; None for one that has no row."""
-    prefixes = [prefix for prefix in METHODS if method.startswith(prefix)]
-    return METHODS[max(prefixes, key=len)] if prefixes else None
+    return _longest(METHODS, method)
 
 
-def bibliography(methods: list[MethodSource], *, analysis: bool = False) -> str:
+def solver_keys_of(method: str) -> tuple[str, ...]:
+    """Keys of the works behind the solvers of a built-in method."""
+    return _longest(SOLVERS, method) or ()
+
+
+def _longest(rows: Mapping[str, tuple[str, ...]], method: str) -> tuple[str, ...] | None:
+    prefixes = [prefix for prefix in rows if method.startswith(prefix)]
+    return rows[max(prefixes, key=len)] if prefixes else None
+
+
+def bibliography(
+    methods: list[MethodSource],
+    *,
+    analysis: bool = False,
+    environment: Mapping[str, Any] | None = None,
+) -> str:
     """BibTeX for the software, the paper and the methods, each work once.
 
     A comment before an entry names the methods that rest on it. Of methods of others there is
     no more than the citation that they declare: it is printed as a comment and as the note of
     a ``@misc``. With ``analysis`` the works behind statistics and signatures follow.
+    ``environment`` is a manifest's, for :func:`software`.
     """
     known = references()
     reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
@@ -160,12 +191,13 @@ def bibliography(methods: list[MethodSource], *, analysis: bool = False) -> str:
         keys = keys_of(method.id) if method.built_in else None
         if keys is None:
             others.append(_other(method))
-        for key in keys or ():
+            continue
+        for key in (*keys, *solver_keys_of(method.id)):
             reasons.setdefault(key, []).append(method.id)
     if analysis:
         for key in ANALYSIS:
             reasons.setdefault(key, []).append("the analysis")
-    known["coartic"] = software()
+    known["coartic"] = software(environment)
     entries = [
         f"% {', '.join(reason)}\n{known[key].to_bibtex()}" for key, reason in reasons.items()
     ]

@@ -31,6 +31,8 @@ SPECIFICATION: dict[str, type] = {
     "run_ids": list,
 }
 """What the specification of a manifest holds."""
+DECLARED = ("title", "citation", "origin", "code")
+"""Texts that the specification declares of every method."""
 _TEXT = (
     "run_id suite task method variant status reason hands replay_hands initial_hands told "
     "parameters commit code packages"
@@ -83,8 +85,15 @@ def check_manifest(path: Path, manifest: Any) -> None:
     for cell in specification["cells"]:
         if not isinstance(cell, dict) or not {"task", "method", "variant"} <= set(cell):
             damaged(path, "a cell of its specification lacks task, method or variant")
-        if cell["task"] not in specification["tasks"]:
-            damaged(path, f"its specification has no task {cell['task']!r}, which a cell names")
+        for what in ("task", "method"):
+            if cell[what] not in specification[f"{what}s"]:
+                damaged(
+                    path, f"its specification has no {what} {cell[what]!r}, which a cell names"
+                )
+    for name, method in specification["methods"].items():
+        for key in DECLARED:
+            if not isinstance(method, dict) or not isinstance(method.get(key), str):
+                damaged(path, f"its method {name!r} has no {key!r} that is a str")
 
 
 def check_columns(path: Path, table: pd.DataFrame) -> None:
@@ -99,20 +108,33 @@ def check_columns(path: Path, table: pd.DataFrame) -> None:
             damaged(path, f"column {column!r} does not hold numbers")
 
 
-def check_runs(path: Path, runs: pd.DataFrame, planned: list[str]) -> None:
-    """Every run of the plan has one row, and no other has any."""
+def check_runs(
+    path: Path, runs: pd.DataFrame, planned: list[str], code: Mapping[str, str]
+) -> None:
+    """Every run of the plan has one row, no other has any, and all of a method are of its code.
+
+    ``code`` is what the manifest declares, by method.
+    """
     twice = runs.run_id[runs.run_id.duplicated()]
     if len(twice):
         damaged(path, f"it holds {len(twice)} rows twice, run {twice.iloc[0]} among them")
-    known = set(planned)
-    lost = [run_id for run_id in planned if run_id not in set(runs.run_id)]
+    known, there = set(planned), set(runs.run_id)
+    lost = [run_id for run_id in planned if run_id not in there]
     if lost:
         damaged(path, f"it lacks {len(lost)} of {len(known)} planned runs, {lost[0]} among them")
     foreign = runs.run_id[~runs.run_id.isin(known)]
     if len(foreign):
         damaged(path, f"it holds {len(foreign)} runs that were not planned, {foreign.iloc[0]}")
-    if runs.reward[runs.status == "ok"].isna().any():
-        damaged(path, "a run with a solution has no reward")
+    for column in ("reward", "hands"):
+        if runs.loc[runs.status == "ok", column].isna().any():
+            damaged(path, f"a run with a solution has no {column}")
+    own = runs.code.eq(runs.method.map(code)).fillna(False)
+    if not own.all():
+        damaged(
+            path,
+            f"{int((~own).sum())} rows are of other code than manifest.json declares for their "
+            f"methods, run {runs.run_id[~own].iloc[0]} the first of them",
+        )
 
 
 def check_sequences(path: Path, sequences: pd.DataFrame, tasks: Mapping[str, Task]) -> None:
@@ -130,7 +152,10 @@ def check_sequences(path: Path, sequences: pd.DataFrame, tasks: Mapping[str, Tas
 def check_solutions(
     path: Path, solutions: pd.DataFrame, runs: pd.DataFrame, tasks: Mapping[str, Task]
 ) -> None:
-    """Every solved run has the movements whose ticks are its reward, on all joints."""
+    """Every solved run, and no other, has movements, on all joints.
+
+    Their ticks add up to its reward, and each is made with the hand of its goal.
+    """
     solved = runs[runs.status == "ok"]
     lost = solved.run_id[~solved.run_id.isin(solutions.run_id)]
     if len(lost):
@@ -145,6 +170,21 @@ def check_solutions(
             path,
             f"the movements of {int(short.sum())} runs, {solved.run_id[short].iloc[0]} the first "
             "of them, do not add up to their reward",
+        )
+    if solutions[["goal", "hand"]].isna().any(axis=None):
+        damaged(path, "a movement has no goal or no hand")
+    hands = dict(zip(solved.run_id, solved.hands, strict=True))
+    rows = zip(solutions.run_id, solutions.goal.astype(int), solutions.hand, strict=True)
+    strange = [
+        run_id
+        for run_id, goal, hand in rows
+        if hands.get(run_id, "")[goal - 1 : goal].lower() != hand[:1]
+    ]
+    if strange:
+        damaged(
+            path,
+            f"{len(strange)} movements, of run {strange[0]} first, are not made with the hands "
+            "of a solved run",
         )
 
 

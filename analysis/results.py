@@ -80,7 +80,7 @@ class Results:
     def solutions(self) -> pd.DataFrame:
         """Movements of every run's solution.
 
-        Raises CoarticError where they cannot be read, or are not all that the runs made.
+        Raises CoarticError where they cannot be read, or are not what the runs made.
         """
         path, table = read_table(self.folder, "solutions", nullable=False)
         check_solutions(path, table, self.runs, self.tasks)
@@ -100,11 +100,17 @@ class Results:
 
 
 def load_results(folder: Path) -> Results:
-    """Read a results folder.
+    """Read a results folder. Every command that reads one passes here.
 
     Raises CoarticError where it is not one, is not finished, or is damaged: where its runs are
-    not those of its plan, say.
+    not those of its plan and code, say, or their movements do not add up to their reward.
     """
+    if not folder.exists():
+        raise CoarticError(
+            f"{folder} does not exist; name a folder that `coartic run` has written"
+        )
+    if not folder.is_dir():
+        raise CoarticError(f"{folder} is a file, not a results folder")
     source = folder / "manifest.json"
     try:
         manifest = json.loads(source.read_text(encoding="utf-8"))
@@ -120,8 +126,11 @@ def load_results(folder: Path) -> Results:
     check_manifest(source, manifest)
     (path, runs), (other, sequences) = (read_table(folder, name) for name in ("runs", "sequences"))
     results = Results(folder, manifest, runs, sequences)
-    check_runs(path, runs, manifest["specification"]["run_ids"])
+    specification = manifest["specification"]
+    code = {name: method["code"] for name, method in specification["methods"].items()}
+    check_runs(path, runs, specification["run_ids"], code)
     check_sequences(other, sequences, results.tasks)
+    results.solutions()  # for its checks
     return results
 
 

@@ -121,16 +121,13 @@ def load_pair(first: Path, second: Path) -> tuple[Results, Results]:
     """Two results folders that can be compared.
 
     Raises CoarticError for one folder given twice, and for one that is no results folder,
-    is damaged, has another format, or has tables that are not those of its plan and code.
+    is damaged or has another format (:func:`~analysis.results.load_results`).
     """
     if first.exists() and second.exists() and first.samefile(second):
         raise CoarticError(
             f"{first} and {second} are one folder: name two, such as results/old results/new"
         )
-    pair = load_results(first), load_results(second)
-    for results in pair:
-        _check_code(results)
-    return pair
+    return load_results(first), load_results(second)
 
 
 def compare_versions(first: Results, second: Results) -> VersionComparison:
@@ -320,17 +317,6 @@ def _codes(results: Results) -> dict[str, str]:
     return {name: str(method["code"]) for name, method in methods.items()}
 
 
-def _check_code(results: Results) -> None:
-    """The runs of a method are all of the code of the plan. Raises CoarticError."""
-    strangers = results.runs.code != results.runs.method.map(_codes(results))
-    if strangers.any():
-        raise CoarticError(
-            f"{results.folder}: runs.parquet does not hold the runs of manifest.json's "
-            f"code ({int(strangers.sum())} rows were made by other code); run the same "
-            "`coartic run` again to make the tables anew"
-        )
-
-
 def _surroundings(first: Results, second: Results) -> tuple[Table, list[str]]:
     """What was asked for and where it was run: a table of what differs, and what does not."""
     a, b = _facts(first), _facts(second)
@@ -367,6 +353,7 @@ def _facts(results: Results) -> dict[str, str]:
         "trial budget": limits.get("trials"),
         "rows of runs.parquet": len(results.runs),
         "coartic": environment.get("coartic"),
+        "code of the model": environment.get("model_code"),
         "commit": commit and commit["id"][:12] + "+" * commit["dirty"],
         "commits of the runs": _list(
             text[:12] + "+" * text.endswith("+") for text in results.runs.commit.dropna()
@@ -413,6 +400,9 @@ def _notes(first: Results, second: Results) -> list[str]:
         "compare code only where processor and load were the same.",
         "Cells with a run that has no solution are not compared: a mean of the others would "
         "flatter whichever side failed on the harder runs.",
+        "Tables are read here and checked against each other and the manifest, not against "
+        "the records that they were made from. `coartic show RUN_ID` checks that a record is "
+        "whole, `coartic reproduce RUN_ID` that its run comes out so again.",
     ]
     for side, results in zip("AB", (first, second), strict=True):
         planned = set(results.manifest["specification"]["run_ids"])

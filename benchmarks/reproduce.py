@@ -121,5 +121,8 @@ def _first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
 
 def _safe(prefix: str) -> str:
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
-        raise RecordError(f"{prefix!r} is no run id: hexadecimal digits with one '-'")
+        raise RecordError(
+            f"{prefix!r} is no run id: hexadecimal digits with one '-', of which the beginning "
+            "is enough"
+        )
     return prefix

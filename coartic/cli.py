@@ -589,15 +589,17 @@ def cite(
 
     if style != "bibtex":
         raise CoarticError(f"--format {style}: the one format is bibtex")
+    environment = None
     if folder is None:
         methods = [MethodSource(item.name, item.title, item.citation, True) for item in BUILT_IN]
     else:
-        declared = load_results(folder).manifest["specification"]["methods"]
+        manifest = load_results(folder).manifest
+        environment = manifest["environment"]
         methods = [
             MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN_ORIGIN)
-            for name, item in declared.items()
+            for name, item in manifest["specification"]["methods"].items()
         ]
-    print(bibliography(methods, analysis=analysis), end="")
+    print(bibliography(methods, analysis=analysis, environment=environment), end="")
 
 
 def _console() -> Console:

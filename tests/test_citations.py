@@ -1,5 +1,7 @@
 """The bibliography: whole, well-formed, and what the methods say of themselves."""
 
+import inspect
+import json
 import re
 import unicodedata
 from pathlib import Path
@@ -10,12 +12,14 @@ from analysis.citations import (
     ANALYSIS,
     METHODS,
     PAPER,
+    SOLVERS,
     MethodSource,
     bibliography,
     keys_of,
     parse,
     references,
     software,
+    solver_keys_of,
 )
 from benchmarks.methods import BUILT_IN, registry
 from benchmarks.suites import Cell
@@ -64,26 +68,43 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
 
 
 def test_every_row_and_every_entry_is_used():
-    used = set(ANALYSIS).union(*(keys_of(method.name) for method in BUILT_IN)) | {PAPER}
+    used = {PAPER, *ANALYSIS}
+    for method in BUILT_IN:
+        used.update(keys_of(method.name), solver_keys_of(method.name))
     assert used == set(BIB)
-    for prefix, keys in METHODS.items():
-        assert any(
-            method.name.startswith(prefix) and keys_of(method.name) == keys for method in BUILT_IN
-        ), prefix
+    for rows, find in ((METHODS, keys_of), (SOLVERS, solver_keys_of)):
+        for prefix, keys in rows.items():
+            assert any(
+                method.name.startswith(prefix) and find(method.name) == keys for method in BUILT_IN
+            ), prefix
     assert keys_of("nobody/knows") is None
+    assert solver_keys_of("nobody/knows") == ()
 
 
-def test_works_behind_the_analysis_are_named_in_it():
+@pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
+def test_solvers_are_cited_where_the_code_uses_them(method):
+    text = Path(inspect.getsourcefile(method)).read_text(encoding="utf-8")
+    due = set()
+    if "from baselines.trajectory_problem import" in text:
+        due = {"wachter2006", "andersson2019"}
+    if "from baselines.cascade import" in text:
+        due = {"diamond2016", "arnstrom2022"}
+        assert method.Parameters().solver == "daqp"
+    assert set(solver_keys_of(method.name)) == due
+
+
+def test_works_behind_analysis_and_solvers_are_named():
     texts = [*ROOT.glob("analysis/**/*.py"), *ROOT.glob("docs/*.md")]
     text = plain("\n".join(path.read_text(encoding="utf-8") for path in texts))
-    for key in ANALYSIS:
+    for key in (*ANALYSIS, *(key for keys in SOLVERS.values() for key in keys)):
         first = plain(BIB[key].fields["author"]).partition(",")[0]
         assert re.search(rf"{first}[^\n]*\n?[^\n]*{BIB[key].fields['year']}", text), key
 
 
 def test_identifiers_are_those_that_the_project_states():
-    """No DOI or preprint number without a source in the code."""
+    """No DOI or preprint number without a source in the code or its documents."""
     sources = [path for name in ("analysis", "baselines") for path in ROOT.glob(f"{name}/**/*.py")]
+    sources += ROOT.glob("docs/*.md")
     text = "".join(path.read_text(encoding="utf-8") for path in sources).lower()
     stated = {
         BIB[key].fields[name].lower() for key in BIB for name in BIB[key].fields.keys() & {"doi"}
@@ -144,12 +165,29 @@ def test_the_software_is_cited_by_the_facts_of_citation_cff():
     assert f"year: {paper['year']}" in text
 
 
+def test_the_software_of_a_folder_has_its_version_and_commit():
+    commit = {"id": "0123456789abcdef", "dirty": False}
+    note = "Version 0.0.9, commit 0123456789abcdef"
+    environment = {"coartic": "0.0.9", "commit": commit}
+    assert software(environment).fields["note"] == note
+    dirty = {**environment, "commit": {**commit, "dirty": True}}
+    assert software(dirty).fields["note"] == f"{note} with changes"
+    assert software({**environment, "commit": None}).fields["note"] == "Version 0.0.9"
+    assert f"  note = {{{note}}}," in bibliography([], environment=environment)
+
+
 def test_each_work_once_with_the_methods_that_rest_on_it():
     text = bibliography([MethodSource(m.name, m.title, m.citation, True) for m in BUILT_IN])
     entries = parse(re.sub("^%.*\n", "", text, flags=re.MULTILINE), "output")
     assert set(entries) == {"coartic", *BIB} - set(ANALYSIS)
     assert list(entries)[:2] == ["coartic", PAPER]
     assert "% cma-es/bandit, cma-es/every\n@misc{hansen2016," in text
+    assert (
+        "% trajectory-optimisation/path-length, trajectory-optimisation/squared-changes, "
+        "trajectory-optimisation/acceleration, trajectory-optimisation/jerk, "
+        "optimum/dynamic-programming, optimum/multistart, optimum/branch-and-bound\n"
+        "@article{wachter2006,"
+    ) in text
     more = bibliography([], analysis=True)
     assert set(re.findall(r"@\w+\{([^,]+),", more)) == {"coartic", PAPER, *ANALYSIS}
 
@@ -178,8 +216,13 @@ def test_command(tmp_path, monkeypatch, capsys):
         for name in ("corrective-alone/given", "test/good")
     ]
     run_and_write(tmp_path / "results", cells, runs=1)
+    path = tmp_path / "results" / "manifest.json"
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    manifest["environment"]["commit"] = {"id": "0123456789abcdef", "dirty": False}
+    path.write_text(json.dumps(manifest), encoding="utf-8")
     code, text, _ = call(monkeypatch, capsys, "cite", tmp_path / "results")
     assert code == 0
+    assert ", commit 0123456789abcdef}," in text
     found = re.findall(r"@\w+\{([^,]+),", text)
     assert found == ["coartic", PAPER, "whitney1969", "method-test-good"]
     assert "% the paper, corrective-alone/given\n" in text
@@ -188,7 +231,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     assert set(re.findall(r"@\w+\{([^,]+),", every)) == {"coartic", *BIB}
     for arguments, words in (
         (("--format", "ris"), "--format ris: the one format is bibtex"),
-        ((tmp_path / "nowhere",), "is not a results folder"),
+        ((tmp_path / "nowhere",), "does not exist"),
         ((tmp_path,), "is not a results folder"),
     ):
         code, out, error = call(monkeypatch, capsys, "cite", *arguments)

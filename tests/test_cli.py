@@ -253,6 +253,7 @@ def test_show_and_reproduce(monkeypatch, capsys, tmp_path):
     code, _, error = call(monkeypatch, capsys, "show", "", "--in", tmp_path)
     assert code == 2
     assert "is no run id" in error
+    assert "the beginning is enough" in error
 
 
 def test_short_names_of_conditions(monkeypatch, capsys, tmp_path):

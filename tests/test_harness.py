@@ -603,12 +603,16 @@ CUTS = {
         (lambda t: pd.concat([t, t[:1]]), "holds 1 rows twice"),
         (lambda t: t.assign(run_id=t.run_id.where(t.index > 0, "x-y")), "lacks 1 of 14"),
         (lambda t: t.assign(reward=t.reward.where(t.index > 0)), "has no reward"),
+        (lambda t: t.assign(hands=t.hands.where(t.index > 0)), "has no hands"),
         (lambda t: t.assign(reward=t.reward.astype(str)), "'reward' does not hold numbers"),
         (lambda t: t.drop(columns="reward"), "has no column 'reward'"),
         (lambda t: t.drop(columns="told"), "has no column 'told'"),
     ],
     "solutions": [
         (lambda t: t[:-1], "do not add up to their reward"),
+        (lambda t: t.assign(hand=t.hand.where(t.index > 0)), "has no goal or no hand"),
+        (lambda t: t.assign(goal=t.goal.where(t.index > 0)), "has no goal or no hand"),
+        (lambda t: t.assign(goal=t.goal + 1.0), "are not made with the hands"),
         (lambda t: t.drop(columns="right_2"), "has no column 'right_2'"),
         (lambda t: t.assign(right_2=np.nan), "'right_2' lacks numbers"),
     ],
@@ -665,10 +669,16 @@ def test_paths_that_are_not_whole_are_named(tmp_path):
         ({"format": 2}, "have format 2"),
         ({"format": 3}, "no 'specification'"),
         ({"format": 3, "specification": {}, "environment": {}}, "'suite' that is a str"),
+        (lambda found: found["methods"].pop("dual-process/EC4"), "no method 'dual-process/EC4'"),
+        (lambda found: found["tasks"].pop("ascending"), "no task 'ascending'"),
+        (lambda found: found["methods"]["dual-process/EC4"].pop("code"), "no 'code' that is a"),
     ],
 )
 def test_manifests_that_are_none(results, tmp_path, content, words):
     folder = shutil.copytree(results.folder, tmp_path / "copy")
+    if callable(content):
+        edit, content = content, json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        edit(content["specification"])
     (folder / "manifest.json").write_text(json.dumps(content))
     with pytest.raises(CoarticError, match=words):
         load_results(folder)

@@ -129,12 +129,15 @@ def test_failed_runs(tmp_path, undrawn):
     folder = tmp_path / "results"
     run_and_write(folder, known, runs=3, trials=30)
     table = pd.read_parquet(folder / "runs.parquet")
+    moves = pd.read_parquet(folder / "solutions.parquet")
     failed = table.assign(
         status="crashed", reason="exit code 9", reward=None, hands=None, trials=None
     )
     for rows in (1, 3):  # some, then all
         mixed = pd.concat([failed.head(rows), table.tail(3 - rows)])
         mixed.to_parquet(folder / "runs.parquet")
+        solved = mixed.run_id[mixed.status == "ok"]
+        moves[moves.run_id.isin(solved)].to_parquet(folder / "solutions.parquet")
         of = Study(with_environment(folder))
         made = build(of)
         write(made, of, tmp_path / "report")

@@ -660,7 +660,8 @@ def results(folder, solved, runs=None):
             run_id = f"{task.name}-{method}-{run}"
             execution = execute(task, solution)
             rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
-                         "status": "ok", "run": run, "reward": execution.reward})  # fmt: skip
+                         "status": "ok", "run": run, "reward": execution.reward,
+                         "hands": execution.hands})  # fmt: skip
             movements += [
                 {"run_id": run_id, **r} for r in movement_rows(task, execution.movements)
             ]

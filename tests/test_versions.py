@@ -17,6 +17,7 @@ from .test_cli import call
 from .test_harness import run_and_write
 
 RUNS = 6
+RUN = ["task", "method", "variant", "seed"]
 KNOWN = registry()
 CELLS = [
     Cell(load_task("ascending"), KNOWN["dual-process/EC1"]),
@@ -34,15 +35,32 @@ def first(tmp_path_factory):
 
 
 def planted(first, folder, edit=lambda runs: runs, manifest=lambda content: None):
-    """A copy of ``first`` with other tables and another manifest."""
+    """A copy of ``first`` with other runs, movements that fit them, and another manifest."""
     shutil.copytree(first, folder, ignore=shutil.ignore_patterns("records"))
     path = folder / "runs.parquet"
     runs = edit(pd.read_parquet(path, dtype_backend="numpy_nullable"))
     runs.to_parquet(path)
+    old = pd.read_parquet(first / "runs.parquet", columns=[*RUN, "run_id", "reward"])
+    _fit(folder / "solutions.parquet", runs.merge(old, on=RUN, suffixes=("", "_old")))
     content = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     manifest(content)
     (folder / "manifest.json").write_text(json.dumps(content), encoding="utf-8")
     return folder
+
+
+def _fit(path, runs):
+    """Movements with the ids and hands of the runs; the first takes up what the reward gained."""
+    moves = pd.read_parquet(path)
+    run = moves.run_id.map(dict(zip(runs.run_id_old, runs.index, strict=True)))
+    run = run[run.isin(runs.index[runs.status == "ok"])].astype(int)
+    moves, run = moves.loc[run.index], runs.loc[run]
+    gained = (run.reward - run.reward_old).to_numpy(dtype=int)
+    letters = [hands[goal - 1] for hands, goal in zip(run.hands, moves.goal, strict=True)]
+    moves.assign(
+        run_id=list(run.run_id),
+        ticks=moves.ticks - gained * (moves.order == 0),
+        hand=["left" if letter == "L" else "right" for letter in letters],
+    ).to_parquet(path)
 
 
 def of(runs, method=LEARNED):
@@ -220,10 +238,46 @@ def test_other_code_is_said_and_never_mixed(first, tmp_path):
     assert (row.verdict, row.remarks) == ("identical", "other code")
     assert [line[0] for line in comparison.differing.rows] == [f"code of {LEARNED}"]
     mixed = recoded(first, tmp_path / "mixed", slice(2))
-    with pytest.raises(CoarticError, match=r"mixed: .*\(4 rows were made by other code\)"):
+    with pytest.raises(CoarticError, match=r"mixed/runs.*\(4 rows are of other code than"):
         load_pair(first, mixed)
     with pytest.raises(CoarticError, match="short.*lacks 1 of 13 planned runs"):
         load_pair(planted(first, tmp_path / "short", lambda runs: runs[1:]), first)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("reward", lambda runs: runs.reward + 50, "do not add up to their reward"),
+        ("hands", "LLL", "are not made with the hands of a solved run"),
+        ("status", "timeout", "are not made with the hands of a solved run"),
+        ("code", "c0ffeec0ffee", "6 rows are of other code than manifest.json declares"),
+        ("code", pd.NA, "6 rows are of other code than manifest.json declares"),
+    ],
+)
+def test_one_gate_for_every_command(first, tmp_path, monkeypatch, capsys, column, value, words):
+    """A table edited by hand is refused by whatever reads the folder."""
+    edited = shutil.copytree(first, tmp_path / "edited", ignore=shutil.ignore_patterns("records"))
+    runs = pd.read_parquet(edited / "runs.parquet", dtype_backend="numpy_nullable")
+    runs.loc[of(runs), column] = value(runs) if callable(value) else value
+    runs.to_parquet(edited / "runs.parquet")
+    for command in (("compare", first), ("analyse",), ("report",), ("cite",)):
+        code, _, error = call(monkeypatch, capsys, *command, edited)
+        assert code == 2
+        assert words in error
+
+
+def test_what_differs_in_the_environment(first, tmp_path):
+    def edit(model, numpy):
+        return lambda content: content["environment"].update(
+            model_code=model, packages={"numpy": numpy}, date=model
+        )
+
+    one = planted(first, tmp_path / "one", manifest=edit("aaaa", "2.4.6"))
+    two = planted(first, tmp_path / "two", manifest=edit("bbbb", "2.4.7"))
+    assert compare_versions(*load_pair(one, two)).differing.rows == (
+        ("code of the model", "aaaa", "bbbb"),
+        ("library numpy", "2.4.6", "2.4.7"),
+    )
 
 
 def test_stale_records_are_counted(first, tmp_path):
@@ -275,8 +329,12 @@ def test_folders_that_cannot_be_compared(first, tmp_path):
             load_pair(first, same)
     empty = tmp_path / "empty"
     empty.mkdir()
-    for missing in (tmp_path / "nowhere", empty):
-        with pytest.raises(CoarticError, match="is not a results folder"):
+    for missing, words in (
+        (tmp_path / "nowhere", "nowhere does not exist; name a folder"),
+        (empty, "is not a results folder: .*manifest.json is missing"),
+        (first / "runs.parquet", "is a file, not a results folder"),
+    ):
+        with pytest.raises(CoarticError, match=words):
             load_pair(first, missing)
     old = planted(first, tmp_path / "old", manifest=lambda content: content.update(format=2))
     with pytest.raises(CoarticError, match="have format 2, this version reads 3; run the same"):
@@ -307,7 +365,7 @@ def test_command(first, tmp_path, monkeypatch, capsys):
     assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "page.csv").read_bytes()
     for arguments, words in (
         ((first, first), "are one folder"),
-        ((first, tmp_path / "nowhere"), "is not a results folder"),
+        ((first, tmp_path / "nowhere"), "does not exist"),
         ((first, second, "--out", "page.html"), "the name must end in .md"),
         ((first, second, "--csv", "table.txt"), "the name must end in .csv"),
         ((first, second, "--out", "/dev/null/x.md"), "cannot write /dev/null/x.md"),
