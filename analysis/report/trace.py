@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.report.document import Column, DataTable, Document, Row
+from analysis.methods import methods_notes
+from analysis.report.document import DataTable, Document, Row
 from analysis.report.numbers import Number
 from analysis.report.optimum_source import SHIPPED, optimum_sources
 from analysis.report.text import inline, parts
@@ -115,9 +116,9 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
         "tables": {
             table.id: {
                 "caption": table.caption,
-                "notes": [_plain(note) for note in table.notes],
+                "notes": _notes(results, table),
                 "columns": [column.name for column in table.columns],
-                "heads": [_head(column) for column in table.columns],
+                "heads": _heads(table),
                 "text": [column.name for column in table.columns if column.kind == "text"],
                 "rows": {
                     row.key: {
@@ -351,10 +352,18 @@ def _suite(results: Results) -> dict[str, Any]:
     }
 
 
-def _head(column: Column) -> str:
-    """A column's header with its unit."""
-    unit = "%" if column.kind == "share" else column.unit
-    return f"{column.header} ({unit})" if unit else column.header
+def _heads(table: DataTable) -> list[str]:
+    """What each column shows, with its unit: value, SD and interval together."""
+    shown: list[list[str]] = [[] for _ in table.columns]
+    for part in parts(table):
+        shown[part.index].append(part.header)
+    return [", ".join(headers) for headers in shown]
+
+
+def _notes(results: Results, table: DataTable) -> list[str]:
+    """A table's notes as plain text; those of methods share what stands above them all."""
+    above = methods_notes(results) if table.id.startswith("methods-") else []
+    return list(dict.fromkeys(_plain(note) for note in (*above, *table.notes)))
 
 
 def _plain(text: str) -> str:
