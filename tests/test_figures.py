@@ -169,19 +169,24 @@ def test_learning_curves_against_a_loop(study):
     window = 7
     data = learning_curves(study, window=window).data
     learning = study.results.learning()
-    ids = study.cells["two-armed-2", "dual-process/EC4"].good.run_id
-    runs = [
-        learning[learning.run_id == run].reward.to_numpy(dtype=float, na_value=np.nan)
-        for run in ids
-    ]
-    rows = data[(data.task == "two-armed-2") & (data.method == "dual-process/EC4")]
-    assert rows.trial.iloc[[0, -1]].tolist() == [1, 120]
-    for row in rows.itertuples():
-        best = [np.nanmax(run[: row.trial]) for run in runs]
-        assert row.best == pytest.approx(np.mean(best))
-        assert (row.best_low, row.best_high) == pytest.approx(np.quantile(best, [0.25, 0.75]))
-        last = np.concatenate([run[max(row.trial - window, 0) : row.trial] for run in runs])
-        assert row.trials == pytest.approx(np.nanmean(last))
+    spread = 0
+    for key, rows in data.groupby(["task", "method"]):
+        ids = study.cells[key].good.run_id
+        runs = [
+            learning[learning.run_id == run].reward.to_numpy(dtype=float, na_value=np.nan)
+            for run in ids
+        ]
+        assert rows.trial.iloc[[0, -1]].tolist() == [1, 120]
+        for row in rows.itertuples():
+            best = sorted(np.nanmax(run[: row.trial]) for run in runs)
+            assert row.best == pytest.approx(np.mean(best))
+            # Quartiles of four runs lie a quarter of the way from the inner to the outer ones.
+            assert row.best_low == pytest.approx(best[0] + 0.75 * (best[1] - best[0]))
+            assert row.best_high == pytest.approx(best[3] - 0.75 * (best[3] - best[2]))
+            spread += row.best_low < row.best_high
+            last = np.concatenate([run[max(row.trial - window, 0) : row.trial] for run in runs])
+            assert row.trials == pytest.approx(np.nanmean(last))
+    assert spread > 100
     assert learning_curves(study, log=False).figure.axes[0].get_xscale() == "linear"
 
 
@@ -204,6 +209,40 @@ def test_context_parts_are_the_signatures(study):
     assert row.other == frame["non-motor-equivalent part"]
     with pytest.raises(CoarticError, match="no method has solved runs on two tasks"):
         context(study, tasks=["ascending"])
+
+
+def test_stars_of_contexts_are_adjusted_over_the_figure(study):
+    """Signatures planted for several methods, with p that Holm's correction moves."""
+    frame, labels = study.signatures, [f"dual-process/EC1-{k}" for k in range(3)]
+    parts = frame[frame.signature.isin(["motor-equivalent part", "non-motor-equivalent part"])]
+    parts = parts[parts.value.notna()]
+    raw = {"motor-equivalent part": [0.0005, 0.02, 0.008],
+           "non-motor-equivalent part": [0.03, 0.6, 0.001]}  # fmt: skip
+    planted = pd.concat(
+        [
+            parts.assign(label=label, p=[raw[name][k] for name in parts.signature])
+            for k, label in enumerate(labels)
+        ],
+        ignore_index=True,
+    )
+    of = Study(study.results)
+    of.__dict__["signatures"] = planted
+    of.__dict__["cells"] = study.cells | {
+        ("ascending", label): study.cells["ascending", "dual-process/EC1"] for label in labels
+    }
+    plot = context(of, methods=labels)
+    data = plot.data.set_index("method").loc[labels]
+    # Smallest of six times six, the next times five, and so on, never falling.
+    together = [p for pair in zip(*raw.values(), strict=True) for p in pair]
+    adjusted, floor = {}, 0.0
+    for place, at in enumerate(np.argsort(together)):
+        floor = max(floor, min(1.0, (6 - place) * together[at]))
+        adjusted[int(at)] = floor
+    assert data.holm_equivalent.tolist() == pytest.approx([adjusted[0], adjusted[2], adjusted[4]])
+    assert data.holm_other.tolist() == pytest.approx([adjusted[1], adjusted[3], adjusted[5]])
+    shown = [text.get_text() for text in plot.figure.axes[0].texts if text.get_text()]
+    assert shown == [stars(adjusted[at]) for at in (0, 2, 4)]
+    assert shown != [stars(p) for p in raw["motor-equivalent part"]]
 
 
 def test_signature_matrices(study):

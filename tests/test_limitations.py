@@ -1,10 +1,13 @@
 """What a report says it cannot show: every sentence where it is true, none where it is not."""
 
 import json
+import re
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from analysis.report.limitations import limitations
 from analysis.study import Study
@@ -143,6 +146,38 @@ def test_trials_and_runs_as_in_the_paper(clean):
     texts = limitations(Study(replace(clean.results, runs=many)))
     assert not any("The paper has 20 runs" in text for text in texts)
     assert any("n = 20" in text for text in texts)
+
+
+def welch_power(difference, sd, n):
+    """P(a one-tailed t-test at 5 % finds it), for two samples of equal variance."""
+    freedom = 2 * n - 2
+    return stats.nct.sf(stats.t.ppf(0.95, freedom), freedom, difference / (sd * (2 / n) ** 0.5))
+
+
+def test_differences_that_are_found(study):  # noqa: F811
+    """Each printed difference is found with probability 80 %, by the rewards of the runs."""
+    (text,) = (t for t in limitations(study) if "a one-tailed t-test at 5 % finds" in t)
+    assert "with probability 80 %" in text
+    found = re.findall(r"([\w-]+) (EC\d) ([\d.]+) ticks \(([\d.]+) %, n = (\d+)\)", text)
+    runs = study.results.runs
+    optimum = {"ascending": -292, "descending": -304, "two-armed-1": -465}
+    spread = {}
+    for key, own in runs[runs.variant == ""].groupby(["task", "method"]):
+        if not key[1].startswith("dual-process/EC"):
+            continue
+        sd = np.std(own.reward.to_numpy(dtype=float), ddof=1)
+        if sd > 0:
+            spread[key[0], key[1][-3:]] = sd
+    assert {(task, condition) for task, condition, *_ in found} == set(spread)
+    assert len(spread) > 1
+    for task, condition, ticks, share, n in found:
+        sd = spread[task, condition]
+        assert n == "4"
+        assert welch_power(float(ticks) - 0.05, sd, 4) <= 0.8 <= (
+            welch_power(float(ticks) + 0.05, sd, 4)
+        )  # fmt: skip
+        # The share is of the difference before rounding.
+        assert float(share) == pytest.approx(100 * float(ticks) / -optimum[task], abs=0.08)
 
 
 def test_few_runs(clean):

@@ -6,15 +6,18 @@ import re
 import shutil
 import statistics as plain
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import analysis.report.build
+from analysis import optimum as shipped
 from analysis.inference import statistics
 from analysis.report.build import build, write
-from analysis.report.trace import FILE, trace
+from analysis.report.optimum_source import optimum_sources
+from analysis.report.trace import FILE, trace, trace_text
 from analysis.results import load_results
 from analysis.study import Study
 from benchmarks.provenance import environment
@@ -496,3 +499,136 @@ def test_what_a_report_does_not_have(home, tmp_path):
         (tmp_path / FILE).write_text(text)
         with pytest.raises(CoarticError, match=re.escape(FILE)):
             trace(tmp_path, "a")
+
+
+def shipped_runs(task, arm):
+    """Ids in the shipped optima, read as plain JSON."""
+    entries = json.loads(shipped.DATA.read_text(encoding="utf-8"))["optima"]
+    (found,) = (
+        entry["run_ids"] for entry in entries
+        if (entry["task"], entry["base"], entry["other_arm"]) == (task, "task", arm)
+    )  # fmt: skip
+    return found
+
+
+def test_shipped_optima_name_their_runs(home):
+    """This folder has no search of its own for the optimum."""
+    for name, arm in (("Optimum", "free"), ("OptimumStill", "still")):
+        found = trace(home, f"coarticTwoArmedOne{name}")
+        assert found.sources == ()
+        known = ", ".join(shipped_runs("two-armed-1", arm))
+        assert found.how == f"proven; shipped data (analysis/optimum.json), runs {known}"
+        assert trace_text(found).splitlines()[-1].startswith("runs: none; this value is the opt")
+    for name, reward, arm in (("Gap", -465, "free"), ("GapPercentLow", -465, "free"),
+                              ("GapStill", -490, "still")):  # fmt: skip
+        method = "ECThree" if arm == "still" else "ECFour"
+        how = trace(home, f"coarticTwoArmedOne{method}{name}").how
+        assert how.startswith("mean, BCa bootstrap")
+        assert f"from the optimum {reward}: proven; shipped data" in how
+        assert ", ".join(shipped_runs("two-armed-1", arm)) in how
+    cell = trace(home, "tasks-in-short", ("two-armed-1", "optimum"))
+    assert cell.sources == ()
+    assert ", ".join(shipped_runs("two-armed-1", "free")) in cell.how
+    still = trace(home, "methods-two-armed-1", ("dual-process/EC3", "gap_still")).how
+    assert "other arm still, -490: proven; shipped data" in still
+    assert ", ".join(shipped_runs("two-armed-1", "still")) in still
+
+
+def test_what_no_runs_are_behind(home):
+    paper = "published in the paper (Shah, Barto & Fagg, 2013"
+    for where, origin in (
+        (("coarticTwoArmedOnePublishedInitialReward",), f"{paper}; Results, Exploration Condi"
+         "tion 2)"),
+        (("coarticTwoArmedOneECFourPublishedReward",), f"{paper}; Results, Exploration Condi"
+         "tion 4)"),
+        (("exhaustive", ("two-armed-1", "published")), f"{paper})"),
+        (("exhaustive", ("two-armed-1", "sequences")), "computed from the corrective process "
+         "alone on two-armed-1 (sequences.parquet)"),
+    ):  # fmt: skip
+        name, *rest = where
+        found = trace(home, name, *rest)
+        assert found.sources == ()
+        assert trace_text(found).splitlines()[-1] == f"runs: none; this value is {origin}"
+
+
+def test_a_cell_of_a_table_says_how(home):
+    found = trace(home, "methods-ascending", ("dual-process/EC1", "reward"))
+    assert found.how.startswith("reward (ticks), SD, 95 % interval. Told: G goals")
+    assert "Reward: of the runs that have a solution" in found.how
+    assert "Optimum of" not in found.how
+    assert "how: reward (ticks)" in trace_text(found)
+    share = trace(home, "methods-ascending", ("dual-process/EC1", "gap_share")).how
+    assert share.startswith("gap (%). ")
+    assert "Optimum of ascending, other arm free, -292: proven; shipped data" in share
+    content = json.loads((home / FILE).read_text(encoding="utf-8"))
+    for name, table in content["tables"].items():
+        row, column = next(iter(table["rows"])), table["columns"][-1]
+        how = trace(home, name, (row, column)).how
+        assert all(note in how for note in table["notes"])
+        assert how.startswith(table["heads"][-1])
+
+
+def test_what_the_command_makes(home, records):
+    """EC4 has a variant in the same suite: naming the method makes both."""
+    text = trace_text(trace(home, "coarticTwoArmedOneECFourReward"))
+    both = [key for key in records.by_cell if key[1].startswith("dual-process/EC4")]
+    runs = sum(len(records.by_cell[key]) for key in both)
+    assert len(both) == 2
+    assert f"  makes {runs} runs, of which these 4\n" in text
+    assert "makes" not in trace_text(trace(home, "coarticTwoArmedOneECThreeReward"))
+
+
+SEARCH, BOUND = "optimum/dynamic-programming", "optimum/branch-and-bound"
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory):
+    """One task with searches of its own, free, with the other arm still, and a locked base."""
+    folder = tmp_path_factory.mktemp("searched") / "results"
+    task = load_task("ascending")
+    cells = [
+        Cell(task, KNOWN["dual-process/EC1"]),
+        Cell(task, KNOWN[SEARCH]),
+        Cell(task, KNOWN[SEARCH], (("other_arm", "still"),)),
+        Cell(task, KNOWN[SEARCH], (("base", "y"),)),
+        Cell(task, KNOWN[BOUND]),
+    ]
+    run_and_write(folder, cells, runs=3, trials=100)
+    return with_environment(folder)
+
+
+def test_searches_in_the_folder_are_the_optimums_runs(searched):
+    home = report_of(Study(searched), searched.folder / "report")
+    own = {"free": [SEARCH, BOUND], "still": [f"{SEARCH} other_arm=still"]}
+
+    def labels(name, *where):
+        return [source.label for source in trace(home, name, *where).sources]
+
+    assert labels("coarticAscendingOptimum") == own["free"]
+    assert trace(home, "coarticAscendingOptimum").how == "proven; searches of this folder"
+    # No search of the folder's bounds it with the other arm still.
+    still = trace(home, "coarticAscendingOptimumStill")
+    assert [source.label for source in still.sources] == own["still"]
+    stored = ", ".join(shipped_runs("ascending", "still"))
+    assert still.how == (
+        "proven; reward: searches of this folder; bound: shipped data (analysis/optimum.json), "
+        f"runs {stored}"
+    )
+    for name in ("coarticAscendingECOneGap", "coarticAscendingECOneGapPercent"):
+        assert labels(name) == ["dual-process/EC1", *own["free"]]
+        assert "from the optimum -292: proven; searches of this folder" in trace(home, name).how
+    assert labels("coarticAscendingECOneReward") == ["dual-process/EC1"]
+    row = ("methods-ascending", ("dual-process/EC1", "gap"))
+    assert labels(*row) == ["dual-process/EC1", *own["free"]]
+    assert labels("tasks-in-short", ("ascending", "optimum")) == own["free"]
+    assert labels("tasks-in-short", ("ascending", "learned")) == ["dual-process/EC1"]
+
+
+def test_a_search_that_falls_short_is_not_the_optimums(searched):
+    runs = searched.runs.copy()
+    runs.loc[runs.method.str.startswith("optimum/"), "reward"] = -300
+    runs["proven_bound"] = None
+    found = optimum_sources(replace(searched, runs=runs))
+    assert found["ascending", "free"].reward == -292
+    assert found["ascending", "free"].cells == ()
+    assert "searches of this folder" not in found["ascending", "free"].how

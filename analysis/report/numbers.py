@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from analysis.inference.statistics import (
 )
 from analysis.methods import LEARNER, solve_times
 from analysis.published import published_cell, published_initial
+from analysis.report.optimum_source import SHIPPED, OptimumSource, optimum_sources
 from analysis.results import CellRuns
 from analysis.study import SEED, Study
 
@@ -32,6 +33,8 @@ Cell = tuple[str, str]
 """Task and label."""
 
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
+_INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
+"""Exploration condition under which the paper speaks of a task's initial solution."""
 _SIGNATURES = {
     "first subtask against initial": ("FirstSubtask", "ticks"),
     "context distance": ("ContextDistance", "length unit, rad"),
@@ -58,9 +61,11 @@ class Number:
     how: str = ""
     """How value and interval were obtained."""
     cells: tuple[Cell, ...] = ()
-    """What it was computed from; none for what the paper prints and for known optima."""
+    """What it was computed from; none for what the paper prints and for shipped optima."""
     of: str = ""
     """What the meaning is said of, such as a method on a task."""
+    origin: str = ""
+    """What a value without cells is, such as published in the paper."""
 
     def companions(self) -> Iterator[tuple[str, str]]:
         """What follows the macro's name, first nothing, with the text that it stands for."""
@@ -127,11 +132,11 @@ def macro_names(study: Study) -> Names:
 
 def headline_numbers(study: Study) -> list[Number]:
     """Every headline value of a results folder, no two with a macro of the same name."""
-    names = macro_names(study)
+    names, sources = macro_names(study), optimum_sources(study.results)
     found = [
-        *_tasks(study, names),
+        *_tasks(study, names, sources),
         *itertools.chain.from_iterable(
-            _cell(study, names, cell) for cell in study.cells.values() if len(cell.good)
+            _cell(study, names, sources, cell) for cell in study.cells.values() if len(cell.good)
         ),
         *_conditions(study, names),
         *_hands(study, names),
@@ -202,27 +207,43 @@ def _number(
     )  # fmt: skip
 
 
-def _tasks(study: Study, names: Names) -> Iterator[Number]:
+def _tasks(
+    study: Study, names: Names, sources: Mapping[tuple[str, str], OptimumSource]
+) -> Iterator[Number]:
     for task in study.results.tasks:
         for arm in ("free", "still"):
-            best = study.optima.get((task, arm))
-            if best is None:
+            source = sources.get((task, arm))
+            if source is None:
                 continue
-            meaning = f"best reward known, other arm {arm}"
-            how = "proven" if best.proven else "not proven"
-            macro = f"{PREFIX}{names.tasks[task]}Optimum{'' if arm == 'free' else 'Still'}"
-            yield Number(macro, meaning, best.reward, 0, "ticks", how=how, of=task)
+            yield Number(
+                f"{PREFIX}{names.tasks[task]}Optimum{'' if arm == 'free' else 'Still'}",
+                f"best reward known, other arm {arm}", source.reward, 0, "ticks",
+                how=source.how, cells=source.cells, of=task,
+                origin="" if source.cells else f"the optimum of the {SHIPPED}",
+            )  # fmt: skip
         printed = published_initial(task)
         if printed is not None:
-            meaning = "published reward of the initial solution"
-            how = "derived from other printed numbers" if printed[2] else "printed"
+            how, origin = _published(_INITIAL[task], derived=printed[2])
             yield Number(
-                f"{PREFIX}{names.tasks[task]}PublishedInitialReward", meaning, printed[1], 0,
-                "ticks", how=how, of=task,
+                f"{PREFIX}{names.tasks[task]}PublishedInitialReward",
+                "published reward of the initial solution", printed[1], 0, "ticks",
+                how=how, of=task, origin=origin,
             )  # fmt: skip
 
 
-def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
+def _published(condition: int, *, derived: bool) -> tuple[str, str]:
+    """How the paper gives a value, and its place there."""
+    how = "derived from other printed numbers" if derived else "printed"
+    place = f"Results, Exploration Condition {condition}"
+    return f"{how}; {place}", f"published in the paper (Shah, Barto & Fagg, 2013; {place})"
+
+
+def _cell(
+    study: Study,
+    names: Names,
+    sources: Mapping[tuple[str, str], OptimumSource],
+    cell: CellRuns,
+) -> Iterator[Number]:
     task, label = key = cell.task, cell.label
     name = names.tasks[task] + names.labels[label]
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
@@ -241,7 +262,8 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
     for column, macro, arm in (("gap", "Gap", "free"), ("gap_still", "GapStill", "still")):
         if math.isnan(row[column]):
             continue
-        best = study.optima[task, arm].reward
+        source = sources[task, arm]
+        best = source.reward
         if arm == "still" and free is not None and best == free.reward:
             continue
         gap = f"gap to the optimum{', other arm still' if arm == 'still' else ''}"
@@ -253,7 +275,8 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
                 yield Number(
                     f"{PREFIX}{name}{macro}{suffix}", gap, (best - found.estimate) * share, 1,
                     unit, (best - found.high) * share, (best - found.low) * share,
-                    how=_how(found), cells=(key,), of=who,
+                    how=f"{_how(found)}; from the optimum {best}: {source.how}",
+                    cells=tuple(dict.fromkeys([key, *source.cells])), of=who,
                 )  # fmt: skip
     evaluations = cell.runs.forward_kinematics + cell.runs.jacobians
     for what, meaning, values, digits, unit in (
@@ -281,14 +304,15 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
                 f"{PREFIX}{name}InitialReward", "reward of the initial solution",
                 float(initial[0]), 0, "ticks", how="deterministic", cells=(key,), of=who,
             )  # fmt: skip
-        printed = published_cell(task, label.removeprefix(LEARNER))
+        condition = label.removeprefix(LEARNER)
+        printed = published_cell(task, condition)
         if printed is not None and printed.summary is not None:
             summary = printed.summary
+            how, origin = _published(int(condition.removeprefix("EC")), derived=summary.derived)
             yield Number(
                 f"{PREFIX}{name}PublishedReward", "published mean reward", summary.mean,
                 1, "ticks", sd=math.nan if summary.sd is None else summary.sd, n=summary.runs,
-                how="derived from other printed numbers" if summary.derived else "printed",
-                of=who,
+                how=how, of=who, origin=origin,
             )  # fmt: skip
 
 

@@ -5,21 +5,26 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
+import re
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.methods import methods_notes
 from analysis.report.document import DataTable, Document, Row
 from analysis.report.numbers import Number
-from analysis.report.text import parts
+from analysis.report.optimum_source import SHIPPED, optimum_sources
+from analysis.report.text import inline, parts
 from analysis.results import Results
 from analysis.table import NONE
 from coartic import CoarticError, builtin_tasks
 
 FILE = "trace.json"
-FORMAT = 2
+FORMAT = 3
+_OPTIMUM = re.compile(r"optimum|proof|gap|gap_share|gap_still|score|within_\d+(_reached)?")
+"""Columns of what is computed from the optimum."""
 _COMPANIONS = {
     "SD": "SD over runs of: ",
     "Low": "lower end of the interval of: ",
@@ -38,6 +43,8 @@ class Source:
     commits: tuple[str, ...]
     command: str
     """Makes the cell's runs anew; empty where it takes files of the user's own."""
+    makes: int
+    """Runs that the command makes: those of the method's other variants, too."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +59,8 @@ class Trace:
     specification: str
     """SHA-256 of the suite's specification."""
     environment: dict[str, Any]
+    origin: str
+    """What the value is where there are no runs behind it."""
     folder: Path | None
     """The results folder, where the report lies in it."""
 
@@ -89,14 +98,28 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
                 "meaning": number.meaning,
                 "of": number.of,
                 "how": number.how,
+                "origin": number.origin,
                 "cells": [places[key] for key in number.cells],
             }
             for number in numbers
         },
+        "optima": [
+            {
+                "task": task,
+                "other_arm": arm,
+                "reward": source.reward,
+                "how": source.how,
+                "cells": [places[key] for key in source.cells],
+            }
+            for (task, arm), source in optimum_sources(results).items()
+        ],
         "tables": {
             table.id: {
                 "caption": table.caption,
+                "notes": _notes(results, table),
                 "columns": [column.name for column in table.columns],
+                "heads": _heads(table),
+                "text": [column.name for column in table.columns if column.kind == "text"],
                 "rows": {
                     row.key: {
                         "texts": _texts(table, row),
@@ -177,17 +200,16 @@ def _find(content: dict[str, Any], home: Path, name: str, where: Sequence[str]) 
         macro, suffix = macros[name]
         entry = content["macros"][macro]
         text, how, keys = entry["texts"][suffix], entry["how"], entry["cells"]
-        title, meaning = name, _meaning(entry, suffix)
+        title, meaning, origin = name, _meaning(entry, suffix), entry["origin"]
     elif name in content["tables"]:
-        title, text, meaning, keys = _table_cell(content["tables"][name], name, where)
-        how = ""
+        title, text, meaning, how, keys, origin = _table_cell(content, name, where)
     else:
         known = [*macros, *content["tables"]]
         raise CoarticError(f"no macro or table {name!r} in {home}{_nearest(name, known)}")
     return Trace(
         title, text, meaning, how,
         tuple(_source(content, content["cells"][key]) for key in keys),
-        content["specification"], content["environment"],
+        content["specification"], content["environment"], origin,
         _results_folder(home.parent, content["specification"]),
     )  # fmt: skip
 
@@ -211,13 +233,18 @@ def trace_text(found: Trace) -> str:
         + ", ".join(f"{k} {v}" for k, v in found.environment["packages"].items()),
     ]
     if not found.sources:
-        lines.append("runs: none; this value is published, known or text")
+        lines.append(f"runs: none; this value is {found.origin}")
     for source in found.sources:
         lines += [
             "",
             f"{source.task} x {source.label}: {len(source.run_ids)} runs, made at commit "
             + ", ".join(source.commits),
             *([f"anew: {source.command}"] if source.command else []),
+            *(
+                [f"  makes {source.makes} runs, of which these {len(source.run_ids)}"]
+                if source.command and source.makes > len(source.run_ids)
+                else []
+            ),
             f"one: coartic reproduce RUN --in {shlex.quote(str(found.folder or 'FOLDER'))}",
             *(f"  {run}" for run in source.run_ids),
         ]
@@ -225,8 +252,10 @@ def trace_text(found: Trace) -> str:
 
 
 def _table_cell(
-    table: dict[str, Any], name: str, where: Sequence[str]
-) -> tuple[str, str, str, list[int]]:
+    content: dict[str, Any], name: str, where: Sequence[str]
+) -> tuple[str, str, str, str, list[int], str]:
+    """Title, text, meaning, how, places of cells and origin."""
+    table = content["tables"][name]
     rows, columns = table["rows"], table["columns"]
     if len(where) != 2:
         raise CoarticError(
@@ -238,10 +267,47 @@ def _table_cell(
         raise CoarticError(f"table {name} has no row {row!r}{_nearest(row, rows)}")
     if column not in columns:
         raise CoarticError(f"table {name} has no column {column!r}{_nearest(column, columns)}")
-    entry = rows[row]
+    entry, place = rows[row], columns.index(column)
     cells = entry["cells_by_column"].get(column, entry["cells"])
-    text = entry["texts"][columns.index(column)]
-    return f"{name} [{row}, {column}]", text, table["caption"], cells
+    known = _optima(content, name, column, entry["cells"]) if place else []
+    if column in ("optimum", "proof"):
+        cells = []
+    cells = list(dict.fromkeys([*cells, *(cell for best in known for cell in best["cells"])]))
+    how = " ".join([f"{table['heads'][place]}.", *table["notes"]])
+    for best in known:
+        how += f" Optimum of {best['task']}, other arm {best['other_arm']}, {best['reward']}: "
+        how += f"{best['how']}."
+    return (
+        f"{name} [{row}, {column}]", entry["texts"][place], table["caption"], how, cells,
+        _origin(table, name, row, column),
+    )  # fmt: skip
+
+
+def _optima(
+    content: dict[str, Any], table: str, column: str, cells: Sequence[int]
+) -> list[dict[str, Any]]:
+    """The optima that a table's column is computed from, of the tasks of a row's cells."""
+    if not _OPTIMUM.fullmatch(column) and not table.startswith("areas-"):
+        return []
+    arm = "still" if column == "gap_still" else "free"
+    tasks = {content["cells"][cell]["task"] for cell in cells}
+    return [
+        best for best in content["optima"] if best["task"] in tasks and best["other_arm"] == arm
+    ]
+
+
+def _origin(table: dict[str, Any], name: str, row: str, column: str) -> str:
+    """What a table's value is that no runs are behind."""
+    if column in ("optimum", "proof"):
+        return f"the optimum of the {SHIPPED}"
+    if column.startswith("published") or (name, column) == ("claims", "place"):
+        return "published in the paper (Shah, Barto & Fagg, 2013)"
+    if name == "exhaustive":
+        return f"computed from the corrective process alone on {row} (sequences.parquet)"
+    claim = name.removeprefix("evidence-")
+    if claim != name:
+        return f"text; the runs of the claim: coartic trace claims {claim} verdict"
+    return "text" if column in table["text"] else "computed without runs"
 
 
 def _meaning(entry: dict[str, Any], suffix: str) -> str:
@@ -259,8 +325,13 @@ def _source(content: dict[str, Any], cell: dict[str, Any]) -> Source:
             f"--{name} {value} " for name, value in options.items() if value is not None
         ) + "--out NEW"  # fmt: skip
     return Source(
-        cell["task"], cell["label"], tuple(cell["runs"]), tuple(cell["commits"]), command
-    )
+        cell["task"], cell["label"], tuple(cell["runs"]), tuple(cell["commits"]), command,
+        sum(
+            len(other["runs"])
+            for other in content["cells"]
+            if (other["task"], other["method"]) == (cell["task"], cell["method"])
+        ),
+    )  # fmt: skip
 
 
 def _results_folder(folder: Path, specification: str) -> Path | None:
@@ -279,6 +350,25 @@ def _suite(results: Results) -> dict[str, Any]:
         "name": specification["suite"],
         **{name: specification[name] for name in ("runs", "trials", "seed")},
     }
+
+
+def _heads(table: DataTable) -> list[str]:
+    """What each column shows, with its unit: value, SD and interval together."""
+    shown: list[list[str]] = [[] for _ in table.columns]
+    for part in parts(table):
+        shown[part.index].append(part.header)
+    return [", ".join(headers) for headers in shown]
+
+
+def _notes(results: Results, table: DataTable) -> list[str]:
+    """A table's notes as plain text; those of methods share what stands above them all."""
+    above = methods_notes(results) if table.id.startswith("methods-") else []
+    return list(dict.fromkeys(_plain(note) for note in (*above, *table.notes)))
+
+
+def _plain(text: str) -> str:
+    """Inline markup as plain text."""
+    return "".join(span.text for span in inline(text))
 
 
 def _texts(table: DataTable, row: Row) -> list[str]:
