@@ -111,13 +111,12 @@ def _versions(study: Study) -> Iterator[str]:
     known = runs.commit.dropna().astype(str)
     commits = sorted(set(known.str.rstrip("+")))
     changed = sorted({commit.rstrip("+") for commit in known if commit.endswith("+")})
-    codes = runs.groupby("method").code.nunique()
     if len(commits) > 1:
-        same = "; the code behind each method's results is the same in all of them"
+        # Loading refuses folders of which that does not hold.
         yield (
             f"*Mixed versions.* Runs were made at {len(commits)} commits "
-            f"({', '.join(f'`{commit[:12]}`' for commit in commits)})"
-            f"{same if (codes <= 1).all() else ''}."
+            f"({', '.join(f'`{commit[:12]}`' for commit in commits)}); the code behind each "
+            "method's results is the same in all of them."
         )
     if len(known) < len(runs):
         yield (
@@ -133,8 +132,6 @@ def _versions(study: Study) -> Iterator[str]:
     packages = runs.packages.nunique()
     if packages > 1:
         yield f"*Mixed versions.* Runs were made with {packages} sets of library versions."
-    for method in codes[codes > 1].index:
-        yield f"*Mixed code.* Runs of `{_code(str(method))}` were made by {codes[method]} codes."
 
 
 def _numbers_of_runs(study: Study) -> Iterator[str]:

@@ -17,6 +17,7 @@ from analysis.inference.statistics import mean
 from analysis.methods import LEARNER
 from analysis.published import TRIALS, published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
+from analysis.report.optimum_source import optimum_sources
 from analysis.report.text import typographic
 from analysis.study import SEED, Study
 
@@ -36,7 +37,7 @@ def best_condition(study: Study, task: str) -> str | None:
 
 def tasks_table(study: Study) -> DataTable | None:
     """One row a task: initial, learned, published and best possible reward."""
-    rows = []
+    rows, sources = [], optimum_sources(study.results)
     for name, task in study.results.tasks.items():
         label = best_condition(study, name)
         if label is None:
@@ -63,7 +64,9 @@ def tasks_table(study: Study) -> DataTable | None:
                     share,
                 ),
                 ((name, label),),
-                {} if best is None else _optimum_cells(study, name),
+                {}
+                if best is None
+                else dict.fromkeys(("optimum", "proof"), sources[name, "free"].cells),
             )
         )
     if not rows:
@@ -90,12 +93,6 @@ def tasks_table(study: Study) -> DataTable | None:
             "Optimum: with all joints free. Gap: from the learned reward to it, as a share of it.",
         ),
     )
-
-
-def _optimum_cells(study: Study, task: str) -> dict[str, tuple[tuple[str, str], ...]]:
-    """What the optimum was computed from: the task's own searches, where they are at hand."""
-    cells = tuple(key for key in study.cells if key[0] == task and key[1].startswith("optimum/"))
-    return {"optimum": cells, "proof": cells} if cells else {}
 
 
 def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
