@@ -84,7 +84,7 @@ def test_a_folder_without_the_learner(alone):
         configurations(alone, [("ascending", [])])
     with pytest.raises(CoarticError, match=r"no task 'nope'; it has descending"):
         bars(alone, tasks=["nope"])
-    with pytest.raises(CoarticError, match=r"no solved run of cma-es/bandit on descending"):
+    with pytest.raises(CoarticError, match=r"no method 'cma-es/bandit'; it has corrective"):
         frontier(alone, methods=["cma-es/bandit"])
     with pytest.raises(CoarticError, match="no task with two hands"):
         recruitment(alone)

@@ -20,7 +20,7 @@ from analysis.figures.style import (
     INK,
     PAPER,
     SMALL,
-    TWO,
+    column_width,
     dagger,
     heading,
     letters,
@@ -64,9 +64,10 @@ def bars(
     data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
     adjusted = holm(data.p.tolist())
     data = data.assign(p_holm=adjusted).reset_index(drop=True)
-    # One row of panels, as wide as their bars.
+    # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
-    figure = Figure(figsize=(min(TWO, 0.5 + 0.58 * sum(counts)), 2.6), layout="constrained")
+    width = column_width(0.5 + 0.58 * sum(counts))
+    figure = Figure(figsize=(width, 2.6), layout="constrained")
     panels = figure.subplots(1, len(labels), width_ratios=counts, squeeze=False)[0]
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}

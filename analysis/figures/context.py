@@ -76,7 +76,7 @@ def context(
             study, f"{len(places)} pairs of tasks share a goal, more than {MOST}: name some tasks"
         )
     rows = sum(len(group) + 3 for _, group in places)
-    figure = Figure(figsize=(ONE * 1.2, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
+    figure = Figure(figsize=(ONE, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
     panels = figure.subplots(
         len(places), 1, squeeze=False, sharex=True,
         height_ratios=[len(group) + 1 for _, group in places],
