@@ -208,7 +208,7 @@ def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
         max([top, *runs.get(label, ())]) for top, label in zip(shown, rows.method, strict=True)
     ]
     bottom = min(rows[["reward", "published"]].min().min(), *(min(r) for r in runs.values()))
-    step = 0.055 * (max(tops) - bottom)
+    step = 0.055 * max(max(tops) - bottom, 1.0)  # tick; nothing learned by anyone
     level = -math.inf
     for place, p in enumerate(rows.p_holm.tolist()[1:], 1):
         level = max(tops[place - 1], tops[place], level) + 1.6 * step
