@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from analysis.figures.style import short
 from analysis.report.document import DataTable, Document, Value
-from analysis.report.text import NO_SPREAD, Part, inline, parts
+from analysis.report.text import MINUS, NO_SPREAD, Part, inline, parts
 from analysis.table import NONE
 
 _ESCAPES = {
@@ -74,7 +74,8 @@ PACKAGES = ("booktabs", "siunitx", "graphicx", "longtable")
 """What the tables need."""
 _LINE = {"footnotesize": 86.0, "scriptsize": 79.0}
 """Figures on a line of 345 pt; of a float by a tenth more, which scaling leaves above 7 pt."""
-_GAP, _THIN, _LEAST = 1.5, 0.6, 8.0  # between columns; a thin character; a column of text
+_GAP, _THIN, _MINUS = 1.5, 0.6, 1.5  # between columns; a thin character; a minus
+_LEAST = 8.0  # of a column of text
 _LABELS = {"method", "first", "second"}  # columns of methods with their variants
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
@@ -169,7 +170,7 @@ def _wrapped(shown: Sequence[Part], table: DataTable, line: float) -> dict[Part,
     texts = [part for part in shown if part.column.kind == "text"]
     for part in sorted(texts, key=lambda part: -widths[part]):
         words = " ".join(_column(part, table)).replace("/", "/ ").split()
-        least = max(_width(max(words, key=_width, default="")), 0.4 * widths[part], _LEAST)
+        least = max(_width(max(words, key=_width, default="")), 0.3 * widths[part], _LEAST)
         width = max(widths[part] - excess, least)
         if excess > 0 and width < widths[part]:
             found[part] = width
@@ -178,13 +179,15 @@ def _wrapped(shown: Sequence[Part], table: DataTable, line: float) -> dict[Part,
 
 
 def _width(text: str) -> float:
-    return sum(_THIN if character in " .,:;()[]/|ijlt'-" else 1.0 for character in text)
+    """In figures: thin characters, a true minus, and all others."""
+    thin, minus = sum(map(text.count, " .,:;()[]/|ijlt'-")), text.count(MINUS)
+    return len(text) + (_THIN - 1) * thin + (_MINUS - 1) * minus
 
 
 def _column(part: Part, table: DataTable) -> list[str]:
     """What stands in a column, the lines of its header first; of S columns their format."""
     sign, wholes, decimals = _format(part, table) if part.numeric else ("", 0, 0)
-    own = f"{sign}{'0' * wholes}{'.' * (decimals > 0)}{'0' * decimals}"
+    own = f"{sign and MINUS}{'0' * wholes}{'.' * (decimals > 0)}{'0' * decimals}"
     words = (_words(part, row.values[part.index]) for row in table.rows)
     return [*_lines(part, table), own, *words]
 
