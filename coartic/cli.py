@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import io
 import json
@@ -92,6 +93,14 @@ def _names(text: str | None, option: str) -> list[str]:
     if not all(names):
         raise CoarticError(f"{option} {text!r} has an empty name; write for example a,b")
     return names
+
+
+def _labels(text: str, option: str) -> list[str]:
+    """A comma-separated list of labels, in double quotes where they have commas themselves."""
+    labels = [label.strip() for label in next(csv.reader([text], skipinitialspace=True), [])]
+    if not labels or not all(labels):
+        raise CoarticError(f"{option} {text!r} has an empty name; write for example a,b")
+    return list(dict.fromkeys(labels))
 
 
 MethodFiles = Annotated[
@@ -459,6 +468,13 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; DIR/report by default.")
     ] = None,
+    methods: Annotated[
+        str | None,
+        typer.Option(
+            help="Methods that the figures show, labels as in the tables: a,b, "
+            "'\"a x=1, y=2\",b' with parameters."
+        ),
+    ] = None,
 ) -> None:
     """Write a report: page with player, tables, figures, numbers for LaTeX, traces."""
     from analysis.report.build import build, write
@@ -468,7 +484,7 @@ def report(
     started = time.monotonic()
     study = Study(load_results(folder))
     out = folder / "report" if out is None else out
-    made = build(study)
+    made = build(study, None if methods is None else _labels(methods, "--methods"))
     write(made, study, out)
     print(
         f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analysis.figures import all_figures
 from analysis.figures.bars import bars, stars
-from analysis.figures.configurations import configurations, paper_configurations, typical_run
+from analysis.figures.configurations import (
+    common_sequences,
+    configurations,
+    paper_configurations,
+    typical_run,
+)
 from analysis.figures.context import context
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
@@ -68,7 +74,7 @@ def test_every_figure_of_the_papers_cells(figures):
         assert len(plot.alt) > 30
         assert len(plot.caption) > 60
         assert len(plot.data)
-        assert plot.figure.get_size_inches()[0] * 25.4 <= 178.001
+        assert round(plot.figure.get_size_inches()[0] * 25.4, 6) in (85, 178)
         assert plot.figure.get_size_inches()[1] * 25.4 <= 240
 
 
@@ -84,7 +90,7 @@ def test_a_folder_without_the_learner(alone):
         configurations(alone, [("ascending", [])])
     with pytest.raises(CoarticError, match=r"no task 'nope'; it has descending"):
         bars(alone, tasks=["nope"])
-    with pytest.raises(CoarticError, match=r"no solved run of cma-es/bandit on descending"):
+    with pytest.raises(CoarticError, match=r"no method 'cma-es/bandit'; it has corrective"):
         frontier(alone, methods=["cma-es/bandit"])
     with pytest.raises(CoarticError, match="no task with two hands"):
         recruitment(alone)
@@ -163,6 +169,58 @@ def test_the_typical_run(study):
             [("two-armed-1", ["dual-process/EC3"])],
             runs={("two-armed-1", "dual-process/EC3"): "0000"},
         )
+
+
+def test_a_row_for_each_common_hand_sequence(study):
+    runs, several = study.results.runs, 0
+    for plot in paper_configurations(study)[0]:
+        titles = [text.get_text() for text in plot.figure.texts]
+        learned = plot.data[plot.data.run_id != ""].drop_duplicates("run_id")
+        for (task, label), rows in learned.groupby(["task", "method"], sort=False):
+            cell = runs[(runs.task == task) & (runs.method == label)]
+            counts = cell.hands.value_counts()  # of four runs: each is a quarter or more
+            expected = sorted(counts.index, key=lambda hands: (-counts[hands], hands))[:2]
+            assert rows.hands.tolist() == expected
+            several += len(expected) > 1
+            for row in rows.itertuples():
+                own = cell[cell.hands == row.hands].reward.astype(float)
+                assert abs(row.total - own.median()) == (own - own.median()).abs().min()
+                name = f"{short(label)}, {row.hands} ({counts[row.hands]} of 4)"
+                assert [title for title in titles if title.endswith(name)]
+    assert several
+
+
+def test_common_hand_sequences_are_a_fifth_of_the_runs(tmp_path):
+    cells = select_cells(
+        load_suite("paper"), KNOWN, tasks=["two-armed-2"], methods=["dual-process/EC3"]
+    )
+    planted = Study(run_and_write(tmp_path, cells=cells, runs=12, trials=20))
+    for hands, expected in (
+        (["LL"] * 5 + ["RR"] * 4 + ["RL"] * 3, ["LL", "RR"]),
+        (["RL"] * 2 + ["LL"] * 10, ["LL"]),
+        (["RL"] * 6 + ["LL"] * 6, ["LL", "RL"]),
+        ([f"{k}" for k in range(12)], ["0"]),
+    ):
+        own = Study(replace(planted.results, runs=planted.results.runs.assign(hands=hands)))
+        assert common_sequences(own, "two-armed-2", "dual-process/EC3", 2) == expected
+
+
+def test_any_methods_side_by_side(study):
+    asked = ["dual-process/EC4", "dual-process/EC1"]
+    found = all_figures(study, methods=asked)
+    assert {"recruitment", "learning-curves", "frontier-trials", "signatures-two-armed-1"} <= {
+        plot.id for plot in found.plots
+    }
+    for plot in found.plots:
+        if "method" in plot.data:
+            assert set(plot.data.method) <= {*asked, "initial"}, plot.id
+    shown = {plot.id: plot.data for plot in found.plots}
+    assert set(shown["configurations-two-armed-1"].method) == {"initial", asked[0]}
+    assert set(shown["configurations-one-armed"].method) == {"initial", asked[1]}
+    assert set(shown["frontier-trials"].method) == set(asked)
+    assert "no runs on every one" in found.skipped["profiles"]
+    with pytest.raises(CoarticError, match="no method 'dual-proces/EC4'; did you mean 'dual-pr"):
+        all_figures(study, methods=["dual-proces/EC4"])
 
 
 def test_learning_curves_against_a_loop(study):
@@ -458,5 +516,6 @@ def test_titles_and_labels_are_within_the_picture(figures):
                     if text.get_text():
                         box = text.get_window_extent(renderer)
                         assert box.x0 >= frame.x0 - 1, (plot.id, text)
+                        assert box.x1 <= frame.x1 + 1, (plot.id, text)
                         assert box.y0 >= frame.y0 - 1, (plot.id, text)
                         assert box.y1 <= frame.y1 + 1, (plot.id, text)

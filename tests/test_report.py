@@ -28,7 +28,8 @@ from analysis.report.document import (
     Section,
 )
 from analysis.report.html import MOST_ROWS, html
-from analysis.report.latex import latex_tables, latex_text
+from analysis.report.latex import MOST_ROWS as MOST_LATEX
+from analysis.report.latex import PACKAGES, latex_table, latex_tables, latex_text
 from analysis.report.legends import with_legends
 from analysis.report.markdown import markdown
 from analysis.report.summary import without_variants
@@ -379,10 +380,53 @@ def test_latex_escapes():
 def test_latex_columns_are_as_wide_as_their_numbers():
     text = latex_tables(document())["methods-shelf"]
     assert (
-        r"\begin{tabular}{lS[table-format=-3.1]S[table-format=1.1]rS[table-format=1.1]"
-        r"S[table-format=7.0]S[table-format=1.3]l}"
+        r"\begin{tabular}{@{}lS[table-format=-3.1]S[table-format=1.1]rS[table-format=1.1]"
+        r"S[table-format=7.0]S[table-format=1.3]>{\raggedright\arraybackslash}p{"
     ) in text
     assert r"-483.2 & 5.0 & {[\num{-490.1}, \num{-477.0}]} & 3.9 & 20" in text
+
+
+LONG = DataTable(
+    "long",
+    "A table of several pages.",
+    (
+        Column("method", "method"),
+        Column("difference", "difference to what was there before", "number", "ticks", digits=1),
+        Column("told", "told"),
+        Column("p", "p of the two-tailed test", "p", digits=4),
+        Column("hidden", "not for print", printed=False),
+    ),
+    tuple(
+        Row(
+            f"{k}",
+            (
+                f"trajectory-optimisation/squared-changes other_arm=still, hands={'LR' * 4}{k}",
+                Estimate(-100.0 - k, 3.25, -120.5, -99.0),
+                "one word after another, " * 3,
+                0.01,
+                "unseen",
+            ),
+        )
+        for k in range(90)
+    ),
+    ("A note.",),
+)
+
+
+def test_tables_longer_than_a_page_are_continued():
+    text = latex_table(LONG)
+    assert r"\begin{longtable}" in text
+    assert r"\begin{table}" not in text
+    assert text.count("{method}") == 2  # the second is for the pages that follow
+    assert text.count("squared changes (other arm still") == 90  # as figures name them
+    assert "trajectory-optimisation" not in text
+    assert "unseen" not in text
+    short = replace(LONG, rows=LONG.rows[:MOST_LATEX])
+    assert r"\begin{table}" in latex_table(short)
+    head = next(line for line in text.splitlines() if line.startswith("{method}"))
+    assert head.replace(r" \\ ", " ").startswith(
+        r"{method} & {\shortstack[c]{difference to what was there before (ticks)}} & {SD} & "
+    )
 
 
 def save(figure, folder):
@@ -402,13 +446,16 @@ def write(folder, shown=None):
 def test_latex_compiles(tmp_path):
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty"]
+    styles = ["kpsewhich", *(f"{name}.sty" for name in PACKAGES)]
     if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip("booktabs, siunitx and graphicx are not installed")
-    write(tmp_path / "report")
+        pytest.skip(f"{', '.join(PACKAGES)} are not installed")
+    several = replace(
+        document(), sections=(*document().sections, Section("pages", "Long", (LONG,)))
+    )
+    write(tmp_path / "report", several)
     (tmp_path / "report" / "paper.tex").write_text(
         r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}"
-        r"\usepackage{booktabs,siunitx,graphicx}\begin{document}\input{tables.tex}\end{document}",
+        r"\usepackage{booktabs,siunitx,graphicx,longtable}\begin{document}\input{tables.tex}\end{document}",
         encoding="utf-8",
     )
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
@@ -417,7 +464,8 @@ def test_latex_compiles(tmp_path):
     )
     log = done.stdout.decode(errors="replace")
     assert done.returncode == 0, log[-2000:]
-    assert "1 page" in log
+    assert " pages" in log
+    assert not re.search(r"Overfull \\hbox.*in alignment", log)  # nor is it scaled
     assert "Missing character" not in log
 
 

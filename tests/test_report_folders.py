@@ -16,6 +16,7 @@ from analysis.slugs import slugs
 from analysis.study import Study
 from benchmarks.suites import Cell, load_suite, select_cells
 from coartic import CoarticError, builtin_tasks
+from coartic.cli import _labels
 
 from .strategies import tiny_task
 from .test_cli import call
@@ -191,6 +192,11 @@ def refused(monkeypatch, capsys, *arguments):
     return error
 
 
+def test_labels_with_commas_are_quoted():
+    text = ' a/b , "a/b x=1, y=2",a/c,a/b'
+    assert _labels(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
+
+
 def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").write_text("x")
@@ -198,6 +204,9 @@ def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):
     for name in ("file", "nowhere"):
         assert str(tmp_path / name) in refused(monkeypatch, capsys, "report", tmp_path / name)
     assert "no report in" in refused(monkeypatch, capsys, "trace", "a", "--in", tmp_path / "empty")
+    near = refused(monkeypatch, capsys, "report", odd.folder, "--methods", "dual-process/EC44")
+    assert "did you mean 'dual-process/EC4'" in near
+    assert "empty name" in refused(monkeypatch, capsys, "report", odd.folder, "--methods", "a,,b")
     # A report folder that is none.
     thesis = tmp_path / "thesis"
     thesis.mkdir()

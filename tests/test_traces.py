@@ -94,7 +94,7 @@ def study(results):
 
 LATEX = r"""\documentclass{article}
 \usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
-\usepackage{booktabs,siunitx,graphicx}
+\usepackage{booktabs,siunitx,graphicx,longtable}
 \hfuzz=1pt
 \input{numbers.tex}
 \begin{document}
@@ -137,6 +137,23 @@ def compiled(folder, body=""):
     log = done.stdout.decode(errors="replace")
     assert done.returncode == 0, log[-2000:]
     return log
+
+
+def test_tables_are_legible(home, tmp_path):
+    """None has to be scaled by more than 0.87 to fit on a line, nor is one wider than it."""
+    line = 345.0  # pt, of class article
+    folder = tmp_path / "report"
+    shutil.copytree(home, folder)
+    log = compiled(
+        folder,
+        rf"\hsize={line}pt\textwidth=\hsize\linewidth=\hsize\columnwidth=\hsize"
+        r"\renewcommand{\resizebox}[3]{\sbox0{#3}\typeout{WIDTH \the\wd0}\usebox0}",
+    )
+    widths = [float(width) for width in re.findall(r"WIDTH ([\d.]+)pt", log)]
+    tables = [path.read_text(encoding="utf-8") for path in (folder / "tables").glob("*.tex")]
+    assert len(widths) == sum(r"\resizebox" in text for text in tables) > 10
+    assert 0.87 * max(widths) <= line
+    assert not re.search(r"Overfull .*in alignment", log)
 
 
 class Records:

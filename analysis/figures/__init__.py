@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from analysis.figures.bars import bars
@@ -14,6 +14,7 @@ from analysis.figures.plot import Plot
 from analysis.figures.profiles import profiles
 from analysis.figures.published import published
 from analysis.figures.recruitment import recruitment
+from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_plot
 from analysis.study import Study
@@ -29,15 +30,21 @@ class Figures:
     """Why there is none, by what would have been drawn."""
 
 
-def all_figures(study: Study, most_tasks: int | None = None) -> Figures:
-    """Every figure with its default methods; what lacks runs is skipped with the reason.
+def all_figures(
+    study: Study, most_tasks: int | None = None, methods: Sequence[str] | None = None
+) -> Figures:
+    """Every figure with its default methods or ``methods``, labels with their variants.
 
-    Figures of signatures, one a task, are skipped where there are more than ``most_tasks``.
+    What lacks runs is skipped with the reason. Figures of signatures, one a task, are skipped
+    where there are more than ``most_tasks``. Raises CoarticError for a method that the folder
+    does not have.
     """
+    if methods is not None:
+        known_methods(study, methods)
     plots = [tasks_plot(list(study.results.tasks.values()))]
-    drawn, skipped = paper_configurations(study)
+    drawn, skipped = paper_configurations(study, methods)
     plots += drawn
-    makers: dict[str, Callable[[Study], Plot | list[Plot]]] = {
+    makers: dict[str, Callable[..., Plot | list[Plot]]] = {
         "learned-reward": bars,
         "published": published,
         "learning-curves": learning_curves,
@@ -53,7 +60,7 @@ def all_figures(study: Study, most_tasks: int | None = None) -> Figures:
         skipped["signatures"] = f"there would be one for each of {tasks} tasks"
     for name, maker in makers.items():
         try:
-            found = maker(study)
+            found = maker(study) if methods is None else maker(study, methods=methods)
         except CoarticError as error:
             skipped[name] = str(error)
         else:

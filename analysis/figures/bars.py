@@ -20,7 +20,7 @@ from analysis.figures.style import (
     INK,
     PAPER,
     SMALL,
-    TWO,
+    column_width,
     dagger,
     heading,
     letters,
@@ -64,9 +64,10 @@ def bars(
     data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
     adjusted = holm(data.p.tolist())
     data = data.assign(p_holm=adjusted).reset_index(drop=True)
-    # One row of panels, as wide as their bars.
+    # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
-    figure = Figure(figsize=(min(TWO, 0.5 + 0.58 * sum(counts)), 2.6), layout="constrained")
+    width = column_width(0.5 + 0.58 * sum(counts))
+    figure = Figure(figsize=(width, 2.6), layout="constrained")
     panels = figure.subplots(1, len(labels), width_ratios=counts, squeeze=False)[0]
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
@@ -207,7 +208,7 @@ def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
         max([top, *runs.get(label, ())]) for top, label in zip(shown, rows.method, strict=True)
     ]
     bottom = min(rows[["reward", "published"]].min().min(), *(min(r) for r in runs.values()))
-    step = 0.055 * (max(tops) - bottom)
+    step = 0.055 * max(max(tops) - bottom, 1.0)  # tick; nothing learned by anyone
     level = -math.inf
     for place, p in enumerate(rows.p_holm.tolist()[1:], 1):
         level = max(tops[place - 1], tops[place], level) + 1.6 * step

@@ -37,6 +37,18 @@ PAPER: dict[str, tuple[str, Rows]] = {
     ),
 }
 """Figures of the paper: number, and methods by task."""
+ROWS = 2
+"""Hand sequences of a method in the paper's figures, at most."""
+COMMON = 0.2
+"""Share of a method's runs that have a hand sequence which is drawn."""
+_TYPICAL = (
+    "Of each method the run with the commonest hand sequence whose reward is nearest to the "
+    "method's median"
+)
+_BY_SEQUENCE = (
+    "Of each method and hand sequence that is found in a fifth of its runs "
+    f"(at most {ROWS}, and the commonest anyway) the run nearest to the median reward of them"
+)
 
 
 @dataclass(frozen=True)
@@ -48,12 +60,15 @@ class Solution:
     """Label; empty for the initial solution."""
     run_id: str
     execution: Execution
+    share: str = ""
+    """In how many runs of the method its hand sequence was found: ``5 of 20``."""
 
     @property
     def name(self) -> str:
         """As the row is headed."""
         name = short(self.method) if self.method else "initial solution"
-        return f"{name}, {self.execution.hands}"
+        found = f" ({self.share})" if self.share else ""
+        return f"{name}, {self.execution.hands}{found}"
 
 
 def initial_solution(study: Study, task: str) -> Solution:
@@ -67,17 +82,30 @@ def initial_solution(study: Study, task: str) -> Solution:
     return Solution(study.results.tasks[task], "", "", execution)
 
 
-def typical_run(study: Study, task: str, label: str) -> str:
-    """Id of the run that stands for a cell.
+def common_sequences(study: Study, task: str, label: str, most: int) -> list[str]:
+    """The ``most`` commonest hand sequences that :data:`COMMON` of a cell's runs have.
 
-    Of the runs with the commonest hand sequence (the first of them in the alphabet where
-    several are as common) that whose reward is nearest to the median reward of the cell.
+    The commonest first, as common ones in the order of the alphabet; at least one.
+    """
+    counts = solved(study, task, label).good.hands.value_counts()
+    ordered = sorted(counts.items(), key=lambda item: (-int(item[1]), str(item[0])))
+    least = COMMON * int(counts.sum())
+    common = [str(hands) for hands, count in ordered if count >= least]
+    return (common or [str(ordered[0][0])])[:most]
+
+
+def typical_run(study: Study, task: str, label: str, hands: str | None = None) -> str:
+    """Id of the run that stands for a cell, or for its runs with one hand sequence.
+
+    Of the runs with ``hands`` that whose reward is nearest to their median. Without
+    ``hands`` of those with the commonest sequence (the first of them in the alphabet where
+    several are as common) that whose reward is nearest to the median of the cell.
     """
     good = solved(study, task, label).good
-    counts = good.hands.value_counts()
-    hands = min(counts.index[counts == counts.max()])
-    candidates = good[good.hands == hands]
-    median = float(np.median(good.reward.to_numpy(dtype=np.float64)))
+    middle = good if hands is None else good[good.hands == hands]
+    own = common_sequences(study, task, label, 1)[0] if hands is None else hands
+    candidates = good[good.hands == own]
+    median = float(np.median(middle.reward.to_numpy(dtype=np.float64)))
     off = np.abs(candidates.reward.to_numpy(dtype=np.float64) - median)
     return str(candidates.run_id.iloc[int(off.argmin())])
 
@@ -96,7 +124,10 @@ def learned_solution(study: Study, task: str, label: str, run_id: str | None = N
     movements = movements_from(
         own, solutions[solutions.run_id == run_id], paths[paths.run_id == run_id]
     )
-    return Solution(own, label, run_id, execute(own, movements))
+    execution = execute(own, movements)
+    alike = int((good.hands == execution.hands).sum())
+    share = f"{alike} of {len(good)}" if len(good) > 1 else ""
+    return Solution(own, label, run_id, execution, share)
 
 
 @styled
@@ -107,11 +138,14 @@ def configurations(
     id: str = "configurations",  # noqa: A002
     runs: Mapping[tuple[str, str], str] | None = None,
     like: str = "Figures 5 to 7",
+    sequences: int = 1,
 ) -> Plot:
     """One panel a goal, one row a solution: the initial one, then each method's.
 
     ``rows`` names the methods of each task. ``runs`` names runs by task and method instead
-    of the typical ones (:func:`typical_run`). Raises CoarticError for what the folder lacks.
+    of the typical ones (:func:`typical_run`). With more than one of ``sequences`` a method
+    has a row for each of so many :func:`common_sequences`. Raises CoarticError for what the
+    folder lacks.
     """
     unknown = [task for task, _ in rows if task not in study.results.tasks]
     if unknown:
@@ -119,14 +153,18 @@ def configurations(
     shown: list[Solution] = []
     for task, methods in rows:
         shown.append(initial_solution(study, task))
-        shown += [
-            learned_solution(study, task, label, (runs or {}).get((task, label)))
-            for label in methods
-        ]
+        for label in methods:
+            own = (runs or {}).get((task, label))
+            if own is not None or sequences == 1:
+                shown.append(learned_solution(study, task, label, own))
+                continue
+            for hands in common_sequences(study, task, label, sequences):
+                run = typical_run(study, task, label, hands)
+                shown.append(learned_solution(study, task, label, run))
     figure = _draw(shown)
     tasks = {solution.task.name: solution.task for solution in shown}
     named = "; ".join(
-        f"{solution.task.name}, {short(solution.method)}: run {solution.run_id}"
+        f"{solution.task.name}, {solution.name}: run {solution.run_id}"
         for solution in shown
         if solution.method
     )
@@ -140,9 +178,10 @@ def configurations(
             "Configuration when each goal was hit (black; joints of the chosen arm marked: "
             "open squares left, closed circles right) and the one before (grey). Above each "
             "panel goal, chosen hand and reward of the movement (−1 a control tick), at the "
-            "row's end the total. Of each method the run with the commonest hand sequence "
-            f"whose reward is nearest to the method's median, unless another was asked for: "
-            f"{named}. After {like} of Shah, Barto & Fagg (2013).{dagger(tasks.values())}"
+            f"row's end the total. {_TYPICAL if sequences == 1 else _BY_SEQUENCE}, unless "
+            "another was asked for; in brackets in how many of the method's runs the sequence "
+            f"was found: {named}. After {like} of Shah, Barto & Fagg (2013)."
+            f"{dagger(tasks.values())}"
         ),
         alt=f"Robot configurations at every goal. {totals}.",
         figure=figure,
@@ -150,24 +189,29 @@ def configurations(
     )
 
 
-def paper_configurations(study: Study) -> tuple[list[Plot], dict[str, str]]:
+def paper_configurations(
+    study: Study, methods: Sequence[str] | None = None
+) -> tuple[list[Plot], dict[str, str]]:
     """The paper's Figures 5 to 7 as far as the folder allows, and why one is missing.
 
-    Methods that the folder lacks are left out where another one of the task remains.
+    They show the paper's conditions or ``methods``, and up to :data:`ROWS` hand sequences of
+    each. Methods that the folder lacks are left out where another one of the task remains.
     """
     plots, skipped = [], {}
-    for name, (figure, rows) in PAPER.items():
+    for name, (figure, printed) in PAPER.items():
+        rows = [(task, own if methods is None else methods) for task, own in printed]
         kept = [
-            (task, [label for label in methods if (task, label) in study.cells])
-            for task, methods in rows
+            (task, [label for label in own if (task, label) in study.cells]) for task, own in rows
         ]
-        kept = [(task, methods) for task, methods in kept if methods]
+        kept = [(task, own) for task, own in kept if own]
         if not kept:
-            wanted = " or ".join(f"{', '.join(methods)} on {task}" for task, methods in rows)
+            wanted = " or ".join(f"{', '.join(own)} on {task}" for task, own in rows)
             skipped[name] = f"no runs of {wanted}"
             continue
         try:
-            plots.append(configurations(study, kept, id=name, like=f"Figure {figure}"))
+            plots.append(
+                configurations(study, kept, id=name, like=f"Figure {figure}", sequences=ROWS)
+            )
         except CoarticError as error:
             skipped[name] = str(error)
     return plots, skipped

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -75,8 +76,8 @@ def context(
         raise missing(
             study, f"{len(places)} pairs of tasks share a goal, more than {MOST}: name some tasks"
         )
-    rows = sum(len(group) + 3 for _, group in places)
-    figure = Figure(figsize=(ONE * 1.2, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
+    rows = sum(len(group) + 4 for _, group in places)
+    figure = Figure(figsize=(ONE, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
     panels = figure.subplots(
         len(places), 1, squeeze=False, sharex=True,
         height_ratios=[len(group) + 1 for _, group in places],
@@ -84,8 +85,8 @@ def context(
     for axes, ((task, where), group) in zip(panels, places, strict=True):
         _panel(axes, group)
         axes.set_xlim(0, 1.12 * data[["equivalent", "other"]].max().max())
-        axes.set_title(f"{task}: {where}")
-    panels[-1].set_xlabel("difference per root of dimension (length unit, rad)")
+        axes.set_title(textwrap.fill(f"{task}: {where}", 31))
+    panels[-1].set_xlabel("difference per root of dimension\n(length unit, rad)")
     if len(places) > 1:
         letters(panels)
     figure.legend(handles=_handles(), loc="outside lower center", ncols=2, fontsize=SMALL)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.figures.plot import Plot
-from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, missing
+from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
 from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, short, styled
 from analysis.inference.across_tasks import by_task, profile, scores_frame
 from analysis.inference.statistics import CONFIDENCE
@@ -38,7 +38,8 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Share of runs, each task counting the same, by normalised score and by gap.
 
     Methods with runs on every task of the folder whose optimum is known; :data:`LEARNER`
-    joins the paper's conditions. Raises CoarticError where there is none.
+    joins the paper's conditions. The caption names methods that were asked for and have no
+    such runs. Raises CoarticError where there is none.
     """
     scores = scores_frame(study.results)
     tasks = list(scores.task.unique())
@@ -60,13 +61,14 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         )
         labels = [LEARNER, *labels]
     else:
-        chosen(study, tasks, [label for label in methods if label != LEARNER])
+        known_methods(study, [label for label in methods if label != LEARNER])
         labels = list(methods)
     everywhere = [label for label in labels if set(by_task(scores, label)) == set(tasks)]
-    if not tasks or not everywhere or (methods and len(everywhere) < len(labels)):
+    if not tasks or not everywhere:
         raise _incomplete(study, tasks, [label for label in labels if label not in everywhere])
     data = pd.concat([_profiles(scores, label) for label in everywhere], ignore_index=True)
     names = ", ".join(tasks)
+    absent = [short(label) for label in methods or () if label not in everywhere]
     ends = data[(data.kind == "gap") & (data.threshold.round(6) == 0.05)]
     words = "; ".join(
         f"{_name(row['method'])}: {row['share']:.0%}" for row in ends.to_dict("records")
@@ -82,6 +84,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
             f"optimum in the place of the best solver). Bands: {percent(CONFIDENCE)} intervals, "
             f"pointwise, runs resampled within tasks (seed {SEED}). Learner: EC1 on tasks with "
             "one hand, EC4 on those with two."
+            + (f" Not run on every task: {', '.join(absent)}." if absent else "")
         ),
         alt=f"Profiles over tasks. Share of runs within 5 % of the optimum: {words}.",
         figure=_draw(data, everywhere),

@@ -62,7 +62,7 @@ def published(
             "paper prints a reward of",
         )
     data = pd.DataFrame(rows)
-    figure = Figure(figsize=(ONE * 1.25, 0.85 + 0.185 * len(data)), layout="constrained")
+    figure = Figure(figsize=(ONE, 0.85 + 0.185 * len(data)), layout="constrained")
     axes = figure.subplots()
     _draw(axes, data, {name: task.reconstructed != () for name, task in found.items()})
     shown = {name: found[name] for name in data.task.unique()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Sequence
 
 from analysis.results import CellRuns
@@ -50,19 +51,34 @@ def headline(study: Study, tasks: Iterable[str]) -> list[str]:
 
 
 def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) -> list[str]:
-    """``methods``, or the default ones; CoarticError where one has no solved run there."""
+    """The default methods, or those of ``methods`` that have a solved run on one of the tasks.
+
+    Raises CoarticError where there is none of them, or one that the folder does not have.
+    """
     if methods is None:
         labels = headline(study, tasks)
         if not labels:
             raise missing(study, f"no method has a solved run on {', '.join(tasks) or 'any task'}")
         return labels
+    known_methods(study, methods)
+    found = [label for label in methods if any(has(study, task, label) for task in tasks)]
+    if not found:
+        raise missing(study, f"no solved run of {', '.join(methods)} on {', '.join(tasks)}")
+    return found
+
+
+def known_methods(study: Study, methods: Sequence[str]) -> None:
+    """Raise CoarticError for a label, method with variant, that the folder does not have."""
+    known = list(dict.fromkeys(label for _, label in study.cells))
     for label in methods:
-        if not any(has(study, task, label) for task in tasks):
-            known = sorted({own for _, own in study.cells})
-            raise missing(
-                study, f"no solved run of {label} on {', '.join(tasks)}; methods: {known}"
+        if label not in known:
+            near = difflib.get_close_matches(label, known, n=3, cutoff=0.5)
+            hint = (
+                f"did you mean {' or '.join(map(repr, near))}?"
+                if near
+                else f"it has {', '.join(known)}"
             )
-    return list(methods)
+            raise missing(study, f"no method {label!r}; {hint}")
 
 
 def known_tasks(study: Study, tasks: Sequence[str] | None) -> dict[str, Task]:

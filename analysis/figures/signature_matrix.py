@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, known_tasks, missing
-from analysis.figures.style import GREY, TWO, dagger, number, on, short, styled
+from analysis.figures.selection import chosen, has, known_tasks, missing
+from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, short, styled
 from analysis.slugs import slugs
 from analysis.study import Study
 from coartic import Task
@@ -52,9 +52,14 @@ def signature_matrix(
     Raises CoarticError where no method has a signature on any of the tasks.
     """
     plots, ids = [], slugs(study.results.tasks)
-    for name, task in known_tasks(study, tasks).items():
-        frame = study.signatures
-        labels = chosen(study, [name], methods) if (frame.task == name).any() else []
+    found, frame = known_tasks(study, tasks), study.signatures
+    if methods is not None:
+        chosen(study, list(found), methods)
+    for name, task in found.items():
+        asked = methods and [label for label in methods if has(study, name, label)]
+        if asked == [] or not (frame.task == name).any():
+            continue
+        labels = chosen(study, [name], asked)
         data = _values(frame[(frame.task == name) & frame.label.isin(labels)], labels)
         if data.value.notna().any():
             plots.append(_plot(task, ids[name], data))
@@ -100,7 +105,9 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
     above, right, tall = 1.38, 0.7, 0.19  # inches
     side = min((TWO - left - right) / len(columns), 0.6)
-    width, height = left + side * len(columns) + right, above + tall * len(labels) + 0.06
+    width = column_width(left + side * len(columns) + right)
+    side = (width - left - right) / len(columns)
+    height = above + tall * len(labels) + 0.06
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes(
         (

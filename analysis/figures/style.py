@@ -189,6 +189,11 @@ def dagger(tasks: Iterable[Task]) -> str:
     return " † Reconstructed: what the paper does not print of this task was inferred."
 
 
+def column_width(inches: float) -> float:
+    """Width in inches of a figure that needs so many: one column of a journal or two."""
+    return ONE if inches <= ONE else TWO
+
+
 def number(value: float, digits: int = 0) -> str:
     """A number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.plot import Plot
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.figures.style import NORMAL, SMALL, TALLEST, TWO, styled
+from analysis.figures.style import NORMAL, SMALL, TALLEST, TWO, column_width, styled
 from coartic import Task
 
 
@@ -31,7 +31,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         (TWO / columns - around) / width, (TALLEST - 0.3 - rows * above) / rows / height, 0.42
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    figure = Figure(figsize=(max(size[0], 2.2), size[1]), layout="constrained")
+    figure = Figure(figsize=(column_width(size[0]), size[1]), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, task, corners in zip(panels, tasks, boxes, strict=False):
         draw_robot(axes, task, task.q0, marked=task.hands)

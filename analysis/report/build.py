@@ -65,9 +65,14 @@ class Report:
     numbers: tuple[Number, ...]
 
 
-def build(study: Study) -> Report:
-    """Everything a report holds. A section that the runs do not allow is left out."""
-    figures, numbers = all_figures(study, MOST_TASKS), tuple(headline_numbers(study))
+def build(study: Study, methods: Sequence[str] | None = None) -> Report:
+    """Everything a report holds. A section that the runs do not allow is left out.
+
+    ``methods``: labels that the figures show instead of their own choice; CoarticError for
+    one that the folder does not have.
+    """
+    figures = all_figures(study, MOST_TASKS, methods)
+    numbers = tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
     judged = judge(study)
     pairs = pairwise_frame(study)

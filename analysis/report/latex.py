@@ -1,15 +1,20 @@
 """A document's tables for LaTeX: booktabs and siunitx, for pdfLaTeX with T1 and UTF-8.
 
-A table wider than the line is scaled down to it; columns that are not for print are left out.
+Columns that are not for print are left out, methods have the names that figures show, headers
+are broken into lines; a float that is wider than the line all the same is scaled down to it.
+Tables longer than a page are of longtable, which needs one column of text.
 """
 
 from __future__ import annotations
 
 import re
+import textwrap
 import unicodedata
+from collections.abc import Sequence
 
+from analysis.figures.style import short
 from analysis.report.document import DataTable, Document, Value
-from analysis.report.text import NO_SPREAD, Part, inline, parts
+from analysis.report.text import MINUS, NO_SPREAD, Part, inline, parts
 from analysis.table import NONE
 
 _ESCAPES = {
@@ -63,13 +68,20 @@ _GREEK = {
 }
 _RAISED = {"⁻": "-", **dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True))}
 _LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True))
-MOST_ROWS = 32
-"""Of a table that fits on a page in footnotesize."""
+MOST_ROWS = 35
+"""Of a float; a table with more is continued on the next page."""
+PACKAGES = ("booktabs", "siunitx", "graphicx", "longtable")
+"""What the tables need."""
+_LINE = {"footnotesize": 86.0, "scriptsize": 79.0}
+"""Figures on a line of 345 pt; of a float by a tenth more, which scaling leaves above 7 pt."""
+_GAP, _THIN, _MINUS = 1.5, 0.6, 1.5  # between columns; a thin character; a minus
+_LEAST = 8.0  # of a column of text
+_LABELS = {"method", "first", "second"}  # columns of methods with their variants
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 
 def latex_tables(document: Document) -> dict[str, str]:
-    """Every table by id, each a ``table`` float with label ``tab:ID``."""
+    """Every table by id, with label ``tab:ID``: a ``table`` float, or a ``longtable``."""
     return {table.id: latex_table(table) for table in document.tables()}
 
 
@@ -77,7 +89,8 @@ def latex_inputs(document: Document) -> str:
     """A file that inputs all tables from ``tables/``."""
     inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
     return (
-        "% Needs \\usepackage{booktabs,siunitx,graphicx}, \\usepackage[T1]{fontenc} and UTF-8.\n"
+        f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
+        f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
         + inputs
     )
 
@@ -85,24 +98,33 @@ def latex_inputs(document: Document) -> str:
 def latex_table(table: DataTable) -> str:
     """One table: numbers in S columns as wide as they need, text and intervals beside them."""
     shown = [part for part in parts(table) if part.column.printed]
-    kinds = [_kind(part, table) for part in shown]
-    head = " & ".join(f"{{{latex_text(part.header)}}}" for part in shown)
+    long = len(table.rows) > MOST_ROWS
+    wrapped = _wrapped(shown, table, _LINE["scriptsize" if long else "footnotesize"])
+    kinds = "".join(
+        f">{{\\raggedright\\arraybackslash}}p{{{0.53 * wrapped[part]:.1f}em}}"
+        if part in wrapped
+        else _kind(part, table)
+        for part in shown
+    )
+    kinds = f"@{{}}{kinds}@{{}}"
+    head = " & ".join(_head(part, table, wrapped.get(part)) for part in shown)
     rows = "\n".join(
         " & ".join(_cell(part, row.values[part.index]) for part in shown) + r" \\"
         for row in table.rows
     )
-    size = "footnotesize" if len(table.rows) <= MOST_ROWS else "scriptsize"
+    caption = f"\\caption{{{_spans(table.caption)}}}\n\\label{{tab:{table.id}}}"
+    if long:
+        return _long(table, caption, kinds, head, rows)
     notes = "".join(
         f"\\par\\smallskip\\parbox{{\\linewidth}}{{{_spans(note)}}}\n" for note in table.notes
     )
     return f"""\\begin{{table}}[htbp]
 \\centering
-\\{size}
-\\setlength{{\\tabcolsep}}{{4pt}}
-\\caption{{{_spans(table.caption)}}}
-\\label{{tab:{table.id}}}
+\\footnotesize
+\\setlength{{\\tabcolsep}}{{3pt}}
+{caption}
 \\resizebox{{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}}{{!}}{{%
-\\begin{{tabular}}{{{"".join(kinds)}}}
+\\begin{{tabular}}{{{kinds}}}
 \\toprule
 {head} \\\\
 \\midrule
@@ -111,6 +133,85 @@ def latex_table(table: DataTable) -> str:
 \\end{{tabular}}}}
 {notes}\\end{{table}}
 """
+
+
+def _long(table: DataTable, caption: str, kinds: str, head: str, rows: str) -> str:
+    notes = "".join(f"\\noindent {_spans(note)}\\par\n" for note in table.notes)
+    return f"""\\begingroup
+\\scriptsize
+\\setlength{{\\tabcolsep}}{{3pt}}
+\\setlength{{\\LTcapwidth}}{{\\linewidth}}
+\\begin{{longtable}}{{{kinds}}}
+{caption} \\\\
+\\toprule
+{head} \\\\
+\\midrule
+\\endfirsthead
+\\toprule
+{head} \\\\
+\\midrule
+\\endhead
+\\bottomrule
+\\endfoot
+{rows}
+\\end{{longtable}}
+{notes}\\endgroup
+"""
+
+
+def _wrapped(shown: Sequence[Part], table: DataTable, line: float) -> dict[Part, float]:
+    """Columns of text to be broken into lines, and their widths, so that a table fits.
+
+    Widths are of figures, which all are as wide.
+    """
+    widths = {part: max(map(_width, _column(part, table))) for part in shown}
+    excess = sum(widths.values()) + _GAP * (len(shown) - 1) - line
+    found = {}
+    texts = [part for part in shown if part.column.kind == "text"]
+    for part in sorted(texts, key=lambda part: -widths[part]):
+        words = " ".join(_column(part, table)).replace("/", "/ ").split()
+        least = max(_width(max(words, key=_width, default="")), 0.3 * widths[part], _LEAST)
+        width = max(widths[part] - excess, least)
+        if excess > 0 and width < widths[part]:
+            found[part] = width
+            excess -= widths[part] - width
+    return found
+
+
+def _width(text: str) -> float:
+    """In figures: thin characters, a true minus, and all others."""
+    thin, minus = sum(map(text.count, " .,:;()[]/|ijlt'-")), text.count(MINUS)
+    return len(text) + (_THIN - 1) * thin + (_MINUS - 1) * minus
+
+
+def _column(part: Part, table: DataTable) -> list[str]:
+    """What stands in a column, the lines of its header first; of S columns their format."""
+    sign, wholes, decimals = _format(part, table) if part.numeric else ("", 0, 0)
+    own = f"{sign and MINUS}{'0' * wholes}{'.' * (decimals > 0)}{'0' * decimals}"
+    words = (_words(part, row.values[part.index]) for row in table.rows)
+    return [*_lines(part, table), own, *words]
+
+
+def _lines(part: Part, table: DataTable, width: float | None = None) -> list[str]:
+    """The header, in as many lines as make it no wider than what stands below."""
+    below = max(len(_words(part, row.values[part.index])) for row in table.rows)
+    text = part.header.replace(" %", "\N{NO-BREAK SPACE}%")  # which a line does not begin with
+    return textwrap.wrap(text, max(int(width or below), 7), break_long_words=False)
+
+
+def _head(part: Part, table: DataTable, width: float | None) -> str:
+    text, lines = part.header, _lines(part, table, width)
+    if len(lines) < 2:
+        return f"{{{latex_text(text)}}}"
+    place = "l" if part.column.kind == "text" else "r" if part.kind == "interval" else "c"
+    stacked = r" \\ ".join(map(latex_text, lines))
+    return f"{{\\shortstack[{place}]{{{stacked}}}}}"
+
+
+def _words(part: Part, value: Value) -> str:
+    """A value as it is printed, before LaTeX."""
+    text = part.text(value)
+    return short(text) if part.column.name in _LABELS and text != NONE else text
 
 
 def latex_text(text: str) -> str:
@@ -153,6 +254,12 @@ def _spans(text: str) -> str:
 def _kind(part: Part, table: DataTable) -> str:
     if not part.numeric:
         return "l" if part.column.kind == "text" else "r"
+    sign, wholes, decimals = _format(part, table)
+    return f"S[table-format={sign}{wholes}.{decimals}]" if wholes else "r"
+
+
+def _format(part: Part, table: DataTable) -> tuple[str, int, int]:
+    """Sign, digits before and digits after the point of a column's numbers."""
     numbers = [
         number
         for row in table.rows
@@ -160,18 +267,17 @@ def _kind(part: Part, table: DataTable) -> str:
         if _NUMBER.fullmatch(number)
     ]
     if not numbers:
-        return "r"
+        return "", 0, 0
     sign = "-" if any(number.startswith("-") for number in numbers) else ""
     wholes, decimals = zip(
         *(number.removeprefix("-").partition(".")[::2] for number in numbers), strict=True
     )
-    width = f"{max(map(len, wholes))}.{max(map(len, decimals))}"
-    return f"S[table-format={sign}{width}]"
+    return sign, max(map(len, wholes)), max(map(len, decimals))
 
 
 def _cell(part: Part, value: Value) -> str:
     if part.column.kind == "text":
-        return latex_text(part.text(value))
+        return latex_text(_words(part, value))
     numbers = part.numbers(value)
     if not numbers:
         return f"{{{latex_text(NONE)}}}"

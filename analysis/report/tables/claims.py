@@ -41,7 +41,7 @@ def claims_table(study: Study, judged: Sequence[Judged]) -> DataTable | None:
         ),
         rows,
         (
-            "Supported: what the claim says is seen, and its p (largest of its tests) is "
+            "Supported: what the claim says is seen, and its p (the largest of its tests) is "
             "below 5 % after Holm's correction over the claims; not supported: the contrary's is, "
             "or what can be counted is not there. No p: counted, or nothing to test.",
         ),

@@ -40,8 +40,9 @@ def targets_table(study: Study, targets: pd.DataFrame, task: str) -> DataTable |
     heads = [Column("method", "method")]
     for share in shares:
         name = f"within_{share:.0%}".rstrip("%")
-        heads.append(Column(f"{name}_reached", f"within {100 * share:.0f} %"))
-        heads.append(Column(name, "median trials", "number", digits=0))
+        printed = share in (shares[0], shares[-1])
+        heads.append(Column(f"{name}_reached", f"within {100 * share:.0f} %", printed=printed))
+        heads.append(Column(name, "median trials", "number", digits=0, printed=printed))
     return table(
         f"targets-{table_ids(study)[task]}",
         f"Trials to come near the optimum of {task}, other arm free.",

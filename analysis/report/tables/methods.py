@@ -66,7 +66,7 @@ def methods_table(study: Study, task: str) -> DataTable | None:
             Column("other_arm", "other arm", printed=False),
             Column("trials", "trials", "number"),
             Column("movement_ticks", "ticks", "number", printed=False),
-            Column("forward_kinematics", "kinematics", "number"),
+            Column("forward_kinematics", "kinematics", "number", printed=False),
             Column("jacobians", "Jacobians", "number", printed=False),
             Column("solver_iterations", "iterations", "number", printed=False),
             Column("solve_s", "solve", "number", "s"),

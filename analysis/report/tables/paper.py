@@ -55,7 +55,7 @@ def published_table(study: Study) -> DataTable | None:
         (
             Column("task", "task"),
             Column("method", "method"),
-            Column("published", "published", "number", "ticks", 1),
+            Column("published", "paper", "number", "ticks", 1),
             Column("published_runs", "published runs", "number", printed=False),
             Column("ours", "ours", "number", "ticks", 1),
             Column("runs", "runs", "number", printed=False),
@@ -68,8 +68,8 @@ def published_table(study: Study) -> DataTable | None:
         ),
         rows,
         (
-            "Published: mean ± SD. Ours: mean ± SD with its BCa interval. The difference has "
-            "Welch's interval from the printed mean, SD and runs; where no SD is printed the "
+            "Paper: mean ± SD as printed. Ours: mean ± SD with its BCa interval. The difference "
+            "has Welch's interval from the printed mean, SD and runs; where no SD is printed the "
             f"printed mean is taken as exact. *Equivalent*: the interval lies within {MARGIN:.0%} "
             "of the published reward; *different*: outside; *undecided*: neither. The "
             "published mean of EC2 is pooled from what is printed by hand sequence. Learned "

@@ -116,7 +116,7 @@ def _signatures(
                 head,
                 "number",
                 unit,
-                printed=index < 3,
+                printed=index < 2,
             )
         )
     return table(
