@@ -102,7 +102,7 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
     for name, entries in (
         ("independent tests", [e for e in paper if not e.claim.fitted]),
         (
-            "no independent tests, as they entered the tasks' reconstruction †",
+            "no independent tests, as they rest on reconstructed tasks †",
             [e for e in paper if e.claim.fitted],
         ),
     ):
