@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.frontier.frames import pareto_frame
 from analysis.frontier.progress import Progress, progress
 from analysis.methods import methods_frame
 from analysis.optimum import Optimum, optima
@@ -61,6 +62,11 @@ class Study:
     def optima(self) -> dict[tuple[str, str], Optimum]:
         """Best known solutions by task and other arm (``free``, ``still``)."""
         return optima(self.results)
+
+    @cached_property
+    def pareto(self) -> pd.DataFrame:
+        """:func:`analysis.frontier.frames.pareto_frame`, a bootstrap."""
+        return pareto_frame(self.results)
 
     @cached_property
     def steps(self) -> dict[str, Progress]:

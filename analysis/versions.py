@@ -27,11 +27,10 @@ from analysis.inference.statistics import (
 )
 from analysis.methods import solve_times
 from analysis.results import CellRuns, Results, load_results
+from analysis.study import SEED
 from analysis.table import NONE, Table
 from coartic import CoarticError
 
-SEED = 0
-"""Of every resampling; it has nothing to do with the seeds of the runs."""
 SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
 """Spends whose medians are compared; the last one is wall time, s."""
 _WORDS = {"title", "description", "provenance"}  # of a task; they change no result

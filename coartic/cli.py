@@ -309,7 +309,6 @@ def analyse(
         anytime_frame,
         area_frame,
         for_both_arms,
-        pareto_frame,
         targets_frame,
     )
     from analysis.frontier.page import frontier_page
@@ -329,7 +328,7 @@ def analyse(
     overall = overall_frame(scores)
     targets = for_both_arms(targets_frame, results, steps)
     areas = for_both_arms(area_frame, results, steps)
-    pareto = pareto_frame(results)
+    pareto = study.pareto
     pages = {
         "claims.md": claims_page(results, judged),
         "comparisons.md": comparisons_page(study, pairs, overall, scores),

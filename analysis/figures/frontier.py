@@ -26,7 +26,7 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.frontier.frames import anytime_frame, pareto_frame
+from analysis.frontier.frames import anytime_frame
 from analysis.frontier.progress import SPENDS
 from analysis.inference.statistics import CONFIDENCE
 from analysis.optimum import METHODS as OPTIMUM
@@ -64,7 +64,7 @@ def frontier(
     ]
     frame = anytime_frame(study.results, study.steps)
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
-    pareto = pareto_frame(study.results)
+    pareto = study.pareto
     front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]
     plots = []
     for spend in spends:

@@ -13,7 +13,7 @@ from analysis.claims.page import FITTED
 from analysis.claims.register import Judged
 from analysis.figures import Figures, Plot, all_figures
 from analysis.figures.plot import save, svg_text
-from analysis.frontier.frames import area_frame, for_both_arms, pareto_frame, targets_frame
+from analysis.frontier.frames import area_frame, for_both_arms, targets_frame
 from analysis.inference.across_tasks import scores_frame
 from analysis.pairs.overall import combined, overall_frame
 from analysis.pairs.pairwise import pairwise_frame
@@ -202,7 +202,7 @@ def _cost(study: Study, frontier: list[Block]) -> Section:
     results, steps = study.results, study.steps
     targets = for_both_arms(targets_frame, results, steps)
     areas = for_both_arms(area_frame, results, steps)
-    pareto = pareto_frame(results)
+    pareto = study.pareto
     below = []
     for task, slug in tables.table_ids(study).items():
         blocks = _tables(
