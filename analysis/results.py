@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,17 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.integrity import (
-    ANEW,
-    check_columns,
-    check_learning,
-    check_manifest,
-    check_paths,
-    check_runs,
-    check_sequences,
-    check_solutions,
-    damaged,
-)
+from analysis.integrity import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
 
 
@@ -78,32 +67,24 @@ class Results:
         ]
 
     def solutions(self) -> pd.DataFrame:
-        """Movements of every run's solution.
-
-        Raises CoarticError where they cannot be read, or are not what the runs made.
-        """
-        path, table = read_table(self.folder, "solutions", nullable=False)
-        check_solutions(path, table, self.runs, self.tasks)
-        return table
+        """Movements of every run's solution."""
+        return read_table(self.folder, "solutions", nullable=False)
 
     def paths(self) -> pd.DataFrame:
-        """Waypoints of the movements that follow a path. Raises CoarticError as above."""
-        path, table = read_table(self.folder, "paths", nullable=False)
-        check_paths(path, table, self.solutions(), self.runs, self.tasks)
-        return table
+        """Waypoints of the movements that follow a path."""
+        return read_table(self.folder, "paths", nullable=False)
 
     def learning(self) -> pd.DataFrame:
-        """Reward of every trial. Raises CoarticError as above."""
-        path, table = read_table(self.folder, "learning")
-        check_learning(path, table, self.runs)
-        return table
+        """Reward of every trial."""
+        return read_table(self.folder, "learning")
 
 
 def load_results(folder: Path) -> Results:
     """Read a results folder. Every command that reads one passes here.
 
-    Raises CoarticError where it is not one, is not finished, or is damaged: where its runs are
-    not those of its plan and code, say, or their movements do not add up to their reward.
+    Stored solutions are executed again, and tables made again from the records (see
+    :mod:`analysis.integrity`). Raises CoarticError where the folder is not a results folder,
+    is not finished, or does not agree with itself.
     """
     if not folder.exists():
         raise CoarticError(
@@ -111,43 +92,19 @@ def load_results(folder: Path) -> Results:
         )
     if not folder.is_dir():
         raise CoarticError(f"{folder} is a file, not a results folder")
-    source = folder / "manifest.json"
-    try:
-        manifest = json.loads(source.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        if (folder / "records").is_dir():
-            raise CoarticError(
-                f"{folder} has records of runs but no tables yet: its run was interrupted, or is "
-                "still at work; start the same `coartic run` again, which does what is missing"
-            ) from None
-        raise CoarticError(f"{folder} is not a results folder: {source} is missing") from None
-    except (OSError, ValueError) as error:
-        raise CoarticError(f"{folder}: results cannot be read: {error}") from None
-    check_manifest(source, manifest)
-    (path, runs), (other, sequences) = (read_table(folder, name) for name in ("runs", "sequences"))
-    results = Results(folder, manifest, runs, sequences)
-    specification = manifest["specification"]
-    code = {name: method["code"] for name, method in specification["methods"].items()}
-    check_runs(path, runs, specification["run_ids"], code)
-    check_sequences(other, sequences, results.tasks)
-    results.solutions()  # for its checks
-    return results
+    manifest = read_manifest(folder)
+    check_tables(folder, manifest, read_records(folder, manifest))
+    return Results(
+        folder,
+        manifest.model_dump(mode="json"),
+        read_table(folder, "runs"),
+        read_table(folder, "sequences"),
+    )
 
 
-def read_table(folder: Path, name: str, *, nullable: bool = True) -> tuple[Path, pd.DataFrame]:
-    """A table of a results folder and its path; nullable types unless it lacks no values.
-
-    Raises CoarticError where it is missing or damaged, or holds another table.
-    """
+def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFrame:
+    """A table of a results folder; nullable types unless it lacks no values."""
     path = folder / f"{name}.parquet"
-    try:
-        if nullable:
-            table = pd.read_parquet(path, dtype_backend="numpy_nullable")
-        else:
-            table = pd.read_parquet(path)
-    except FileNotFoundError:
-        raise CoarticError(f"{path} is missing; {ANEW}") from None
-    except (OSError, ValueError) as error:
-        damaged(path, str(error).splitlines()[0] if str(error) else type(error).__name__)
-    check_columns(path, table)
-    return path, table
+    if nullable:
+        return pd.read_parquet(path, dtype_backend="numpy_nullable")
+    return pd.read_parquet(path)

@@ -34,7 +34,6 @@ from coartic import CoarticError
 SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
 """Spends whose medians are compared; the last one is wall time, s."""
 _WORDS = {"title", "description", "provenance"}  # of a task; they change no result
-_RESULT = ["status", "reward", "hands"]
 _VERDICTS = (
     ("identical", "identical in every run"),
     ("equivalent", "not identical, equivalent"),
@@ -147,7 +146,7 @@ def cells_frame(first: Results, second: Results) -> pd.DataFrame:
     """One row per cell that both folders have, in the order of the first one's plan.
 
     ``n_*`` runs, ``solved_*`` those with a solution, ``mean_*`` reward; ``shared`` seeds and
-    ``identical`` runs among them: the same status, reward and hands. ``difference`` is the
+    ``identical`` runs among them: the same status, joints, ticks and rewards of all trials. ``difference`` is the
     mean of B less that of A with its 95 % BCa interval (``low``, ``high``), ``paired`` by seed
     where at least three are shared; ``p`` is of the two-sided bootstrap test, ``p_adjusted``
     after Holm over all cells tested. ``verdict`` is ``identical`` (every run), ``equivalent``,
@@ -182,7 +181,7 @@ _COLUMNS = [
 def _row(first: CellRuns, second: CellRuns, task: list[str] | None) -> dict[str, Any]:
     a, b = first.good, second.good
     both = first.runs.merge(second.runs, on="seed", suffixes=("_a", "_b"), validate="1:1")
-    same = np.all([_equal(both[f"{name}_a"], both[f"{name}_b"]) for name in _RESULT], axis=0)
+    same = both.result_a == both.result_b
     row: dict[str, Any] = {
         "task": first.task,
         "method": first.method,
@@ -216,12 +215,6 @@ def _row(first: CellRuns, second: CellRuns, task: list[str] | None) -> dict[str,
     }
     everything = row["identical"] == len(a) == len(b)
     return row | (_EQUAL if everything else _difference(a, b))
-
-
-def _equal(first: pd.Series, second: pd.Series) -> pd.Series:
-    """Entry by entry; two missing values are equal."""
-    missing: pd.Series = first.isna() & second.isna()
-    return missing | (first == second).fillna(False).astype(bool)
 
 
 _EQUAL = {"verdict": "identical", "paired": True, "difference": 0.0}
@@ -399,12 +392,12 @@ def _notes(first: Results, second: Results) -> list[str]:
         "compare code only where processor and load were the same.",
         "Cells with a run that has no solution are not compared: a mean of the others would "
         "flatter whichever side failed on the harder runs.",
-        "Tables are read here and checked against each other and the manifest, not against "
-        "the records that they were made from. `coartic show RUN_ID` checks that a record is "
-        "whole, `coartic reproduce RUN_ID` that its run comes out so again.",
+        "Identical runs have the same status, the same solution to the last joint and tick, and "
+        "the same reward in every trial. Both folders were checked against their records, whose "
+        "solutions were executed again; `coartic reproduce RUN_ID` performs a whole run again.",
     ]
     for side, results in zip("AB", (first, second), strict=True):
-        planned = set(results.manifest["specification"]["run_ids"])
+        planned = set(results.runs.run_id)
         keys = {run_id.partition("-")[0] for run_id in planned}
         stale = sum(
             path.stem not in planned and path.stem.partition("-")[0] in keys

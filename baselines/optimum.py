@@ -93,18 +93,21 @@ class Optimum(Method):
                 )
             made, ticks = self._whole(session, task, problem, best)
         ranked = sorted(best.values(), key=lambda entry: entry[1].cost)
+        bound, proof = self._proof(session, task, ticks)
         details = {
             "path_length": ranked[0][1].cost,
             "path_lengths": {letters_of(i.hands): plan.cost for i, plan in ranked},
             "solves": solves,
             "failed_solves": failed,
-            **self._proof(session, task, ticks),
+            **proof,
         }
-        return Result(made, details)
+        return Result(made, details, bound=bound)
 
-    def _proof(self, session: Session, task: Task, ticks: int) -> dict[str, Any]:
-        """What is proven about the ticks found."""
-        return {}
+    def _proof(
+        self, session: Session, task: Task, ticks: int
+    ) -> tuple[int | None, dict[str, Any]]:
+        """Reward that is proven never to be exceeded, and how hard that was."""
+        return None, {}
 
     def _shortest(
         self, session: Session, task: Task, problem: TrajectoryProblem
@@ -210,7 +213,7 @@ class BranchAndBound(DynamicProgramming):
     Parameters = BoundParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "most_nodes": 100}
 
-    def _proof(self, session: Session, task: Task, ticks: int) -> dict[str, Any]:
+    def _proof(self, session: Session, task: Task, ticks: int) -> tuple[int, dict[str, Any]]:
         with session.solving():
             found = certify(
                 task,
@@ -220,8 +223,7 @@ class BranchAndBound(DynamicProgramming):
                 most_nodes=self.parameters.most_nodes,
             )
         session.spend(solver_iterations=found.iterations)
-        return {
-            "proven_bound": -found.ticks,
+        return -found.ticks, {
             "proven_optimal": found.proven,
             "nodes": found.nodes,
             "open_nodes": found.open_nodes,

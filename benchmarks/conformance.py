@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.methods import Entry, Registry, build, why_not
+from benchmarks.harness import record_of
+from benchmarks.methods import Entry, Registry
 from benchmarks.reproduce import differences, perform_once
-from benchmarks.sandbox import Sandbox
+from benchmarks.sandbox import Keeper
 from benchmarks.specification import Limits, RunSpec
 from coartic import (
     CoarticError,
@@ -31,7 +32,9 @@ from coartic import (
     load_task,
     parse_task,
 )
-from coartic.method import METERED, Information
+from coartic.method import METERED
+from coartic.record import Record
+from coartic.text import plain
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
@@ -83,11 +86,10 @@ def _run(checks: Iterator[Check]) -> Iterator[Law]:
 class _MethodChecks:
     def __init__(self, entry: Entry) -> None:
         self.entry = entry
-        self._sandbox: Sandbox | None = None
+        self._keeper = Keeper()
 
     def close(self) -> None:
-        if self._sandbox is not None:
-            self._sandbox.close()
+        self._keeper.close()
 
     def laws(self) -> Iterator[Check]:
         yield "declaration", self.declaration
@@ -103,16 +105,16 @@ class _MethodChecks:
     def defaults(self) -> dict[str, Any]:
         """Parameters of the check: few trials where the method has trials."""
         trials = {"trials": CHECK_TRIALS} if "trials" in self.fields else {}
-        return trials | dict(self.entry.method.quick)
+        return trials | self.entry.declared.quick
 
     @cached_property
     def fields(self) -> dict[str, Any]:
-        return dict(self.entry.method.Parameters.model_fields)
+        return dict(self.entry.declared.defaults)
 
     @cached_property
     def tasks(self) -> list[Task]:
         tasks = [load_task(name) for name in builtin_tasks()]
-        found = [task for task in tasks if why_not(self.entry, task, self.defaults) is None]
+        found = [task for task in tasks if self.entry.why_not(task, self.defaults) is None]
         if not found:
             raise _BrokenError(
                 "it applies to none of the shipped tasks, so nothing can be checked"
@@ -129,56 +131,50 @@ class _MethodChecks:
             Limits(CHECK_LIMIT_S, budget),
         )
 
-    def record(self, task: Task, seed: int = 1, budget: int | None = None) -> dict[str, Any]:
+    def record(self, task: Task, seed: int = 1, budget: int | None = None) -> Record:
         """A run in the process that lives through the whole check."""
-        return self.perform(self.spec(task, seed, budget).job())
+        spec = self.spec(task, seed, budget)
+        return self.perform(spec, spec.job())
 
-    def perform(self, job: dict[str, Any]) -> dict[str, Any]:
-        if self._sandbox is None or not self._sandbox.alive:
-            self._sandbox = Sandbox()
-        answer = self._sandbox.perform(job)
-        if "status" not in answer:
-            raise _BrokenError(f"{answer['failure']}: {answer['reason']}")
-        record: dict[str, Any] = json.loads(answer["record"])
-        return record
+    def perform(self, spec: RunSpec, job: dict[str, Any]) -> Record:
+        answer = self._keeper.perform(job)
+        if "failure" in answer:
+            raise _BrokenError(f"{answer['failure']}: {plain(answer['reason'])}")
+        return record_of(answer, spec)
 
     @cached_property
-    def first_records(self) -> list[tuple[Task, dict[str, Any]]]:
+    def first_records(self) -> list[tuple[Task, Record]]:
         return [(task, self.record(task)) for task in self.tasks]
 
     def declaration(self) -> str:
-        method = self.entry.method
+        method = self.entry.declared
         for attribute in ("title", "citation"):
-            if not str(getattr(method, attribute, "")).strip():
+            if not getattr(method, attribute).strip():
                 raise _BrokenError(f"{attribute} is empty")
-        unknown = [item for item in method.told if item not in frozenset(Information)]
-        if unknown:
-            raise _BrokenError(f"told names {unknown}, which is not Information")
         told = ", ".join(sorted(method.told)) or "nothing"
         return f"{method.title}; told: {told}"
 
     def parameters(self) -> str:
-        parameters = self.entry.method.Parameters()
-        plain = json.loads(json.dumps(parameters.model_dump(mode="json")))
-        again = build(self.entry, plain).parameters
+        parameters = self.entry.complete({})
+        again = self.entry.complete(parameters)
         if again != parameters:
             raise _BrokenError(f"they do not survive JSON: {parameters} became {again}")
         try:
-            build(self.entry, {"no_such_parameter": 1})
+            self.entry.complete({"no_such_parameter": 1})
         except CoarticError:
             pass
         else:
             raise _BrokenError("an unknown parameter is accepted; forbid extra keys")
-        if parameters.model_config.get("frozen") is not True:
+        if not self.entry.declared.frozen:
             raise _BrokenError("they can be changed after validation; freeze them")
-        return ", ".join(f"{key}={value}" for key, value in plain.items()) or "none"
+        return ", ".join(f"{key}={value}" for key, value in parameters.items()) or "none"
 
     def solution(self) -> str:
         rewards = []
         for task, record in self.first_records:
-            if record["status"] != "ok":
-                raise _BrokenError(f"on {task.name}: {record['status']}: {record['reason']}")
-            rewards.append(f"{task.name} {record['score']['reward']}")
+            if record.solution is None:
+                raise _BrokenError(f"on {task.name}: {record.status}: {record.reason}")
+            rewards.append(f"{task.name} {record.solution.reward}")
         with_what = ", ".join(f"{key}={value}" for key, value in self.defaults.items())
         return (
             "executed and scored on "
@@ -195,7 +191,7 @@ class _MethodChecks:
         found = differences(record, perform_once(self.spec(task)))
         if found:
             raise _BrokenError(f"same seed on {task.name}, another process: {found[0]}")
-        if not self.entry.method.stochastic:
+        if not self.entry.declared.stochastic:
             found = differences(record, self.record(task, seed=2))
             if found:
                 raise _BrokenError(
@@ -216,21 +212,21 @@ class _MethodChecks:
     def limits(self) -> str:
         for task in self.tasks:
             record = self.record(task, budget=_BUDGET)
-            trials = record["meter"]["trials"]
-            if record["status"] not in ("ok", "infeasible") or trials > _BUDGET:
+            trials = 0 if record.meter is None else record.meter.trials
+            if record.status not in ("ok", "infeasible") or trials > _BUDGET:
                 raise _BrokenError(
                     f"a budget of {_BUDGET} trials on {task.name}: "
-                    + (record["reason"] or f"{trials} were made")
+                    + (record.reason or f"{trials} were made")
                 )
         return f"keeps to a budget of {_BUDGET} trials"
 
     def information(self) -> str:
-        declared = {item.value for item in self.entry.method.told & METERED}
+        declared = {item.value for item in self.entry.declared.told if item in METERED}
         used: set[str] = set()
         for task, record in self.first_records:
-            if any(words in record["reason"] for words in ("does not declare", "own compiled")):
-                raise _BrokenError(f"on {task.name}: {record['reason']}")
-            used |= set(record["used"])
+            if any(words in record.reason for words in ("does not declare", "own compiled")):
+                raise _BrokenError(f"on {task.name}: {record.reason}")
+            used |= set(record.used)
         idle = sorted(declared - used)
         if idle:
             raise _BrokenError(f"declared but never used: {', '.join(idle)}")
@@ -238,15 +234,16 @@ class _MethodChecks:
 
     def failure(self) -> str:
         task = _hopeless(self.tasks[0])
-        if why_not(self.entry, task, self.defaults) is not None:
+        if self.entry.why_not(task, self.defaults) is not None:
             return "says beforehand that it does not apply to a task without a solution"
-        record = self.perform({**self.spec(task).job(), "reach": False})
-        if record["status"] not in ("infeasible", "solver-failed"):
+        spec = self.spec(task)
+        record = self.perform(spec, {**spec.job(), "reach": False})
+        if record.status not in ("infeasible", "solver-failed"):
             raise _BrokenError(
-                f"a task that nobody can complete gives {record['status']} {record['reason']}, "
+                f"a task that nobody can complete gives {record.status} {record.reason}, "
                 "where infeasible with a reason is right"
             )
-        return f"a task that nobody can complete gives {record['status']}: {record['reason']}"
+        return f"a task that nobody can complete gives {record.status}: {record.reason}"
 
 
 def _hopeless(like: Task) -> Task:
@@ -317,7 +314,7 @@ def _task_laws(path: Path, known: Registry) -> Iterator[Check]:
         return "goals and start have a source and a status"
 
     def applicable() -> str:
-        names = [name for name, entry in known.items() if why_not(entry, task()) is None]
+        names = [name for name, entry in known.items() if entry.why_not(task()) is None]
         if not names:
             raise _BrokenError("no method applies to it")
         return ", ".join(names)

@@ -7,15 +7,17 @@ worker dies, the pool breaks): the harness asks again for what is missing.
 from __future__ import annotations
 
 import contextlib
-import os
+import queue
+import threading
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-from benchmarks.sandbox import SandboxError, die_with_parent, supervise
+from benchmarks.sandbox import Keeper, SandboxError, failure, keeper, supervise
 from coartic import CoarticError
 
 Job = dict[str, Any]
 Answer = dict[str, Any]
+_LOOK_S = 0.5  # between looks at the keyboard
 
 
 class Executor(Protocol):
@@ -27,38 +29,51 @@ class Executor(Protocol):
 
 
 class Local:
-    """Processes on this machine, by joblib's loky; one thread each for BLAS."""
+    """Sandboxes on this machine, each driven by a thread; one thread each for BLAS."""
 
     def __init__(self, jobs: int = -1) -> None:
         self.jobs = jobs
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
-        """Answers as they come. A broken pool ends the iteration early."""
-        from joblib import Parallel, delayed, effective_n_jobs, parallel_config
-        from joblib.externals.loky import get_reusable_executor
-        from joblib.externals.loky.process_executor import BrokenProcessPool
+        """Answers as they come. Raises CoarticError where no worker can be started."""
+        from joblib import effective_n_jobs
+
+        waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
+        for job in jobs:
+            waiting.put(job)
+        answers: queue.SimpleQueue[Answer | BaseException] = queue.SimpleQueue()
+        keepers: list[Keeper] = []
+
+        def work() -> None:
+            try:
+                with keeper() as own:
+                    keepers.append(own)
+                    while True:
+                        answers.put(own.perform(waiting.get_nowait()))
+            except queue.Empty:
+                pass
+            except BaseException as error:
+                answers.put(error)
 
         workers = min(effective_n_jobs(self.jobs), len(jobs))
+        threads = [threading.Thread(target=work, daemon=True) for _ in range(workers)]
+        for thread in threads:
+            thread.start()
+        answered = 0
         try:
-            # The initializer runs before any job: no worker outlives a suite killed early.
-            with parallel_config(
-                backend="loky",
-                n_jobs=workers,
-                inner_max_num_threads=1,
-                initializer=die_with_parent,
-                initargs=(os.getpid(),),
-            ):
-                yield from Parallel(return_as="generator_unordered", batch_size=1)(
-                    delayed(supervise)(job) for job in jobs
-                )
-        except BrokenProcessPool:
-            return
-        except SandboxError as error:
-            raise CoarticError(str(error)) from None
-        except (KeyboardInterrupt, GeneratorExit):
-            if workers > 1:
-                get_reusable_executor().shutdown(kill_workers=True)
-            raise
+            while answered < len(jobs):
+                with contextlib.suppress(queue.Empty):
+                    answer = answers.get(timeout=_LOOK_S)
+                    if isinstance(answer, SandboxError):
+                        raise CoarticError(str(answer))
+                    if isinstance(answer, BaseException):
+                        raise answer
+                    answered += 1
+                    yield answer
+        finally:
+            if answered < len(jobs):
+                for own in keepers:
+                    own.dismiss()
 
 
 class Dask:
@@ -87,12 +102,7 @@ class Dask:
                 error = future.exception()
                 if isinstance(error, KilledWorker):
                     reason = "every worker that tried this run died"
-                    yield {
-                        "run_id": futures[future],
-                        "failure": "crashed",
-                        "reason": reason,
-                        "wall_s": 0.0,
-                    }
+                    yield failure(futures[future], "crashed", reason, 0.0)
                 elif isinstance(error, SandboxError):
                     raise CoarticError(str(error))
                 elif error is not None:

@@ -1,18 +1,39 @@
-"""Performs a plan: what the store lacks is run, and kept as soon as it is done."""
+"""Performs a plan: what the store lacks is run, scored, and kept as soon as it is done."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated
+
+from pydantic import Field, ValidationError
 
 from benchmarks.executors import Answer, Executor
-from benchmarks.provenance import environment
+from benchmarks.provenance import surroundings
 from benchmarks.specification import RunSpec
-from benchmarks.store import Damage, Store, encode
-from coartic import CoarticError
-from coartic.method import Meter
+from benchmarks.store import Damage, Store
+from coartic import CoarticError, Movement
+from coartic.errors import IncompleteError
+from coartic.method import Information
+from coartic.record import (
+    MOST_MOVEMENTS,
+    SEARCH,
+    Details,
+    Environment,
+    Plain,
+    PlainMovement,
+    Record,
+    Reward,
+    Solved,
+    Spent,
+    Status,
+    Timing,
+    problems,
+    solved,
+)
+from coartic.text import plain
 
+Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
 RETRIED = frozenset({"timeout", "crashed"})
 
@@ -52,11 +73,8 @@ def perform_plan(
     each. Raises
     CoarticError where records cannot be written or runs keep getting lost.
     """
-    store.open()
-    try:
+    with store.locked():
         return _perform(specs, store, executor, retry_failed, redo, watch)
-    finally:
-        store.close()
 
 
 def _perform(
@@ -76,20 +94,20 @@ def _perform(
             if isinstance(record, Damage):
                 progress.damaged.append(record)
                 store.set_aside(record.path)
-            elif not _to_redo(record, by_id[record["run_id"]], retry_failed):
-                del missing[record["run_id"]]
+            elif not _to_redo(record, by_id[record.run_id], retry_failed):
+                del missing[record.run_id]
                 progress.present += 1
-                progress.failed += record["status"] != "ok"
+                progress.failed += record.status != "ok"
     watch(progress, None)
     idle = 0
     while missing and idle < _ROUNDS:
         idle += 1
         for answer in executor.perform([spec.job() for spec in missing.values()]):
             spec = missing.pop(answer["run_id"])
-            status, text = record_of(answer, spec)
-            store.write(spec.run_id, text)
+            record = record_of(answer, spec)
+            store.write(record)
             progress.done += 1
-            progress.failed += status != "ok"
+            progress.failed += record.status != "ok"
             idle = 0
             watch(progress, spec)
     if missing:
@@ -100,53 +118,152 @@ def _perform(
     return progress
 
 
-def _to_redo(record: dict[str, Any], spec: RunSpec, retry_failed: bool) -> bool:
-    if record["status"] not in RETRIED:
+def _to_redo(record: Record, spec: RunSpec, retry_failed: bool) -> bool:
+    if record.status not in RETRIED:
         return False
     if retry_failed:
         return True
-    had, has = record["timing"]["time_limit_s"], spec.limits.time_s
-    return record["status"] == "timeout" and had is not None and (has is None or has > had)
+    had, has = record.timing.time_limit_s, spec.limits.time_s
+    return record.status == "timeout" and had is not None and (has is None or has > had)
 
 
-def record_of(answer: Answer, spec: RunSpec) -> tuple[str, str]:
-    """Status and record (as text) of an answer, also of one that says how the run failed."""
-    if "status" in answer:
-        return answer["status"], answer["record"]
-    if answer["failure"] == "foreign":
-        raise CoarticError(answer["reason"])
-    job = spec.job()
-    record = {
-        "run_id": spec.run_id,
-        "run": spec.run,
-        "specification": job["specification"],
-        "code": job["code"],
-        "status": answer["failure"],
-        "reason": answer["reason"],
-        "score": None,
-        "solution": [],
-        "told": sorted(spec.entry.method.told),
-        "secondary": list(spec.entry.method.secondary),
-        "used": [],
-        "meter": None,  # went with the worker
-        "details": {},
-        "rewards": [],
-        "timing": {
-            "wall_s": answer["wall_s"],
-            "cpu_s": None,
-            "warm": None,
-            "process_peak_mb": None,
-            "time_limit_s": spec.limits.time_s,
-        },
-        "origin": spec.entry.origin,
-        "environment": environment(),
+class Outcome(Plain):
+    """What a worker states of a run: typed and bounded, and believed in no more than that."""
+
+    status: Status
+    reason: str = ""
+    solution: Handed = ()
+    initial: Handed = ()
+    replay: Handed = ()
+    bound: Reward | None = None
+    details: Details = {}
+    used: tuple[Information, ...] = ()
+    meter: Spent | None = None
+    rewards: tuple[Reward | None, ...] = ()
+    timing: Timing
+    environment: Environment
+
+
+class _Said(Plain):
+    """An answer of a worker."""
+
+    error: str | None
+    foreign_code: bool = False
+    answer: Outcome | None
+
+
+def record_of(answer: Answer, spec: RunSpec) -> Record:
+    """The record of an answer, also of one that says how the run failed.
+
+    Solutions are executed and scored here, where the method has never been, by the
+    specification's own task and model. Raises CoarticError where the answer comes from
+    other code than was asked for.
+    """
+    if "outcome" not in answer:
+        return _failure(spec, answer["failure"], answer["reason"], answer["wall_s"])
+    try:
+        said = _Said.model_validate_json(answer["outcome"])
+    except ValidationError as error:
+        return _failure(
+            spec, "solver-failed", f"what it handed over cannot be kept: {problems(error)}"
+        )
+    if said.foreign_code:
+        raise CoarticError(plain(said.error or "other code"))
+    if said.answer is None:
+        return _failure(spec, "crashed", said.error or "it gave no answer")
+    try:
+        record = _record(spec, said.answer, **_scores(spec, said.answer))
+    except _ClaimError as error:
+        record = _record(spec, said.answer.model_copy(update=error.update))
+    problem = record.disagreement()
+    if problem is not None:
+        return _failure(spec, "solver-failed", f"what it states contradicts itself: {problem}")
+    return record
+
+
+class _ClaimError(Exception):
+    """A run is not what its worker states."""
+
+    def __init__(self, status: Status, reason: str) -> None:
+        super().__init__(reason)
+        self.update = {"status": status, "reason": reason}
+
+
+def _scores(spec: RunSpec, outcome: Outcome) -> dict[str, Solved]:
+    """The scores of what an outcome hands over; _ClaimError where there is none to be had."""
+    if outcome.status != "ok":
+        return {}
+    _check_claims(spec, outcome)
+    return {
+        name: _solved(spec, [row.movement() for row in movements])
+        for name in ("solution", "initial", "replay")
+        if (movements := getattr(outcome, name)) or name == "solution"
     }
-    return answer["failure"], encode(record)
 
 
-def meter_of(record: dict[str, Any]) -> dict[str, Any]:
-    """The meter of a record, every entry None where it went with the worker."""
-    if record["meter"] is None:
-        return dict.fromkeys(Meter().as_dict())
-    meter: dict[str, Any] = record["meter"]
-    return meter
+def _check_claims(spec: RunSpec, outcome: Outcome) -> None:
+    told = spec.entry.declared.told
+    undeclared = sorted(set(outcome.used) - set(told))
+    if undeclared:
+        raise _ClaimError(
+            "crashed", f"the method used {undeclared[0]!r}, which it does not declare"
+        )
+    if Information.CORRECTIVE_PROCESS not in told and any(
+        row.kind == "corrective" and row.target is None for row in outcome.solution
+    ):
+        raise _ClaimError(
+            "crashed",
+            f"the method used {Information.CORRECTIVE_PROCESS.value!r}, which it does not declare",
+        )
+    if outcome.bound is not None and not spec.method.startswith(SEARCH):
+        raise _ClaimError(
+            "solver-failed", f"it states a bound, which only methods {SEARCH}* of this project may"
+        )
+
+
+def _solved(spec: RunSpec, movements: Sequence[Movement]) -> Solved:
+    """A solution's score, executed once, and once more from what would be stored."""
+    try:
+        found = solved(spec.task, movements, spec.model)
+    except IncompleteError as error:
+        raise _ClaimError("infeasible", str(error)) from None
+    except (CoarticError, TypeError, ValueError, OverflowError) as error:
+        reason = f"the solution cannot be executed: {error}"
+        raise _ClaimError("solver-failed", reason) from None
+    again = solved(spec.task, [row.movement() for row in found.movements], spec.model)
+    if again != found:
+        raise AssertionError(f"run {spec.run_id}: {found.reward} re-executes to {again.reward}")
+    return found
+
+
+def _failure(spec: RunSpec, status: Status, reason: str, wall_s: float = 0.0) -> Record:
+    """The record of a run that has left nothing but how it ended."""
+    timing = Timing(wall_s=wall_s, time_limit_s=spec.limits.time_s)
+    return _record(
+        spec, Outcome(status=status, reason=reason, timing=timing, environment=surroundings())
+    )
+
+
+def _record(spec: RunSpec, outcome: Outcome, **scores: Solved) -> Record:
+    good = outcome.status == "ok"
+    return Record(
+        run_id=spec.run_id,
+        run=spec.run,
+        specification=spec.specification,
+        code=spec.entry.code,
+        status=outcome.status,
+        reason="" if good else plain(outcome.reason) or "it gave no reason",
+        solution=scores.get("solution"),
+        initial=scores.get("initial"),
+        replay=scores.get("replay"),
+        bound=outcome.bound if good else None,
+        told=spec.entry.declared.told,
+        secondary=spec.entry.declared.secondary,
+        used=tuple(item for item in outcome.used if item in spec.entry.declared.told),
+        meter=outcome.meter,
+        details=outcome.details,
+        rewards=outcome.rewards,
+        timing=outcome.timing,
+        origin=spec.entry.origin,
+        environment=outcome.environment,
+    )

@@ -21,7 +21,7 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.store import Store
-from benchmarks.tables import TIMINGS
+from coartic.tables import TIMINGS
 
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
 SUITE = ("run", "quick", "--runs", "8", "--trials", "6000")

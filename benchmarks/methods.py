@@ -1,20 +1,21 @@
-"""Methods by id: those of this project, of installed plug-ins, and of the user's files."""
+"""Methods by id: those of this project, of installed plug-ins, and of the user's files.
+
+Methods of this project are classes here. The others are known by what they declare: their
+code is run in sandboxes alone, to describe them and to perform their runs.
+"""
 
 from __future__ import annotations
 
-import ast
+import atexit
 import difflib
-import hashlib
-import importlib.util
-import inspect
-import sys
+import json
+import threading
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from pydantic import ValidationError
@@ -26,14 +27,29 @@ import baselines.optimum
 import baselines.posture_based
 import baselines.random_search
 import baselines.trajectory_optimisation
+from benchmarks.code_identity import built_in_code, foreign_code
+from benchmarks.declaration import (
+    Declaration,
+    Foreign,
+    MethodFileError,
+    completed,
+    declared,
+    reason_against,
+)
+from benchmarks.sandbox import Failure, Sandbox
 from coartic import CoarticError, Task
-from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
+from coartic.learner import METHOD_PREFIX
 from coartic.method import Method
+from coartic.record import SEARCH
+from coartic.text import plain
 
 ENTRY_POINTS = "coartic.methods"
 BUILT_IN_ORIGIN = "built in"
-_PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
+RESERVED = (METHOD_PREFIX, SEARCH)
+"""Ids that begin so have a meaning in every table: methods of this project alone have them."""
+QUESTION_LIMIT_S = 60.0
+"""Seconds that a method which is not built in has to say what it is."""
 BUILT_IN: tuple[type[Method], ...] = (
     *DUAL_PROCESS,
     *baselines.corrective_alone.METHODS,
@@ -44,35 +60,52 @@ BUILT_IN: tuple[type[Method], ...] = (
     *baselines.trajectory_optimisation.METHODS,
     *baselines.optimum.METHODS,
 )
-
-
-class MethodFileError(CoarticError):
-    """A method file or plug-in that cannot be used."""
-
-
-@dataclass(frozen=True)
-class Plugin:
-    """Source of a method file, so that any worker on any machine can run it."""
-
-    filename: str
-    source: str
-
-    @property
-    def digest(self) -> str:
-        """Hash of the source."""
-        return hashlib.sha256(self.source.encode()).hexdigest()[:16]
+CLASSES: Mapping[str, type[Method]] = {method.name: method for method in BUILT_IN}
+"""The built-in methods by id."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """One method as the harness knows it."""
 
-    method: type[Method]
+    declared: Declaration
     origin: str
     """``built in``, the distribution of a plug-in, or the path of a method file."""
     code: str
     """Hash of the code that produces its results."""
-    plugin: Plugin | None = None
+    foreign: Foreign | None = None
+    """Where it comes from; None for a method of this project."""
+
+    @property
+    def name(self) -> str:
+        """Id of the method."""
+        return self.declared.name
+
+    def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """All parameters, defaults included; CoarticError names the ones that are wrong."""
+        return _complete(self.foreign, self.name, json.dumps(parameters, sort_keys=True))
+
+    def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
+        """Why the method with parameters does not apply to a task; None where it does.
+
+        Raises CoarticError for wrong parameters and for a method that fails to say.
+        """
+        if self.foreign is None:
+            return reason_against(CLASSES[self.name], task, parameters or {})
+        try:
+            reason = _ask(
+                self.foreign,
+                question="applies",
+                method=self.name,
+                task=task.model_dump(mode="json"),
+                parameters=dict(parameters or {}),
+            )
+        except MethodFileError as error:
+            raise MethodFileError(
+                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
+                f"{error}"
+            ) from None
+        return None if reason is None else plain(str(reason))
 
 
 Registry = Mapping[str, Entry]
@@ -82,123 +115,54 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     """Every known method by id.
 
     A plug-in that cannot be loaded is a warning. Raises MethodFileError for a file that
-    cannot be loaded, holds no method, or takes an id that is already there.
+    cannot be loaded, holds no method, or takes an id that is reserved or already there.
     """
-    found: dict[str, Entry] = {}
+    found = dict(_built_in())
 
-    def add(method: type[Method], entry: Entry) -> None:
-        name = _checked_name(method, entry.origin)
-        if name in found:
-            raise MethodFileError(
-                f"{entry.origin}: method id {name!r} is already taken ({found[name].origin})"
-            )
-        found[name] = entry
+    def add(foreign: Foreign, origin: str) -> None:
+        origin = plain(origin, 200)
+        for declaration in _described(foreign, origin):
+            name = declaration.name
+            if name.startswith(RESERVED):
+                raise MethodFileError(
+                    f"{origin}: method id {name!r} is reserved: ids that begin with "
+                    f"{' or '.join(map(repr, RESERVED))} are this project's"
+                )
+            if name in found:
+                raise MethodFileError(
+                    f"{origin}: method id {name!r} is already taken ({found[name].origin})"
+                )
+            found[name] = Entry(declaration, origin, foreign_code(foreign), foreign)
 
-    for method in BUILT_IN:
-        add(method, Entry(method, BUILT_IN_ORIGIN, code_hash(_package_source(method))))
     for point in metadata.entry_points(group=ENTRY_POINTS):
         origin = f"plug-in {point.dist.name if point.dist else point.value}"
         try:  # a broken plug-in must not take the others with it
-            for method in _methods_of(point.load(), origin):
-                add(method, Entry(method, origin, code_hash(_package_source(method))))
-        except Exception as error:
+            add(Foreign(kind="installed", where=point.value), origin)
+        except CoarticError as error:
             warnings.warn(
-                f"{origin}: entry point {point.name!r} cannot be used: {_brief(error)}",
-                stacklevel=2,
+                f"{origin}: entry point {point.name!r} cannot be used: {error}", stacklevel=2
             )
     for path in method_files:
-        plugin = read_plugin(path)
-        for method in plugin_methods(plugin):
-            code = code_hash(file_source(plugin.source))
-            add(method, Entry(method, str(path), code, plugin))
+        add(read_method_file(path), str(path))
     return found
 
 
-def read_plugin(path: Path) -> Plugin:
-    """The text of a method file."""
+@cache
+def _built_in() -> dict[str, Entry]:
+    return {
+        name: Entry(declared(method), BUILT_IN_ORIGIN, built_in_code(method.__module__))
+        for name, method in CLASSES.items()
+    }
+
+
+def read_method_file(path: Path) -> Foreign:
+    """The text of a method file. Raises MethodFileError where there is none."""
     try:
-        return Plugin(path.name, path.read_text(encoding="utf-8"))
+        return Foreign(kind="file", where=path.name, source=path.read_text(encoding="utf-8"))
     except OSError as error:
         raise MethodFileError(f"{path}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise MethodFileError(f"{path}: is not a text file in UTF-8") from None
-
-
-def plugin_methods(plugin: Plugin) -> list[type[Method]]:
-    """The methods that a method file defines; the file is run to find them."""
-    return list(_load_plugin(plugin))
-
-
-@cache
-def _load_plugin(plugin: Plugin) -> tuple[type[Method], ...]:
-    module = ModuleType(f"coartic_method_{plugin.digest}")
-    module.__file__ = plugin.filename
-    sys.modules[module.__name__] = module  # typing looks annotations up there
-    try:
-        exec(compile(plugin.source, plugin.filename, "exec"), module.__dict__)
-    except Exception as error:
-        raise MethodFileError(f"{plugin.filename}: cannot be run: {_brief(error)}") from None
-    return tuple(_methods_of(module, plugin.filename))
-
-
-def _methods_of(target: Any, origin: str) -> list[type[Method]]:
-    """A method class itself, or those that a module defines."""
-    if inspect.isclass(target) and issubclass(target, Method):
-        return [target]
-    found = [
-        value
-        for value in vars(target).values()
-        if inspect.isclass(value)
-        and issubclass(value, Method)
-        and not inspect.isabstract(value)
-        and value.__module__ == getattr(target, "__name__", None)
-    ]
-    if not found:
-        raise MethodFileError(f"{origin}: defines no subclass of coartic.method.Method")
-    return found
-
-
-def _checked_name(method: type[Method], origin: str) -> str:
-    for attribute in ("name", "title", "citation", "told"):
-        if not hasattr(method, attribute):
-            raise MethodFileError(f"{origin}: {method.__name__} does not declare {attribute!r}")
-    name = method.name
-    if not isinstance(name, str) or not name or any(c in ", \t\n" for c in name):
-        raise MethodFileError(
-            f"{origin}: {method.__name__}.name is {name!r}; an id is text without spaces or commas"
-        )
-    return name
-
-
-def build(entry: Entry, parameters: Mapping[str, Any]) -> Method:
-    """A method with parameters; raises CoarticError naming the ones that are wrong."""
-    try:
-        return entry.method(entry.method.Parameters(**parameters))
-    except ValidationError as error:
-        known = ", ".join(entry.method.Parameters.model_fields) or "none"
-        problems = "; ".join(
-            f"{'.'.join(map(str, detail['loc']))}: {decapitalised(detail['msg'])} "
-            f"(found {detail['input']!r})"
-            for detail in error.errors()
-        )
-        raise CoarticError(
-            f"method {entry.method.name!r}: {problems}. Its parameters: {known}."
-        ) from None
-
-
-def why_not(entry: Entry, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
-    """Why a method with parameters does not apply to a task; None where it does.
-
-    Raises CoarticError for wrong parameters and for a method that fails to say.
-    """
-    method = build(entry, parameters or {})
-    try:
-        return method.why_not(task)
-    except Exception as error:
-        raise MethodFileError(
-            f"method {entry.method.name!r} cannot say whether it applies to task "
-            f"{task.name!r}: {_brief(error)}"
-        ) from None
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
@@ -209,88 +173,55 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     return CoarticError(f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}.")
 
 
-def _package_source(method: type[Method]) -> str:
-    """Every source of the package (or the module) that an installed method comes from.
-
-    For a method of this project: its own module and those of ``baselines`` it imports.
-    """
-    root = method.__module__.partition(".")[0]
-    if root == "coartic":
-        return ""  # part of the model's code anyway
-    if root == "baselines":
-        return _own_source(method.__module__)
-    module = sys.modules[root]
-    paths = [Path(folder) for folder in getattr(module, "__path__", [])]
-    files = [path for folder in paths for path in sorted(folder.rglob("*.py"))]
-    if not files and module.__file__:
-        files = [Path(module.__file__)]
-    return _joined(files)
-
-
-def _own_source(name: str) -> str:
-    sources: dict[str, str] = {}
-    waiting = [name]
-    while waiting:
-        name = waiting.pop()
-        module = sys.modules.get(name)
-        if name in sources or module is None or name.partition(".")[0] != "baselines":
-            continue
-        sources[name] = inspect.getsource(module)
-        waiting += _imported(sources[name])
-    return "".join(f"{name}\n{sources[name]}" for name in sorted(sources))
-
-
-def file_source(source: str) -> str:
-    """Source of a method file with the local modules it imports: all but installed ones."""
-    local: dict[str, Path] = {}
-    waiting = _imported(source)
-    while waiting:
-        root = waiting.pop().partition(".")[0]
-        if root in local or root in sys.stdlib_module_names or root in _PACKAGES:
-            continue
-        spec = importlib.util.find_spec(root)
-        if spec is None or spec.origin is None or "site-packages" in spec.origin:
-            continue
-        local[root] = Path(spec.origin)
-        waiting += _imported(local[root].read_text(encoding="utf-8"))
-    files = []
-    for path in local.values():
-        files += sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
-    return source + _joined(files)
-
-
-def _imported(source: str) -> list[str]:
-    names: list[str] = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return names
-
-
-def _joined(files: list[Path]) -> str:
-    return "".join(f"{path.name}\n{path.read_text(encoding='utf-8')}" for path in files)
-
-
-def code_hash(source: str) -> str:
-    """Hash of the code one method's results come from: the model, scoring, the method."""
-    digest = hashlib.sha256(model_source())
-    for path in (PACKAGE / "frames.py", Path(__file__).with_name("worker.py")):
-        digest.update(_on_import(path))
-    digest.update(source.encode())
-    return digest.hexdigest()[:12]
+@cache
+def _complete(foreign: Foreign | None, name: str, parameters: str) -> dict[str, Any]:
+    given: dict[str, Any] = json.loads(parameters)
+    if foreign is None:
+        return completed(CLASSES[name], given)
+    found = _ask(foreign, question="complete", method=name, parameters=given)
+    if not isinstance(found, dict):
+        raise MethodFileError(f"method {name!r}: its parameters are no table")
+    return found
 
 
 @cache
-def _on_import(path: Path) -> bytes:
-    return path.read_bytes()
+def _described(foreign: Foreign, origin: str) -> tuple[Declaration, ...]:
+    foreign_code(foreign)  # what is no Python is said without running it
+    try:
+        found = _ask(foreign, question="describe")
+        return tuple(Declaration.model_validate_json(json.dumps(item)) for item in found)
+    except MethodFileError as error:
+        raise MethodFileError(f"{origin}: {error}") from None
+    except (ValidationError, TypeError) as error:
+        raise MethodFileError(f"{origin}: declares no method: {plain(str(error))}") from None
 
 
-def decapitalised(text: str) -> str:
-    """A sentence as part of another."""
-    return text[:1].lower() + text[1:]
+_asked: dict[Foreign, Sandbox] = {}
+_lock = threading.Lock()
 
 
-def _brief(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"
+def _ask(foreign: Foreign, **question: Any) -> Any:
+    """What a method that is not built in answers, in a process of its own."""
+    with _lock:
+        sandbox = _asked.get(foreign)
+        if sandbox is None or not sandbox.alive:
+            sandbox = _asked[foreign] = Sandbox()
+        answer = sandbox.ask(
+            {**question, "foreign": foreign.model_dump(mode="json")}, QUESTION_LIMIT_S
+        )
+    if isinstance(answer, Failure):
+        raise MethodFileError(f"it gave no answer: {answer.reason}")
+    try:
+        said = json.loads(answer)
+        error, result = said["error"], said["answer"]
+    except (ValueError, RecursionError, TypeError, KeyError):
+        raise MethodFileError("what it answered cannot be read") from None
+    if error is not None:
+        raise MethodFileError(plain(str(error)))
+    return result
+
+
+@atexit.register
+def _dismiss() -> None:
+    for sandbox in _asked.values():
+        sandbox.close()

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import re
 import subprocess
 import sys
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 import coartic
 from coartic.compiled import PACKAGE, source_fingerprint
+from coartic.record import Environment
+from coartic.text import LONGEST_LINE, plain
 
 _LIBRARIES = (
     "casadi",
@@ -22,6 +28,7 @@ _LIBRARIES = (
     "daqp",
     "dask",
     "distributed",
+    "filelock",
     "joblib",
     "llvmlite",
     "matplotlib",
@@ -30,6 +37,7 @@ _LIBRARIES = (
     "osqp",
     "pandas",
     "proxsuite",
+    "psutil",
     "pyarrow",
     "pydantic",
     "rich",
@@ -48,14 +56,35 @@ def environment() -> dict[str, Any]:
         "commit": _commit(),
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
-        "platform": platform.platform(),
-        "processor": _processor(),
+        "platform": plain(platform.platform(), LONGEST_LINE),
+        "processor": plain(_processor(), LONGEST_LINE),
         "cores": cpu_count(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "command": command(),
     }
 
 
+def surroundings() -> Environment:
+    """:func:`environment`, typed."""
+    return Environment.model_validate_json(json.dumps(environment()))
+
+
+def command() -> list[str]:
+    """The command line of this process."""
+    return [plain(word) for word in (Path(sys.argv[0]).name, *sys.argv[1:])]
+
+
+def process_peak_mb() -> float:
+    """Most memory that this process has had so far, MiB."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return float(psutil.Process().memory_info().peak_wset) / 2**20
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+@cache
 def _commit() -> dict[str, Any] | None:
     """Commit of the checkout the code runs from and whether it was changed since."""
     root = PACKAGE.parent

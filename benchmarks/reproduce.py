@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
-from benchmarks.harness import meter_of, record_of
+from benchmarks.harness import record_of
 from benchmarks.methods import Registry, unknown
 from benchmarks.sandbox import SandboxError, supervise
 from benchmarks.specification import Limits, RunSpec
-from benchmarks.store import RecordError, Store
-from coartic import CoarticError, MotionModel, Trajectory, parse_task, trajectory
-from coartic.frames import movements_from
-from coartic.method import Meter
+from benchmarks.store import Store
+from coartic import CoarticError, Trajectory, trajectory
+from coartic.record import Record, RecordError
 
 
-def find_record(prefix: str, folder: Path) -> tuple[Store, dict[str, Any]]:
+def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
     """The one record whose id starts with ``prefix``, in a folder or any below it.
 
-    Raises RecordError where there is none, more than one, or it is damaged.
+    Raises RecordError where there is none, more than one, or it is damaged or forged.
     """
     found = sorted(folder.glob(f"**/records/{_safe(prefix)}*.json"))
     ids = sorted({path.stem for path in found})
@@ -33,83 +29,88 @@ def find_record(prefix: str, folder: Path) -> tuple[Store, dict[str, Any]]:
         shown = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
         raise RecordError(f"{prefix!r} is the beginning of {len(ids)} runs: {shown}")
     store = Store(found[0].parent.parent)
-    return store, store.read(ids[0])
+    record = store.read(ids[0])
+    record.check()
+    return store, record
 
 
-def trajectory_of(record: dict[str, Any]) -> Trajectory:
+def trajectory_of(record: Record) -> Trajectory:
     """The solution of a record tick by tick, from nothing but the record.
 
     Raises CoarticError where the run has no solution.
     """
-    specification = record["specification"]
-    if record["status"] != "ok":
+    if record.solution is None:
         raise CoarticError(
-            f"run {record['run_id']} has no solution to show: {record['status']}, "
-            f"{record['reason']}"
+            f"run {record.run_id} has no solution to show: {record.status}, {record.reason}"
         )
-    task = parse_task(specification["task"], f"record {record['run_id']}")
-    waypoints = [
-        {"order": row["order"], "waypoint": index, **point}
-        for row in record["solution"]
-        for index, point in enumerate(row.get("waypoints") or ())
-    ]
-    movements = movements_from(task, pd.DataFrame(record["solution"]), pd.DataFrame(waypoints))
-    return trajectory(task, movements, MotionModel(**specification["model"]))
+    return trajectory(record.task, record.movements(), record.model)
 
 
-def spec_of(record: dict[str, Any], known: Registry, limits: Limits) -> RunSpec:
+def spec_of(record: Record, known: Registry, limits: Limits) -> RunSpec:
     """The specification of a record, to be performed by the code that is here now."""
-    specification = record["specification"]
-    name = specification["method"]
-    if name not in known:
-        raise unknown("method", name, known)
+    if record.method not in known:
+        raise unknown("method", record.method, known)
+    specification = record.specification
     return RunSpec(
-        task=parse_task(specification["task"], f"record {record['run_id']}"),
-        entry=known[name],
-        parameters=tuple(specification["parameters"].items()),
-        run=record["run"],
-        seed=specification["seed"],
-        limits=Limits(limits.time_s, specification["trial_budget"]),
+        task=record.task,
+        entry=known[record.method],
+        parameters=tuple(specification.parameters.items()),
+        run=record.run,
+        seed=specification.seed,
+        limits=Limits(limits.time_s, specification.trial_budget),
     )
 
 
-def perform_once(spec: RunSpec) -> dict[str, Any]:
+def perform_once(spec: RunSpec) -> Record:
     """The record of one run, performed in a process of its own."""
     try:
-        _, record = record_of(supervise(spec.job()), spec)
+        return record_of(supervise(spec.job()), spec)
     except SandboxError as error:
         raise CoarticError(str(error)) from None
-    performed: dict[str, Any] = json.loads(record)
-    return performed
 
 
-def command_for(record: dict[str, Any], folder: Path) -> str:
+def command_for(record: Record, folder: Path) -> str:
     """The command that performs the run of a record again."""
-    command = f"coartic reproduce {record['run_id']} --in {shlex.quote(str(folder))}"
-    origin = record["origin"]
-    if origin.endswith(".py"):
-        command += f" --method-file {shlex.quote(origin)}"
-    return command
+    words = ["coartic", "reproduce", record.run_id, "--in", str(folder)]
+    if record.origin.endswith(".py"):
+        words += ["--method-file", record.origin]
+    return shlex.join(words)
 
 
-def differences(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
+def differences(a: Record, b: Record) -> list[str]:
     """In what the results of two records differ; times and surroundings apart."""
+    first, second = a.result(), b.result()
     found = [
-        f"{name}: {a[name]!r} against {b[name]!r}"
-        for name in ("status", "reason", "score", "details")
-        if a[name] != b[name]
-    ]
-    first, second = meter_of(a), meter_of(b)
-    found += [
-        f"{name}: {first[name]} against {second[name]}"
-        for name in Meter.COUNTS
+        f"{name}: {_shown(first[name])} against {_shown(second[name])}"
+        for name in ("status", "bound", "details")
         if first[name] != second[name]
     ]
-    if a["solution"] != b["solution"]:
-        found.append("the solutions' movements differ")
-    if a["rewards"] != b["rewards"]:
-        found.append(f"rewards by trial differ{_first_difference(a['rewards'], b['rewards'])}")
+    if a.reason != b.reason:
+        found.append(f"reason: {a.reason!r} against {b.reason!r}")
+    for name in ("solution", "initial", "replay"):
+        if first[name] != second[name]:
+            found.append(f"{name}: {_score(first[name])} against {_score(second[name])}")
+    ours, theirs = first["meter"] or {}, second["meter"] or {}
+    found += [
+        f"{name}: {ours.get(name)} against {theirs.get(name)}"
+        for name in ours | theirs
+        if ours.get(name) != theirs.get(name)
+    ]
+    if a.rewards != b.rewards:
+        found.append(f"rewards by trial differ{_first_difference(a.rewards, b.rewards)}")
     return found
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 200 else f"{text[:200]}..."
+
+
+def _score(solution: dict[str, Any] | None) -> str:
+    if solution is None:
+        return "none"
+    movements = len(solution["movements"])
+    return f"{solution['reward']} with {solution['hands']} in {movements} movements"
 
 
 def _first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:

@@ -1,10 +1,10 @@
-"""Processes that runs are performed in, and the clock outside them.
+"""Processes that methods run in, and the clock outside them.
 
-:func:`supervise` performs one job in a child process that lives on from job to job, until
-one of them times out or ends it. The child speaks JSON lines over pipes. Where a job
-exceeds its time limit, or the child dies, the child is killed and the outcome is data; a
-run whose child was killed by a signal is tried again in a fresh one first. Standard
-library only: workers of any executor import this module, and must do so fast.
+A :class:`Sandbox` is a worker process under a guard (:mod:`benchmarks.guard`); it answers
+questions, one JSON line each. Where it takes too long, says too much or dies, that is a
+:class:`Failure`, and the worker ends with all that it has started. A :class:`Keeper` performs
+jobs in one sandbox after another: methods of this project share one, any other method has one
+that no other method's run is ever performed in.
 """
 
 from __future__ import annotations
@@ -13,14 +13,20 @@ import atexit
 import contextlib
 import json
 import os
-import selectors
+import queue
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import IO, Any
+
+import psutil
+
+from benchmarks.guard import end, end_below
+from coartic.text import plain
 
 # One run, one core: BLAS and OpenMP threads would only get in each other's way.
 THREADS = dict.fromkeys(
@@ -33,154 +39,285 @@ THREADS = dict.fromkeys(
     ),
     "1",
 )
-_END_LIMIT_S = 5.0
+LARGEST_ANSWER = 128 << 20
+"""Bytes of one answer."""
+LAST_WORDS = 4096
+"""Bytes that are kept of what a process prints."""
+_END_LIMIT_S = 10.0
+_LOOK_S = 0.1  # between looks at the clock
 _RETRIES = 2  # fresh processes for a run whose process was killed
 _START_LIMIT_S = 300.0  # imports and a cold compilation, on a slow machine
 
 
 class SandboxError(RuntimeError):
-    """The child cannot even start: no run would do better."""
+    """The worker cannot even start: no run would do better."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no answer."""
+
+    outcome: str
+    """``timeout`` or ``crashed``."""
+    reason: str
+    wall_s: float
+    killed: bool = False
+    """By a signal: out of memory, an operator, or its own doing."""
 
 
 class Sandbox:
-    """One child process."""
+    """One worker process."""
 
     def __init__(self) -> None:
-        self._messages: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.worker", str(os.getpid())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._messages,
-            env={**os.environ, **THREADS},
-            start_new_session=True,  # Ctrl-C is for the parent
-        )
-        self._buffer = b""
-        self._said_before = 0
-        ready = self._read_line(_START_LIMIT_S)
-        if ready != b"ready":
+        try:
+            self._guard = subprocess.Popen(
+                [sys.executable, "-m", "benchmarks.guard", str(os.getpid())],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env={**os.environ, **THREADS},
+                start_new_session=True,  # Ctrl-C is for the parent
+            )
+        except OSError as error:
+            raise SandboxError(f"a worker process did not start: {error.strerror}") from None
+        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._said = bytearray()
+        self._worker: psutil.Process | None = None
+        self._readers = [
+            threading.Thread(target=read, args=(stream,), daemon=True)
+            for read, stream in (
+                (self._read_answers, self._guard.stdout),
+                (self._read_messages, self._guard.stderr),
+            )
+        ]
+        for reader in self._readers:
+            reader.start()
+        with _lock:
+            _open[:] = [other for other in _open if other.alive]
+            _open.append(self)
+        started = self._answer(_START_LIMIT_S)
+        if isinstance(started, Failure):
             self.close()
-            raise SandboxError(f"a worker process did not start: {self._last_words()}")
+            raise SandboxError(f"a worker process did not start: {started.reason}")
+        with contextlib.suppress(psutil.Error, ValueError):
+            self._worker = psutil.Process(int(started))
 
     @property
     def alive(self) -> bool:
-        """Whether the child still runs."""
-        return self._process.poll() is None
+        """Whether the worker still runs."""
+        return self._guard.poll() is None
 
-    def perform(self, job: dict[str, Any]) -> dict[str, Any]:
-        """One job: status and record (as text), or how it failed, which ends the child."""
-        assert self._process.stdin is not None
-        self._said_before = os.fstat(self._messages.fileno()).st_size
-        clock = time.perf_counter()
+    def ask(self, question: dict[str, Any], limit_s: float | None) -> bytes | Failure:
+        """One answer as it was given, or why there is none, which ends the worker.
+
+        The limit counts the time that the worker had: not while it, or this process, was
+        stopped or asleep.
+        """
+        assert self._guard.stdin is not None
+        self._said.clear()
         try:
-            self._process.stdin.write(json.dumps(job).encode() + b"\n")
-            self._process.stdin.flush()
-            line = self._read_line(job["time_limit_s"])
-        except BrokenPipeError:
-            line = b""
-        except BaseException:  # Ctrl-C: never read one job's answer as the next one's
+            self._guard.stdin.write(json.dumps(question).encode() + b"\n")
+            self._guard.stdin.flush()
+            answer = self._answer(limit_s)
+        except (BrokenPipeError, ValueError):  # it is ending, or was closed from elsewhere
+            answer = self._end_of_worker(0.0)
+        except BaseException:  # Ctrl-C: never read one question's answer as the next one's
             self.close()
             raise
-        wall = time.perf_counter() - clock
-        if line is None:
+        if isinstance(answer, Failure):
             self.close()
-            reason = f"time limit of {job['time_limit_s']:g} s exceeded"
-            return {"failure": "timeout", "reason": reason, "wall_s": wall}
-        if not line:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(_END_LIMIT_S)  # it closed its output: it is ending
-            code = self._process.poll() or 0
-            how = f"killed by {_signal_name(-code)}" if code < 0 else f"exit code {code}"
-            reason = f"the worker process ended ({how}): {self._last_words()}"
-            self.close()
-            return {"failure": "crashed", "reason": reason, "wall_s": wall, "killed": code < 0}
-        answer: dict[str, Any] = json.loads(line)
-        record = self._read_line(_START_LIMIT_S)
-        if not record:
-            self.close()
-            reason = "the worker process ended before it had handed over its record"
-            return {"failure": "crashed", "reason": reason, "wall_s": wall}
-        return {**answer, "record": record.decode()}
+        return answer
 
     def close(self) -> None:
-        """End the child at once."""
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        for stream in (self._process.stdin, self._process.stdout, self._messages):
-            with contextlib.suppress(OSError):  # a job it never read may be left in the pipe
-                if stream is not None:
-                    stream.close()
+        """End the worker at once, with all that it has started."""
+        with contextlib.suppress(psutil.Error):
+            guard = psutil.Process(self._guard.pid)
+            end_below(guard)
+            end([guard])
+        if self._worker is not None and self._worker.is_running():  # it has lost its guard
+            end_below(self._worker)
+            end([self._worker])
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._guard.wait(_END_LIMIT_S)
+        with contextlib.suppress(OSError):  # a question it never read may be in the pipe
+            if self._guard.stdin is not None:
+                self._guard.stdin.close()
 
-    def _read_line(self, limit: float | None) -> bytes | None:
-        """One line; None where the limit passed, empty where the child ended."""
-        assert self._process.stdout is not None
-        deadline = None if limit is None else time.monotonic() + limit
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._process.stdout, selectors.EVENT_READ)
-            while b"\n" not in self._buffer:
-                left = None if deadline is None else max(0.0, deadline - time.monotonic())
-                if not selector.select(left):
-                    return None
-                chunk = os.read(self._process.stdout.fileno(), 1 << 20)
-                if not chunk:
-                    return b""
-                self._buffer += chunk
-        line, _, self._buffer = self._buffer.partition(b"\n")
-        return line
+    def _answer(self, limit_s: float | None) -> bytes | Failure:
+        clock = before = time.monotonic()
+        had = 0.0
+        while True:
+            left = _LOOK_S if limit_s is None else min(_LOOK_S, max(limit_s - had, 0.0))
+            try:
+                answer = self._answers.get(timeout=left)
+            except queue.Empty:
+                now = time.monotonic()
+                if not self._stopped():
+                    had += min(now - before, 2 * _LOOK_S)
+                before = now
+                if limit_s is not None and had >= limit_s:
+                    reason = f"time limit of {limit_s:g} s exceeded"
+                    return Failure("timeout", reason, now - clock)
+                if self.alive:
+                    continue
+                answer = self._last_answer()
+            if answer is None:
+                return self._end_of_worker(time.monotonic() - clock)
+            if len(answer) >= LARGEST_ANSWER:
+                reason = f"it answered with more than {LARGEST_ANSWER >> 20} MiB"
+                return Failure("crashed", reason, time.monotonic() - clock)
+            return answer
+
+    def _last_answer(self) -> bytes | None:
+        """What was said before the end, if it was."""
+        try:
+            return self._answers.get(timeout=1.0)
+        except queue.Empty:  # somebody else holds the stream open
+            return None
+
+    def _end_of_worker(self, wall_s: float) -> Failure:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._guard.wait(_END_LIMIT_S)  # it closed its output: it is ending
+        self._readers[1].join(1.0)
+        code = self._guard.poll()
+        number = 0 if code is None else code - 128 if code > 128 else -code if code < 0 else 0
+        how = f"killed by {_signal_name(number)}" if number else f"exit code {code or 0}"
+        return Failure(
+            "crashed",
+            f"the worker process ended ({how}): {self._last_words()}",
+            wall_s,
+            killed=bool(number),
+        )
+
+    def _stopped(self) -> bool:
+        try:
+            return self._worker is not None and self._worker.status() == psutil.STATUS_STOPPED
+        except psutil.Error:
+            return False
 
     def _last_words(self) -> str:
-        self._messages.seek(self._said_before)  # the child is gone: the offset is ours
-        lines = self._messages.read().decode(errors="replace").strip().splitlines()
-        return " | ".join(lines[-3:]) or "it left no message"
+        lines = bytes(self._said).decode(errors="replace").strip().splitlines()
+        return plain("\n".join(lines[-3:]), 1000) or "it left no message"
+
+    def _read_answers(self, stream: IO[bytes]) -> None:
+        with stream:
+            while line := stream.readline(LARGEST_ANSWER):
+                if not line.endswith(b"\n") and len(line) < LARGEST_ANSWER:
+                    break  # cut short: no answer
+                self._answers.put(line)
+                if len(line) >= LARGEST_ANSWER:
+                    break
+        self._answers.put(None)
+
+    def _read_messages(self, stream: IO[bytes]) -> None:
+        with stream:
+            while chunk := stream.read1(1 << 16):  # type: ignore[attr-defined]
+                self._said += chunk
+                del self._said[:-LAST_WORDS]
 
 
-_local = threading.local()
-_all: list[Sandbox] = []
+class Keeper:
+    """Performs jobs, each in a sandbox that no other method has run in."""
+
+    def __init__(self) -> None:
+        self._sandbox: Sandbox | None = None
+        self._owner: str | None = None
+        self._dismissed = False
+
+    @property
+    def reusable(self) -> bool:
+        """Whether others may go on with its sandbox."""
+        return self._owner is None and self._sandbox is not None and not self._dismissed
+
+    def perform(self, job: dict[str, Any]) -> dict[str, Any]:
+        """The answer to one job: ``outcome`` as the worker states it (text), or ``failure``,
+        ``reason`` and ``wall_s``. Raises SandboxError where no worker can be started.
+
+        A run whose worker was killed by a signal is tried again in a fresh one first.
+        """
+        found = self._suited(job).ask({"question": "solve", **job}, job["time_limit_s"])
+        for _ in range(_RETRIES):
+            if isinstance(found, bytes) or not found.killed:
+                break
+            found = self._fresh(job).ask({"question": "solve", **job}, job["time_limit_s"])
+        if isinstance(found, bytes):
+            return {"run_id": job["run_id"], "outcome": found.decode(errors="replace")}
+        return failure(job["run_id"], found.outcome, found.reason, found.wall_s)
+
+    def close(self) -> None:
+        """End the sandbox."""
+        if self._sandbox is not None:
+            self._sandbox.close()
+        self._sandbox = None
+
+    def dismiss(self) -> None:
+        """End the sandbox, from another thread as well, and start no other."""
+        self._dismissed = True
+        if (sandbox := self._sandbox) is not None:
+            sandbox.close()
+
+    def _suited(self, job: dict[str, Any]) -> Sandbox:
+        sandbox = self._sandbox
+        if sandbox is None or not sandbox.alive or self._owner != job["owner"]:
+            return self._fresh(job)
+        return sandbox
+
+    def _fresh(self, job: dict[str, Any]) -> Sandbox:
+        self.close()
+        if self._dismissed:
+            raise SandboxError("the suite has ended")
+        self._sandbox = sandbox = Sandbox()
+        self._owner = job["owner"]
+        if self._dismissed:  # while it started
+            sandbox.close()
+        ready = sandbox.ask({"question": "prepare"}, _START_LIMIT_S)
+        if isinstance(ready, Failure):
+            raise SandboxError(f"a worker process did not start: {ready.reason}")
+        return sandbox
+
+
+def failure(run_id: str, outcome: str, reason: str, wall_s: float) -> dict[str, Any]:
+    """The answer to a job that no worker gave."""
+    return {"run_id": run_id, "failure": outcome, "reason": reason, "wall_s": wall_s}
+
+
+_idle: list[Keeper] = []
+_open: list[Sandbox] = []
 _lock = threading.Lock()
 
 
-def supervise(job: dict[str, Any]) -> dict[str, Any]:
-    """Perform one job in this thread's sandbox."""
-    sandbox: Sandbox | None = getattr(_local, "sandbox", None)
-    if sandbox is None or not sandbox.alive:
-        if sandbox is not None:
-            sandbox.close()
-        sandbox = _new_sandbox()
-    answer = sandbox.perform(job)
-    for _ in range(_RETRIES):
-        if not answer.get("killed"):
-            break
-        # From outside (out of memory, an operator), or by its own fault: tried again.
-        answer = _new_sandbox().perform(job)
-    return {"run_id": job["run_id"], **answer}
-
-
-def _new_sandbox() -> Sandbox:
-    _local.sandbox = sandbox = Sandbox()
+@contextlib.contextmanager
+def keeper() -> Iterator[Keeper]:
+    """A keeper that nobody else uses; one for built-in methods is kept for whoever is next."""
     with _lock:
-        _all[:] = [other for other in _all if other.alive]
-        _all.append(sandbox)
-    return sandbox
+        own = _idle.pop() if _idle else Keeper()
+    try:
+        yield own
+    except BaseException:
+        own.close()
+        raise
+    if own.reusable:
+        with _lock:
+            _idle.append(own)
+    else:
+        own.close()
+
+
+def supervise(job: dict[str, Any]) -> dict[str, Any]:
+    """Perform one job; see :meth:`Keeper.perform`."""
+    with keeper() as own:
+        return own.perform(job)
 
 
 @atexit.register
-def _close_all() -> None:
+def close_all() -> None:
+    """End every sandbox of this process."""
     with _lock:
-        for sandbox in _all:
-            sandbox.close()
-
-
-def die_with_parent(parent: int) -> None:
-    """Have the kernel end this process when its parent (a process id) ends (Linux)."""
-    if sys.platform != "linux":
-        return
-    import ctypes
-
-    set_death_signal = 1  # PR_SET_PDEATHSIG
-    ctypes.CDLL(None, use_errno=True).prctl(set_death_signal, signal.SIGKILL)
-    if os.getppid() != parent:  # it ended before we asked
-        os._exit(1)
+        sandboxes = list(_open)
+        _open.clear()
+        _idle.clear()
+    for sandbox in sandboxes:
+        sandbox.close()
 
 
 def _signal_name(number: int) -> str:

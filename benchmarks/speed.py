@@ -22,12 +22,11 @@ from benchmarks.harness import perform_plan
 from benchmarks.methods import registry
 from benchmarks.specification import Limits
 from benchmarks.store import Store
-from benchmarks.suites import Suite, load_suite, run_specs, select_cells
+from benchmarks.suites import Suite, load_suite, manifest_of, run_specs, select_cells
 from benchmarks.tables import write_tables
-from coartic import Robot, learn, reference
+from coartic import CONDITIONS, Robot, learn, reference
 from coartic.compiled import entry, inner, joint_chain
-from coartic.dual_process import DualProcess
-from coartic.learner import TRIALS, warm_up
+from coartic.learner import METHOD_PREFIX, TRIALS, warm_up
 from coartic.robot import chain
 
 SLOW_TRIALS = 60
@@ -38,9 +37,8 @@ def main() -> None:
     suite = load_suite("paper")
     trials = suite.trials or TRIALS
     cells = [
-        (cell.task, cell.entry.method.condition)
+        (cell.task, CONDITIONS[cell.method.removeprefix(METHOD_PREFIX)])
         for cell in select_cells(suite, registry())
-        if issubclass(cell.entry.method, DualProcess)
     ]
     warm_up()
 
@@ -81,9 +79,8 @@ def _suite(suite: Suite, trials: int) -> tuple[float, float]:
     chosen = select_cells(suite, registry())
     planned = run_specs(chosen, runs=suite.runs, seed=0, trials=trials, limits=Limits(600.0))
     work = [
-        (spec.task, cell.entry.method.condition, spec.seed)
-        for cell, spec in planned
-        if issubclass(cell.entry.method, DualProcess)
+        (spec.task, CONDITIONS[spec.method.removeprefix(METHOD_PREFIX)], spec.seed)
+        for _, spec in planned
     ]
     clock = time.perf_counter()
     runs = Parallel(n_jobs=-1, prefer="threads")(
@@ -91,16 +88,14 @@ def _suite(suite: Suite, trials: int) -> tuple[float, float]:
     )
     bare = time.perf_counter() - clock
     with tempfile.TemporaryDirectory() as folder:
-        write_tables(Path(folder), suite.name, [], {})  # pyarrow imports what it needs
         store = Store(Path(folder))
         clock = time.perf_counter()
         perform_plan([spec for _, spec in planned], store, Local())
-        records = [(cell, store.read(spec.run_id)) for cell, spec in planned]
-        write_tables(Path(folder), suite.name, records, {})
+        records = write_tables(store, manifest_of(suite, suite.runs, 0, planned))
         harness = time.perf_counter() - clock
-    for run, (_, record) in zip(runs, records, strict=True):
-        if record["score"]["reward"] != run.reward:
-            raise SystemExit(f"{record['run_id']}: the two sides disagree")
+    for run, record in zip(runs, records.values(), strict=True):
+        if record.solution is None or record.solution.reward != run.reward:
+            raise SystemExit(f"{record.run_id}: the two sides disagree")
     return bare, harness
 
 

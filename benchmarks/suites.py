@@ -7,12 +7,14 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from benchmarks.methods import Entry, Registry, build, decapitalised, unknown, why_not
-from benchmarks.specification import UNLIMITED, Limits, RunSpec, run_seed
+from benchmarks.declaration import decapitalised
+from benchmarks.methods import Entry, Registry, unknown
+from benchmarks.provenance import surroundings
+from benchmarks.specification import UNLIMITED, Limits, RunSpec
 from coartic import (
     CONDITIONS,
     VARIANTS,
@@ -23,6 +25,8 @@ from coartic import (
     parse_task,
 )
 from coartic.learner import METHOD_PREFIX
+from coartic.record import run_seed
+from coartic.tables import DeclaredMethod, Manifest, Plan, PlanLimits, PlannedCell, variant_of
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 ALL = "*"
@@ -79,17 +83,12 @@ class Cell:
     @property
     def variant(self) -> str:
         """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-        fields = self.entry.method.Parameters.model_fields
-        return ", ".join(
-            f"{name}={value}"
-            for name, value in self.parameters
-            if name not in fields or value != fields[name].default
-        )
+        return variant_of(dict(self.parameters), self.entry.declared.defaults)
 
     @property
     def method(self) -> str:
         """Id of the method."""
-        return self.entry.method.name
+        return self.entry.name
 
     @property
     def label(self) -> str:
@@ -172,7 +171,7 @@ def select_cells(
 
     def add(task: Task, names: Iterable[str]) -> None:
         for name in names:
-            reason = why_not(known[name], task)
+            reason = known[name].why_not(task)
             if reason is None:
                 cells.append(Cell(task, known[name]))
             else:
@@ -221,10 +220,10 @@ def run_specs(
     planned = []
     for cell in cells:
         parameters = dict(cell.parameters)
-        if trials is not None and "trials" in cell.entry.method.Parameters.model_fields:
+        if trials is not None and "trials" in cell.entry.declared.defaults:
             parameters.setdefault("trials", trials)
-        build(cell.entry, parameters)  # refuse wrong parameters before any run
-        for run in range(runs if cell.entry.method.stochastic else 1):
+        cell.entry.complete(parameters)  # refuse wrong parameters before any run
+        for run in range(runs if cell.entry.declared.stochastic else 1):
             spec = RunSpec(
                 task=cell.task,
                 entry=cell.entry,
@@ -259,7 +258,7 @@ def _cells_of(suite: Suite, block: _Block, known: Registry, task: Task) -> list[
     every = ALL in block.methods
     cells = []
     for name in known if every else block.methods:
-        reason = why_not(known[name], task, block.parameters)
+        reason = known[name].why_not(task, block.parameters)
         if reason is not None:
             if every or ALL in block.tasks:
                 continue  # "all that applies"
@@ -268,7 +267,7 @@ def _cells_of(suite: Suite, block: _Block, known: Registry, task: Task) -> list[
             point = dict(zip(block.grid, combination, strict=True))
             parameters = {**block.parameters, **point}
             cell = Cell(task, known[name], tuple(parameters.items()))
-            build(cell.entry, parameters)
+            cell.entry.complete(parameters)
             cells.append(cell)
     return cells
 
@@ -296,35 +295,52 @@ def _family(suite: Suite, task: Task, move: _Move | None) -> list[Task]:
     return variants
 
 
-def plan_specification(
-    suite: Suite, cells: Sequence[Cell], runs: int, seed: int, planned: Sequence[RunSpec]
-) -> dict[str, Any]:
-    """The whole plan as plain data, for the manifest."""
-    return {
-        "suite": suite.name,
-        "runs": runs,
-        "seed": seed,
-        "trials": max((s.all_parameters.get("trials", 0) for s in planned), default=0),
-        "tasks": {cell.task.name: cell.task.model_dump(mode="json") for cell in cells},
-        "methods": {
-            cell.method: {
-                "title": cell.entry.method.title,
-                "citation": cell.entry.method.citation,
-                "told": sorted(cell.entry.method.told),
-                "secondary": list(cell.entry.method.secondary),
-                "origin": cell.entry.origin,
-                "code": cell.entry.code,
-            }
+def manifest_of(
+    suite: Suite,
+    runs: int,
+    seed: int,
+    planned: Sequence[tuple[Cell, RunSpec]],
+    limits: Limits = UNLIMITED,
+) -> Manifest:
+    """What is asked for, and with what it is made."""
+    return Manifest(
+        specification=_plan(suite, runs, seed, planned),
+        limits=PlanLimits(time_s=limits.time_s, trials=limits.trials),
+        environment=surroundings(),
+    )
+
+
+def _plan(suite: Suite, runs: int, seed: int, planned: Sequence[tuple[Cell, RunSpec]]) -> Plan:
+    by_cell: dict[tuple[str, str], tuple[Cell, list[RunSpec]]] = {}
+    for cell, spec in planned:
+        by_cell.setdefault((cell.task.name, cell.label), (cell, []))[1].append(spec)
+    cells = [cell for cell, _ in by_cell.values()]
+    trials = [spec.all_parameters.get("trials") for _, spec in planned]
+    return Plan(
+        suite=suite.name,
+        runs=runs,
+        seed=seed,
+        trials=max((count for count in trials if isinstance(count, int)), default=0),
+        tasks={cell.task.name: cell.task.model_dump(mode="json") for cell in cells},
+        methods={
+            cell.method: DeclaredMethod(
+                **cell.entry.declared.model_dump(
+                    include={"title", "citation", "told", "secondary", "defaults"}
+                ),
+                origin=cell.entry.origin,
+                code=cell.entry.code,
+            )
             for cell in cells
         },
-        "cells": [
-            {
-                "task": cell.task.name,
-                "method": cell.method,
-                "variant": cell.variant,
-                "parameters": dict(cell.parameters),
-            }
-            for cell in cells
-        ],
-        "run_ids": [spec.run_id for spec in planned],
-    }
+        cells=tuple(
+            PlannedCell(
+                task=cell.task.name,
+                method=cell.method,
+                variant=cell.variant,
+                parameters=dict(cell.parameters),
+                complete=specs[0].all_parameters,
+                run_ids=tuple(spec.run_id for spec in specs),
+            )
+            for cell, specs in by_cell.values()
+        ),
+    )

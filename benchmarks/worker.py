@@ -1,47 +1,44 @@
-"""Performs runs: builds the method, lets it solve, executes and scores what it returns.
+"""The process that methods run in: it describes them, asks them, lets them solve.
 
-``python -m benchmarks.worker`` is the child process of a sandbox.
+``python -m benchmarks.worker`` reads questions and writes answers, one JSON line each. It may
+run code that nobody has read, so nothing that it says is more than a statement: what it hands
+over as a solution is executed and scored elsewhere.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import resource
-import sys
 import time
 from datetime import UTC, datetime
 from functools import cache
 from typing import Any
 
-from benchmarks import store
-from benchmarks.methods import (
-    BUILT_IN_ORIGIN,
-    Entry,
-    Plugin,
-    build,
-    code_hash,
-    file_source,
-    plugin_methods,
-    registry,
-    why_not,
+from benchmarks.code_identity import built_in_code, foreign_code
+from benchmarks.declaration import (
+    Foreign,
+    MethodFileError,
+    brief,
+    completed,
+    declared,
+    methods_of,
+    reason_against,
 )
-from benchmarks.provenance import environment
-from benchmarks.sandbox import THREADS, die_with_parent
-from coartic import (
-    CoarticError,
-    MotionModel,
-    Movement,
-    NotApplicableError,
-    Task,
-    execute,
-    parse_task,
-)
+from benchmarks.provenance import environment, process_peak_mb
+from benchmarks.sandbox import THREADS
+from coartic import CoarticError, MotionModel, NotApplicableError, parse_task
 from coartic.errors import SolutionError
-from coartic.frames import movement_rows
 from coartic.learner import warm_up
-from coartic.method import BudgetError, MethodError, Result, Session, UndeclaredError
-from coartic.solution import other_arm_travel
+from coartic.method import (
+    BudgetError,
+    Information,
+    Method,
+    MethodError,
+    Result,
+    Session,
+    UndeclaredError,
+)
+from coartic.record import PlainMovement
 
 _solved_before: set[str] = set()
 
@@ -50,46 +47,67 @@ class ForeignCodeError(CoarticError):
     """This worker would perform the run with other code than was asked for."""
 
 
+def answer(question: dict[str, Any]) -> Any:
+    """What is asked for, as plain data. Raises CoarticError where that cannot be had."""
+    what = question["question"]
+    if what == "prepare":
+        warm_up()
+        return "ready"
+    if what == "solve":
+        return perform(question)
+    foreign = Foreign(**question["foreign"])
+    if what == "describe":
+        return [declared(method).model_dump(mode="json") for method in _foreign_methods(foreign)]
+    method = _method(question["method"], foreign)
+    if what == "complete":
+        return completed(method, question["parameters"])
+    if what == "applies":
+        task = parse_task(question["task"], "task", reach=False)
+        return reason_against(method, task, question["parameters"])
+    raise CoarticError(f"nobody knows what {what!r} asks for")
+
+
 def perform(job: dict[str, Any]) -> dict[str, Any]:
-    """The record of one run. Whatever the method does is an outcome, not an error.
+    """What a method states of one run. Whatever it does is an outcome, not an error.
 
     Raises ForeignCodeError where this process runs other code than the job's.
     """
     specification = job["specification"]
+    name = specification["method"]
+    foreign = None if job["foreign"] is None else Foreign(**job["foreign"])
     try:
-        entry = _entry(specification["method"], job["plugin"])
+        method_class = _method(name, foreign)
+        code = built_in_code(method_class.__module__) if foreign is None else foreign_code(foreign)
     except CoarticError as error:
-        raise ForeignCodeError(f"method {specification['method']!r}: {error}") from None
-    if entry.code != job["code"]:
+        raise ForeignCodeError(f"method {name!r}: {error}") from None
+    if code != job["code"]:
         raise ForeignCodeError(
-            f"method {specification['method']!r} has code {entry.code} here and {job['code']} "
-            "where the suite was started; install the same version everywhere"
+            f"method {name!r} has code {code} here and {job['code']} where the suite was "
+            "started; install the same version everywhere"
         )
     task = parse_task(specification["task"], "specification", reach=job["reach"])
-    method = build(entry, specification["parameters"])
+    method = method_class(method_class.Parameters(**specification["parameters"]))
     session = Session(
         task,
         specification["seed"],
-        method.told,
+        map(Information, job["told"]),  # as declared, whatever became of the class since
         model=MotionModel(**specification["model"]),
         trial_budget=specification["trial_budget"],
-        trusted=entry.origin == BUILT_IN_ORIGIN,
+        trusted=foreign is None,
     )
-    warm = method.name in _solved_before
-    _solved_before.add(method.name)
+    warm = name in _solved_before
+    _solved_before.add(name)
 
     status, reason = "ok", ""
-    details: dict[str, Any] = {}
-    solution: Any = ()
+    stated: dict[str, Any] = {}
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        reason_against = why_not(entry, task, specification["parameters"])
-        if reason_against is not None:
-            raise MethodError("infeasible", reason_against)
-        solution, details = _checked(method.solve(session))
-        session.check_solution(solution)
+        reason_not = reason_against(method_class, task, specification["parameters"])
+        if reason_not is not None:
+            raise MethodError("infeasible", reason_not)
+        stated = _stated(method.solve(session), session)
     except MethodError as error:
-        status, reason, details = error.outcome, str(error), error.details
+        status, reason, stated = error.outcome, str(error), {"details": error.details}
     except UndeclaredError as error:
         status, reason = "crashed", str(error)
     except BudgetError as error:
@@ -99,36 +117,22 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
     except NotApplicableError as error:
         status, reason = "infeasible", str(error)
     except (Exception, SystemExit, KeyboardInterrupt) as error:
-        status, reason = "crashed", f"{type(error).__name__}: {error}"
+        status, reason = "crashed", brief(error)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-
-    score: dict[str, Any] | None = None
-    movements: list[dict[str, Any]] = []
-    if status == "ok":
-        status, reason, score, movements = _score(task, solution, session.model)
     return {
-        "run_id": job["run_id"],
-        "run": job["run"],
-        "specification": specification,
-        "code": entry.code,
         "status": status,
         "reason": reason,
-        "score": score,
-        "solution": movements,
-        "told": sorted(method.told),
-        "secondary": list(method.secondary),
+        **stated,
         "used": sorted(session.used),
         "meter": session.meter.as_dict(),
-        "details": details,
         "rewards": session.rewards,
         "timing": {
             "wall_s": wall,
             "cpu_s": cpu,
             "warm": warm,
-            "process_peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "process_peak_mb": process_peak_mb(),
             "time_limit_s": job["time_limit_s"],
         },
-        "origin": job["origin"],
         "environment": {
             **_environment(),
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -137,47 +141,25 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _score(
-    task: Task, solution: Any, model: MotionModel
-) -> tuple[str, str, dict[str, Any] | None, list[dict[str, Any]]]:
-    """Execute a solution apart from its method: the only score that counts."""
-    try:
-        execution = execute(task, solution, model=model)
-        movements = movement_rows(task, execution.movements)
-    except (CoarticError, TypeError, ValueError, AttributeError, IndexError) as error:
-        return "solver-failed", f"the solution cannot be executed: {error}", None, []
-    if not execution.completed:
-        return "infeasible", execution.reason, None, []
-    # What is stored must give the score by itself, without the corrective process.
-    again = execute(task, execution.movements, model=model)
-    if again.ticks_by_goal() != execution.ticks_by_goal() or again.hands != execution.hands:
-        raise AssertionError(f"{execution.reward} re-executes to {again.reward}")
-    score = {
-        "reward": execution.reward,
-        "hands": execution.hands,
-        "ticks_by_goal": list(execution.ticks_by_goal()),
-        "corrections": execution.corrections,
-        "other_arm_travel": other_arm_travel(task, execution),
-    }
-    return "ok", "", score, movements
-
-
 class _ResultError(ValueError):
     """What a method returned is no result."""
 
 
-def _checked(result: Any) -> tuple[tuple[Movement, ...], dict[str, Any]]:
-    """Solution and details of a result, if it is one and can be kept."""
+def _stated(result: Any, session: Session) -> dict[str, Any]:
+    """A result as plain data, if it is one."""
     if not isinstance(result, Result):
         raise _ResultError(f"the method returned {type(result).__name__}, not a Result")
+    session.check_solution(tuple(result.solution))
     try:
-        movements = tuple(result.solution)
-        details = json.loads(json.dumps(result.details, allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise _ResultError(f"the method's result cannot be kept: {error}") from None
-    if not isinstance(details, dict):
-        raise _ResultError(f"the method's details are {type(details).__name__}, not a dict")
-    return movements, details
+        stated = {
+            name: [PlainMovement.of(movement).model_dump() for movement in getattr(result, name)]
+            for name in ("solution", "initial", "replay")
+        }
+        content = {**stated, "details": result.details, "bound": result.bound}
+        json.dumps(content, allow_nan=False)
+    except (TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise _ResultError(f"the method's result cannot be kept: {brief(error)}") from None
+    return content
 
 
 @cache
@@ -186,43 +168,42 @@ def _environment() -> dict[str, Any]:
 
 
 @cache
-def _built_in() -> dict[str, Entry]:
-    return registry()
+def _foreign_methods(foreign: Foreign) -> list[type[Method]]:
+    return methods_of(foreign)
 
 
-def _entry(name: str, plugin: list[str] | None) -> Entry:
-    if plugin is None:
-        known = _built_in()
-        if name not in known:
-            raise ForeignCodeError(f"method {name!r} is not installed on this worker")
-        return known[name]
-    read = Plugin(*plugin)
-    for method in plugin_methods(read):
+def _method(name: str, foreign: Foreign | None) -> type[Method]:
+    if foreign is None:
+        from benchmarks.methods import CLASSES  # its imports are no use to other methods
+
+        if name not in CLASSES:
+            raise MethodFileError("it is not installed on this worker")
+        return CLASSES[name]
+    for method in _foreign_methods(foreign):
         if method.name == name:
-            return Entry(method, read.filename, code_hash(file_source(read.source)), read)
-    raise ForeignCodeError(f"{read.filename} defines no method {name!r}")
+            return method
+    raise MethodFileError(f"{foreign.where} defines no method {name!r}")
 
 
 def main() -> None:
-    """Answer jobs, one JSON line each, until the input ends."""
-    die_with_parent(int(sys.argv[1]))
-    jobs, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    """Answer questions until the input ends."""
+    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a method prints is not an answer
     with open(os.devnull, "rb") as nothing:
-        os.dup2(nothing.fileno(), 0)  # and what it reads is not a job
-    warm_up()
-    answers.write(b"ready\n")
+        os.dup2(nothing.fileno(), 0)  # and what it reads is not a question
+    answers.write(f"{os.getpid()}\n".encode())
     answers.flush()
-    for line in jobs:
-        record = "{}"
+    for line in questions:
+        said: dict[str, Any] = {"error": None, "answer": None}
         try:
-            performed = perform(json.loads(line))
-            answer = {"status": performed["status"]}
-            record = store.encode(performed)
-        except ForeignCodeError as error:
-            answer = {"failure": "foreign", "reason": str(error)}
-        # The record goes as text: nobody on its way to the disk has to read it.
-        answers.write(f"{json.dumps(answer)}\n{record}\n".encode())
+            said["answer"] = answer(json.loads(line))
+            text = json.dumps(said, allow_nan=False)
+        except CoarticError as error:
+            other = isinstance(error, ForeignCodeError)
+            text = json.dumps({"error": str(error), "answer": None, "foreign_code": other})
+        except (Exception, SystemExit, KeyboardInterrupt) as error:
+            text = json.dumps({"error": brief(error), "answer": None})
+        answers.write(text.encode() + b"\n")
         answers.flush()
 
 

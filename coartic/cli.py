@@ -155,11 +155,11 @@ def run(
     from benchmarks.executors import Dask, Local
     from benchmarks.harness import perform_plan
     from benchmarks.methods import registry
-    from benchmarks.provenance import environment
     from benchmarks.specification import Limits
-    from benchmarks.store import Store, write_atomically
-    from benchmarks.suites import load_suite, plan_specification, run_specs, select_cells
+    from benchmarks.store import Store
+    from benchmarks.suites import load_suite, manifest_of, run_specs, select_cells
     from benchmarks.tables import write_tables
+    from coartic.files import publish
 
     if jobs == 0:
         raise CoarticError("--jobs 0: give a number of processes, or -1 for one per core")
@@ -179,13 +179,12 @@ def run(
     limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
     runs = runs or chosen.runs
     planned = run_specs(cells, runs=runs, seed=seed, trials=trials or chosen.trials, limits=limits)
-    specs = [spec for _, spec in planned]
-    started, clock = environment(), time.perf_counter()
+    manifest, clock = manifest_of(chosen, runs, seed, planned, limits), time.perf_counter()
     store = Store(out)
-    with _Display(chosen.name) as display:
+    with store.locked(), _Display(chosen.name) as display:
         try:
             progress = perform_plan(
-                specs,
+                [spec for _, spec in planned],
                 store,
                 Dask(scheduler) if scheduler else Local(jobs),
                 retry_failed=retry_failed,
@@ -200,22 +199,20 @@ def run(
                 file=sys.stderr,
             )
             sys.exit(130)
-    wall = time.perf_counter() - clock
-    manifest = {
-        "specification": plan_specification(chosen, cells, runs, seed, specs),
-        "limits": {"time_s": limits.time_s, "trials": limits.trials},
-        "environment": started,
-    }
-    write_tables(
-        out, chosen.name, [(cell, store.read(spec.run_id)) for cell, spec in planned], manifest
-    )
-    results = load_results(out)
-    comparison = compare(results)
-    try:
-        write_atomically(out / "comparison.md", comparison.to_markdown().encode())
-        write_atomically(out / "methods.csv", methods_frame(results).to_csv(index=False).encode())
-    except OSError as error:
-        raise CoarticError(f"cannot write to {out}: {error.strerror or error}") from None
+        wall = time.perf_counter() - clock
+        records = write_tables(store, manifest)
+        results = load_results(out)
+        comparison = compare(results)
+        pages = {
+            "comparison.md": comparison.to_markdown(),
+            "methods.csv": methods_frame(results).to_csv(index=False),
+        }
+        publish(
+            out,
+            {name: text.encode() for name, text in pages.items()},
+            owner="run",
+            alone=False,
+        )
 
     console = _console()
     hidden = sum(
@@ -231,7 +228,7 @@ def run(
         f"{wall:.1f} s; {progress.failed} failed. "
         f"Results in {out}, this comparison in {out / 'comparison.md'}."
     )
-    if any(store.read(spec.run_id)["status"] == "crashed" for spec in specs):
+    if any(record.status == "crashed" for record in records.values()):
         sys.exit(1)
 
 
@@ -266,12 +263,9 @@ def list_(method_file: MethodFiles = None) -> None:
         [
             (
                 name,
-                entry.method.title + ("" if entry.origin == "built in" else f" ({entry.origin})"),
-                ", ".join(sorted(entry.method.told)),
-                ", ".join(
-                    f"{key}={field.default}"
-                    for key, field in entry.method.Parameters.model_fields.items()
-                )
+                entry.declared.title + ("" if entry.foreign is None else f" ({entry.origin})"),
+                ", ".join(sorted(entry.declared.told)),
+                ", ".join(f"{key}={value}" for key, value in entry.declared.defaults.items())
                 or "–",
                 _applicable(entry, known),
             )
@@ -291,10 +285,8 @@ def list_(method_file: MethodFiles = None) -> None:
 
 def _applicable(entry: Entry, tasks: list[Task]) -> str:
     """Tasks a method applies to with its default parameters, or why that is unknown."""
-    from benchmarks.methods import why_not
-
     try:
-        return ", ".join(task.name for task in tasks if why_not(entry, task) is None)
+        return ", ".join(task.name for task in tasks if entry.why_not(task) is None)
     except CoarticError as error:
         return f"unknown: {error}"
 
@@ -319,7 +311,7 @@ def analyse(
     from analysis.results import load_results
     from analysis.signatures.page import signatures_page
     from analysis.study import Study
-    from benchmarks.store import write_atomically
+    from coartic.files import write_atomically
 
     results = load_results(folder)
     study = Study(results)
@@ -373,10 +365,9 @@ def show(
     from benchmarks.reproduce import command_for, find_record
 
     store, record = find_record(run_id, folder)
-    shown = dict(record)
-    rewards = shown.pop("rewards")
-    shown["rewards"] = f"{len(rewards)} trials, in learning.parquet and in the record"
-    shown["record"] = str(store.path(record["run_id"]))
+    shown = record.model_dump(mode="json")
+    shown["rewards"] = f"{len(record.rewards)} trials, in learning.parquet and in the record"
+    shown["record"] = str(store.path(record.run_id))
     print(json.dumps(shown, indent=2, ensure_ascii=False))
     print(f"\nReproduce it with: {command_for(record, store.folder)}")
 
@@ -393,13 +384,13 @@ def reproduce(
     from benchmarks.specification import Limits
 
     _, record = find_record(run_id, folder)
-    limits = Limits(record["timing"]["time_limit_s"], None)
+    limits = Limits(record.timing.time_limit_s, None)
     spec = spec_of(record, registry(method_file or []), limits)
     again = perform_once(spec)
     found = differences(record, again)
-    label = f"{record['run_id']} ({spec.method} on {spec.task.name}, run {spec.run})"
-    if record["code"] != again["code"]:
-        print(f"The record was made by code {record['code']}; here is {again['code']}.")
+    label = f"{record.run_id} ({spec.method} on {spec.task.name}, run {spec.run})"
+    if record.code != again.code:
+        print(f"The record was made by code {record.code}; here is {again.code}.")
     if not found:
         print(f"{label}: identical.")
         return
@@ -520,7 +511,7 @@ def compare(
 ) -> None:
     """Compare two results folders cell by cell: versions, machines, parameters."""
     from analysis.versions import compare_versions, load_pair
-    from benchmarks.store import write_atomically
+    from coartic.files import write_atomically
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
         if path is not None and path.suffix.lower() != ending:
@@ -574,8 +565,7 @@ def animate(
         if name is not None:
             _, record = find_record(name, folder)
             found = trajectory_of(record)
-            method = record["specification"]["method"]
-            panels.append(Panel(f"{found.task.name}: {method}, run {record['run']}", found))
+            panels.append(Panel(f"{found.task.name}: {record.method}, run {record.run}", found))
     if initial:
         task = panels[0].trajectory.task
         movements = corrective_trial(task, initial_hands(task)).movements

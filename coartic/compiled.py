@@ -32,20 +32,25 @@ _PRESENTATION = {
     "__init__.py",
     "__main__.py",
     "cli.py",
+    "files.py",
     "frames.py",
+    "record.py",
     "reference.py",
+    "tables.py",
+    "text.py",
     "trajectory.py",
 }
+
+
+def model_files() -> list[Path]:
+    """The files of this package that results come from."""
+    return [path for path in sorted(PACKAGE.glob("*.py")) if path.name not in _PRESENTATION]
 
 
 @cache
 def model_source() -> bytes:
     """The sources that results come from, as they were when the package was imported."""
-    return b"\0".join(
-        path.name.encode() + b"\0" + path.read_bytes()
-        for path in sorted(PACKAGE.glob("*.py"))
-        if path.name not in _PRESENTATION
-    )
+    return b"\0".join(path.name.encode() + b"\0" + path.read_bytes() for path in model_files())
 
 
 def source_fingerprint() -> str:

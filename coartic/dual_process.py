@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from itertools import chain
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -21,7 +21,7 @@ from coartic.exploration import (
     ExplorationCondition,
 )
 from coartic.initial import InitialSearch, search_initial_hands
-from coartic.learner import METHOD_PREFIX, TRIALS, LearningRun, learn
+from coartic.learner import METHOD_PREFIX, TRIALS, learn
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.task import Task
 
@@ -88,8 +88,12 @@ class DualProcess(Method):
         session.spend(**asdict(run.counters))
         session.record_rewards(run.rewards.tolist())  # None where a trial failed
         if run.best_trial is None:
-            raise MethodError("infeasible", run.reason, _details(run))
-        return Result(run.solution, _details(run))
+            raise MethodError("infeasible", run.reason)
+        return Result(
+            run.solution,
+            initial=run.initial,
+            replay=run.replay if run.replay_completed else (),
+        )
 
 
 def spend_search(session: Session, search: InitialSearch) -> None:
@@ -97,16 +101,6 @@ def spend_search(session: Session, search: InitialSearch) -> None:
     spent = search._asdict()
     del spent["hands"]
     session.spend(**spent, jacobians=search.corrective_iterations)
-
-
-def _details(run: LearningRun) -> dict[str, Any]:
-    return {
-        "initial_reward": run.initial_reward,
-        "initial_hands": run.first_hands,
-        "replay_reward": run.replay_reward,
-        "replay_hands": run.replay_hands,
-        "best_trial": run.best_trial,
-    }
 
 
 _SECONDARY = "change the posture as little as possible (nullspace of a correction)"

@@ -330,6 +330,7 @@ def _learn(
     tables: Any,
     rewards: Any,
     completed: Any,
+    first: Any,
     best: Any,
     replay: Any,
     counts: Any,
@@ -351,6 +352,8 @@ def _learn(
         completed[trial] = done
         if not done:
             continue
+        if trial == 0:
+            _copy(trial_log, first)
         _update(-float(ticks), tables, trial_log)
         if best_trial < 0 or -ticks > rewards[best_trial]:
             best_trial = trial
@@ -397,6 +400,8 @@ class LearningRun:
     """Total reward of each trial, shape ``(trials,)``; masked where the trial failed."""
     best_trial: int | None
     """First trial with the highest total reward; None where none was completed."""
+    initial: tuple[Movement, ...]
+    """Movements of trial 0; none where it failed."""
     solution: tuple[Movement, ...]
     """Movements of the best trial."""
     replay: tuple[Movement, ...]
@@ -500,7 +505,7 @@ def learn(
     problem = _problem(task, condition, model)
     goals, dof = len(task.goals), task.robot.dof
     tables = _Tables(np.full((goals, 3, 2), -np.inf), np.full((goals, 3, 2, dof), np.nan))
-    best, replay, trial_log = (_empty_log(goals, dof) for _ in range(3))
+    first, best, replay, trial_log = (_empty_log(goals, dof) for _ in range(4))
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
     counts = np.zeros(len(_C), dtype=np.int64)
@@ -514,6 +519,7 @@ def learn(
             tables,
             trial_rewards,
             completed,
+            first,
             best,
             replay,
             counts,
@@ -538,6 +544,7 @@ def learn(
         initial_search=search,
         rewards=np.ma.array(rewards, mask=~completed),
         best_trial=int(best_trial) if best_trial >= 0 else None,
+        initial=_movements(first),
         solution=_movements(best) if best_trial >= 0 else (),
         replay=_movements(replay),
         replay_completed=bool(replayed),

@@ -150,6 +150,12 @@ class Result:
     solution: tuple[Movement, ...]
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method wants kept beside it, as plain data. Never its score."""
+    initial: tuple[Movement, ...] = ()
+    """Of a learner: its first trial, if that hit every goal."""
+    replay: tuple[Movement, ...] = ()
+    """Of a learner: one greedy trial, without noise, with what it has learned."""
+    bound: int | None = None
+    """Reward that no solution exceeds, where proven; for searches of this project."""
 
 
 class Session:

@@ -43,5 +43,7 @@ def _printable(text: str) -> str:
     return text
 
 
-Line = Annotated[str, Field(max_length=LONGEST_LINE), AfterValidator(_printable)]
+printable = AfterValidator(_printable)
+"""Refuses what is not one line of printable text."""
+Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
 """One line of printable text, such as a title or a citation."""

@@ -1,0 +1,128 @@
+"""The code that a result comes from, as a hash: read as text, never imported.
+
+Of every module the syntax tree counts, without docstrings: a comment or a better sentence
+does not make a result stale, a changed number does.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from benchmarks.declaration import Foreign, MethodFileError, brief
+from coartic.compiled import PACKAGE, model_files
+
+_PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
+
+
+@cache
+def built_in_code(module: str) -> str:
+    """Hash for a method of this project, defined in ``module``, with all of ``baselines`` it
+    imports."""
+    if module.partition(".")[0] == "coartic":
+        return _code_hash([])  # part of the model's code anyway
+    found: dict[str, str] = {}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        path = PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")
+        if name in found or name.partition(".")[0] != "baselines" or not path.is_file():
+            continue
+        found[name] = _text(path)
+        waiting += _imported(found[name], name)
+    return _code_hash(found[name] for name in sorted(found))
+
+
+@cache
+def foreign_code(foreign: Foreign) -> str:
+    """Hash for a method file with the local modules it imports, or for an installed package.
+
+    Raises MethodFileError where it is no Python.
+    """
+    if foreign.kind == "installed":
+        root = foreign.where.partition(":")[0].partition(".")[0]
+        return _code_hash(map(_text, _files_of(root)))
+    local: dict[str, list[Path]] = {}
+    waiting = _imported(foreign.source, foreign.where)
+    while waiting:
+        root = waiting.pop().partition(".")[0]
+        if root in local or root in sys.stdlib_module_names or root in _PACKAGES:
+            continue
+        local[root] = [path for path in _files_of(root) if "site-packages" not in path.parts]
+        waiting += [name for path in local[root] for name in _imported(_text(path), str(path))]
+    files = [path for root in sorted(local) for path in local[root]]
+    return _code_hash([foreign.source, *map(_text, files)], foreign.where)
+
+
+def _files_of(root: str) -> list[Path]:
+    """The sources of a top-level module or package."""
+    try:
+        spec = importlib.util.find_spec(root)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        return []
+    folders = [Path(folder) for folder in spec.submodule_search_locations or []]
+    if folders:
+        return [path for folder in folders for path in sorted(folder.rglob("*.py"))]
+    return [Path(spec.origin)] if spec.origin and spec.origin.endswith(".py") else []
+
+
+def _imported(source: str, name: str) -> list[str]:
+    names: list[str] = []
+    for node in ast.walk(_tree(source, name)):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return names
+
+
+def _code_hash(sources: Iterable[str], name: str = "") -> str:
+    digest = hashlib.sha256(_model())
+    for source in sources:
+        digest.update(_essence(source, name))
+    return digest.hexdigest()[:12]
+
+
+@cache
+def _model() -> bytes:
+    """The model, and the worker that hands it to methods."""
+    files = [*model_files(), Path(__file__).with_name("worker.py")]
+    return b"".join(path.name.encode() + _essence(_text(path), str(path)) for path in files)
+
+
+def _essence(source: str, name: str) -> bytes:
+    """A module's syntax tree without docstrings."""
+    tree = _tree(source, name)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [child for child in body if not _is_text(child)]  # type: ignore[attr-defined]
+    return ast.dump(tree).encode()
+
+
+def _is_text(node: ast.AST) -> bool:
+    """A text that stands for itself: a docstring, of an attribute as well."""
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )
+
+
+def _tree(source: str, name: str) -> ast.Module:
+    try:
+        return ast.parse(source)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise MethodFileError(f"{name}: cannot be run: {brief(error)}") from None
+
+
+@cache
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")

@@ -1,0 +1,344 @@
+"""The tables of a results folder: what follows from its manifest and the records of its plan.
+
+``runs.parquet`` has one row a run, ``solutions.parquet`` one row a movement of each run's
+solution, ``paths.parquet`` one row a waypoint of movements that follow a path,
+``learning.parquet`` one row a trial, ``sequences.parquet`` one row per task and hand
+sequence of the corrective process alone. :func:`tables_of` makes them; those who read a
+folder make them again and compare, so a table never says anything that its records do not.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pyarrow as pa
+from pydantic import Field, JsonValue
+
+from coartic.errors import NotApplicableError
+from coartic.initial import hand_sequences, ranked_sequences
+from coartic.method import Information, Meter
+from coartic.record import (
+    Count,
+    Environment,
+    Plain,
+    PlainMovement,
+    Record,
+    content_hash,
+)
+from coartic.task import Task, parse_task
+from coartic.text import Line
+
+FORMAT = 4  # of manifest and tables; raised when one of them changes its meaning
+
+RUNS = pa.schema(
+    [
+        ("run_id", pa.string()),
+        ("suite", pa.string()),
+        ("task", pa.string()),
+        ("method", pa.string()),
+        ("variant", pa.string()),  # parameters that differ from the method's defaults
+        ("run", pa.int32()),  # 0-based
+        ("seed", pa.int64()),
+        ("status", pa.string()),  # ok, infeasible, solver-failed, timeout, crashed
+        ("reason", pa.string()),  # empty where status is ok
+        ("hands", pa.string()),  # of the solution, such as LRLR
+        ("reward", pa.int64()),  # of the solution, executed and scored by the harness
+        ("replay_reward", pa.int64()),  # one noiseless greedy trial with what was learned
+        ("replay_hands", pa.string()),
+        ("initial_reward", pa.int64()),  # trial 0 of a learner
+        ("initial_hands", pa.string()),
+        ("best_trial", pa.int64()),  # first trial with the solution's reward, if any
+        *((name, pa.int64()) for name in Meter.COUNTS),
+        ("solution_corrections", pa.int64()),  # corrective movements the solution needed
+        ("other_arm_travel", pa.float64()),  # of the arm that is not chosen, rad
+        ("proven_bound", pa.int64()),  # reward that no solution exceeds, where proven
+        ("told", pa.string()),  # what the method was told, comma-separated
+        ("parameters", pa.string()),  # all of them, JSON
+        ("build_s", pa.float64()),
+        ("solve_s", pa.float64()),
+        ("wall_s", pa.float64()),
+        ("cpu_s", pa.float64()),
+        ("warm", pa.bool_()),  # the process had run this method before
+        ("process_peak_mb", pa.float64()),  # of the worker so far, all its runs included
+        ("commit", pa.string()),
+        ("code", pa.string()),  # hash of the code that produced the result
+        ("packages", pa.string()),  # hash of Python's and all libraries' versions
+        ("result", pa.string()),  # hash of all that a repetition has to give again
+    ]
+)
+TIMINGS = (
+    "build_s",
+    "solve_s",
+    "wall_s",
+    "cpu_s",
+    "warm",
+    "process_peak_mb",
+    "commit",
+    "packages",
+)
+"""Columns of ``runs.parquet`` that may differ between two runs of one specification."""
+
+SOLUTIONS = pa.schema(
+    [
+        ("run_id", pa.string()),
+        ("order", pa.int32()),  # 0-based, over the trial
+        ("goal", pa.int32()),  # 1-based
+        ("hand", pa.string()),
+        ("kind", pa.string()),  # learned, corrective, planned, path
+        ("ticks", pa.int64()),
+    ]
+)
+PATHS = pa.schema([("run_id", pa.string()), ("order", pa.int32()), ("waypoint", pa.int32())])
+SEQUENCES = pa.schema(
+    [
+        ("task", pa.string()),
+        ("hands", pa.string()),
+        ("reward", pa.int64()),
+        ("reason", pa.string()),
+    ]
+)
+
+
+class DeclaredMethod(Plain):
+    """What a method declares of itself, and where it comes from."""
+
+    title: Line
+    citation: Line
+    told: tuple[Information, ...]
+    secondary: tuple[Line, ...]
+    defaults: dict[Line, JsonValue]
+    """Its parameters; None for one that has no default."""
+    origin: Line
+    code: Line
+
+
+class PlannedCell(Plain):
+    """One method with parameters on one task, and its runs in order."""
+
+    task: Line
+    method: Line
+    variant: Line
+    parameters: dict[str, JsonValue]
+    """What the suite says of its parameters."""
+    complete: dict[str, JsonValue]
+    """All of them, as its runs have them."""
+    run_ids: tuple[Line, ...]
+
+
+class Plan(Plain):
+    """What a suite asked for, all of it."""
+
+    suite: Line
+    runs: Count
+    seed: Count
+    trials: Count
+    tasks: dict[Line, dict[str, JsonValue]]
+    methods: dict[Line, DeclaredMethod]
+    cells: tuple[PlannedCell, ...]
+
+    @property
+    def run_ids(self) -> list[str]:
+        """Ids of all runs, each once, in the order of the plan."""
+        return list(dict.fromkeys(run_id for cell in self.cells for run_id in cell.run_ids))
+
+
+class PlanLimits(Plain):
+    """Bounds that runs were performed under."""
+
+    time_s: Annotated[float, Field(gt=0)] | None
+    trials: Annotated[int, Field(gt=0)] | None
+
+
+class Manifest(Plain):
+    """``manifest.json``: what was asked for and with what it was made."""
+
+    format: Literal[4] = 4
+    specification: Plan
+    limits: PlanLimits
+    environment: Environment
+
+    def seal(self) -> str:
+        """Hash of the whole content, kept beside it: a changed manifest is noticed."""
+        return content_hash(self.model_dump(mode="json"))
+
+    def text(self) -> str:
+        """The file's text."""
+        content = {**self.model_dump(mode="json"), "seal": self.seal()}
+        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def variant_of(parameters: Mapping[str, Any], defaults: Mapping[str, Any]) -> str:
+    """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
+    return ", ".join(
+        f"{name}={value}"
+        for name, value in parameters.items()
+        if name not in defaults or value != defaults[name]
+    )
+
+
+def tables_of(manifest: Manifest, records: Mapping[str, Record]) -> dict[str, pa.Table]:
+    """All tables by name (``runs``, ...); ``records`` by run id has the plan's at least.
+
+    A cell that shares its runs with another has rows of its own.
+    """
+    plan = manifest.specification
+    rows = [(cell, records[run_id]) for cell in plan.cells for run_id in cell.run_ids]
+    distinct = [records[run_id] for run_id in plan.run_ids]
+    tasks = [parse_task(task, "manifest") for task in plan.tasks.values()]
+    return {
+        "runs": pa.Table.from_pylist(
+            [_run_row(plan.suite, cell, record) for cell, record in rows], schema=RUNS
+        ),
+        "solutions": _joint_table(_solution_rows(distinct), SOLUTIONS),
+        "paths": _joint_table(_path_rows(distinct), PATHS),
+        "learning": _learning_table(distinct),
+        "sequences": pa.Table.from_pylist(_sequence_rows(tasks), schema=SEQUENCES),
+    }
+
+
+def parquet_options(name: str) -> dict[str, Any]:
+    """How a table is best written."""
+    if name != "learning":
+        return {"compression": "zstd"}
+    return {
+        "compression": "zstd",
+        "use_dictionary": ["run_id"],
+        "column_encoding": {"trial": "DELTA_BINARY_PACKED", "reward": "DELTA_BINARY_PACKED"},
+    }
+
+
+def _run_row(suite: str, cell: PlannedCell, record: Record) -> dict[str, Any]:
+    solution, replay, initial = record.solution, record.replay, record.initial
+    specification, environment = record.specification, record.environment
+    commit = environment.commit
+    return {
+        "run_id": record.run_id,
+        "suite": suite,
+        "task": cell.task,
+        "method": cell.method,
+        "variant": cell.variant,
+        "run": record.run,
+        "seed": specification.seed,
+        "status": record.status,
+        "reason": record.reason,
+        "hands": solution and solution.hands,
+        "reward": solution and solution.reward,
+        "replay_reward": replay and replay.reward,
+        "replay_hands": replay and replay.hands,
+        "initial_reward": initial and initial.reward,
+        "initial_hands": initial and initial.hands,
+        "best_trial": _best_trial(record),
+        **(asdict(record.meter) if record.meter else dict.fromkeys(asdict(Meter()))),
+        "solution_corrections": solution and solution.corrections,
+        "other_arm_travel": solution and solution.other_arm_travel,
+        "proven_bound": record.bound,
+        "told": ", ".join(record.told),
+        "parameters": json.dumps(specification.parameters, sort_keys=True),
+        "wall_s": record.timing.wall_s,
+        "cpu_s": record.timing.cpu_s,
+        "warm": record.timing.warm,
+        "process_peak_mb": record.timing.process_peak_mb,
+        "commit": commit and commit.id + ("+" if commit.dirty else ""),
+        "code": record.code,
+        "packages": content_hash([environment.python, environment.packages])[:8],
+        "result": record.digest(),
+    }
+
+
+def _best_trial(record: Record) -> int | None:
+    if record.solution is None or record.solution.reward not in record.rewards:
+        return None
+    return record.rewards.index(record.solution.reward)
+
+
+def _solution_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
+    return [
+        {
+            "run_id": record.run_id,
+            "order": order,
+            "goal": row.goal,
+            "hand": row.hand,
+            "kind": row.kind,
+            "ticks": row.ticks,
+            **dict(zip(record.task.robot.joint_names, row.target or (), strict=True)),
+        }
+        for record in records
+        for order, row in enumerate(_movements(record))
+    ]
+
+
+def _path_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
+    return [
+        {
+            "run_id": record.run_id,
+            "order": order,
+            "waypoint": index,
+            **dict(zip(record.task.robot.joint_names, point, strict=True)),
+        }
+        for record in records
+        for order, row in enumerate(_movements(record))
+        for index, point in enumerate(row.waypoints or ())
+    ]
+
+
+def _movements(record: Record) -> tuple[PlainMovement, ...]:
+    return () if record.solution is None else record.solution.movements
+
+
+def _joint_table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
+    """A table with one further column per joint that its rows have."""
+    joints = dict.fromkeys(key for row in rows for key in row if key not in schema.names)
+    for name in _ordered(joints):
+        schema = schema.append(pa.field(name, pa.float64()))
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
+def _ordered(joints: Iterable[str]) -> list[str]:
+    """Joint names in the order of q, whichever robots they come from."""
+
+    def key(name: str) -> tuple[int, int, str]:
+        part, _, number = name.rpartition("_")
+        return ("base", "left", "right").index(part), int(number) if number.isdigit() else 0, name
+
+    return sorted(joints, key=key)
+
+
+def _learning_table(records: Sequence[Record]) -> pa.Table:
+    rewards = [pa.array(record.rewards, pa.int32()) for record in records]
+    lengths = [len(array) for array in rewards]
+    ids = pa.DictionaryArray.from_arrays(
+        pa.array(np.repeat(np.arange(len(records), dtype=np.int32), lengths)),
+        pa.array([record.run_id for record in records], pa.string()),
+    )
+    trials = np.concatenate([np.zeros(0, np.int64), *(np.arange(n) for n in lengths)])
+    return pa.table(
+        {
+            "run_id": ids,
+            "trial": pa.array(trials, pa.int32()),
+            "reward": pa.chunked_array(rewards, pa.int32()),
+        }
+    )
+
+
+def _sequence_rows(tasks: Sequence[Task]) -> list[dict[str, Any]]:
+    """The corrective process alone, one row per task and hand sequence, best first."""
+    rows: list[dict[str, Any]] = []
+    for task in tasks:
+        try:
+            trials = ranked_sequences(task, hand_sequences(task))
+        except NotApplicableError:
+            continue  # more sequences than anyone would list
+        rows.extend(
+            {
+                "task": task.name,
+                "hands": hands,
+                "reward": execution.reward,
+                "reason": execution.reason,
+            }
+            for hands, execution in trials
+        )
+    return rows
