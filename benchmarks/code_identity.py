@@ -38,7 +38,6 @@ def built_in_code(module: str) -> str:
     return _code_hash(found[name] for name in sorted(found))
 
 
-@cache
 def foreign_code(foreign: Foreign) -> str:
     """Hash for a method file with the local modules it imports, or for an installed package.
 
@@ -123,6 +122,5 @@ def _tree(source: str, name: str) -> ast.Module:
         raise MethodFileError(f"{name}: cannot be run: {brief(error)}") from None
 
 
-@cache
 def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8")

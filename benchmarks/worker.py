@@ -77,7 +77,7 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
     foreign = None if job["foreign"] is None else Foreign(**job["foreign"])
     try:
         method_class = _method(name, foreign)
-        code = built_in_code(method_class.__module__) if foreign is None else foreign_code(foreign)
+        code = built_in_code(method_class.__module__) if foreign is None else _foreign_code(foreign)
     except CoarticError as error:
         raise ForeignCodeError(f"method {name!r}: {error}") from None
     if code != job["code"]:
@@ -170,6 +170,11 @@ def _environment() -> dict[str, Any]:
 @cache
 def _foreign_methods(foreign: Foreign) -> list[type[Method]]:
     return methods_of(foreign)
+
+
+@cache
+def _foreign_code(foreign: Foreign) -> str:
+    return foreign_code(foreign)
 
 
 def _method(name: str, foreign: Foreign | None) -> type[Method]:

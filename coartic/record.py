@@ -322,6 +322,7 @@ class Record(Plain):
             (
                 not learner
                 or spent is None
+                or not self.rewards
                 or len(self.rewards) == self.specification.parameters.get("trials")
                 or self.specification.trial_budget is not None,
                 "its trials are not those it was asked for",

@@ -10,28 +10,30 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis.comparison import compare
-from analysis.integrity import FORMAT, NUMBERS, TEXT
+from analysis.integrity import read_manifest
 from analysis.results import load_results
 from benchmarks import tables
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
-from benchmarks.methods import build, registry
-from benchmarks.specification import Limits, run_seed
-from benchmarks.store import Store, encode
+from benchmarks.methods import CLASSES, registry
+from benchmarks.specification import Limits
+from benchmarks.store import Store
 from benchmarks.suites import (
     Cell,
     load_suite,
-    plan_specification,
+    manifest_of,
     run_specs,
     select_cells,
     suites,
 )
-from benchmarks.tables import RUNS, TIMINGS, write_tables
+from benchmarks.tables import write_tables
 from benchmarks.worker import ForeignCodeError, perform
 from coartic import CoarticError, Movement, execute, hand_sequences, learn, load_task
 from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
 from coartic.method import Information, Session
+from coartic.record import run_seed
+from coartic.tables import FORMAT, RUNS, TIMINGS
 
 from .strategies import tiny_task
 
@@ -48,9 +50,8 @@ class InProcess:
 
     def perform(self, jobs):
         for job in jobs:
-            record = perform(json.loads(json.dumps(job)))
-            answer = {"run_id": job["run_id"], "status": record["status"]}
-            yield {**answer, "record": encode(record)}
+            said = {"error": None, "answer": perform(json.loads(json.dumps(job)))}
+            yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
 
 
 def paper_cells(**selection):
@@ -58,20 +59,11 @@ def paper_cells(**selection):
 
 
 def run_and_write(folder, cells=None, runs=2, trials=150, seed=0, executor=None, **options):
-    suite = load_suite("paper")
-    cells = cells or paper_cells()
-    planned = run_specs(
-        cells, runs=runs, seed=seed, trials=trials, limits=options.pop("limits", Limits(300.0))
-    )
-    specs = [spec for _, spec in planned]
+    limits = options.pop("limits", Limits(300.0))
+    planned = run_specs(cells or paper_cells(), runs=runs, seed=seed, trials=trials, limits=limits)
     store = Store(folder)
-    perform_plan(specs, store, executor or InProcess(), **options)
-    records = [(cell, store.read(spec.run_id)) for cell, spec in planned]
-    manifest = {
-        "specification": plan_specification(suite, cells, runs, seed, specs),
-        "environment": {},
-    }
-    write_tables(folder, suite.name, records, manifest)
+    perform_plan([spec for _, spec in planned], store, executor or InProcess(), **options)
+    write_tables(store, manifest_of(load_suite("paper"), runs, seed, planned, limits))
     return load_results(folder)
 
 
@@ -100,7 +92,7 @@ def test_suite_comparison_has_every_method_on_every_task_it_applies_to():
         (name, method)
         for name in ("ascending", "descending", "two-armed-1", "two-armed-2")
         for method, entry in KNOWN.items()
-        if entry.method().why_not(load_task(name)) is None
+        if entry.why_not(load_task(name)) is None
     }
     assert cells == expected
     assert set(suites()) >= {"paper", "comparison", "quick"}
@@ -335,10 +327,6 @@ def test_cells_are_told_apart_by_their_parameters(tmp_path):
 
 
 def compare_cells(found):
-    found.manifest["environment"] = {
-        "coartic": "0", "commit": None, "model_code": "c", "python": "3", "platform": "p",
-        "date": "d",
-    }  # fmt: skip
     table = compare(found).tables[0]
     rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
     return {(row["task"].removesuffix(" †"), row["method"]): row for row in rows}
@@ -402,9 +390,10 @@ def test_a_worker_with_other_code_refuses():
         perform({**spec.job(), "code": "c0ffee"})
     job = spec.job()
     job["specification"] = {**job["specification"], "method": "not-here"}
-    with pytest.raises(ForeignCodeError, match="'not-here' is not installed on this worker"):
+    with pytest.raises(ForeignCodeError, match="'not-here': it is not installed on this worker"):
         perform(job)
-    broken = {**spec.job(), "plugin": ["far.py", "import no_such_module_here"]}
+    far = {"kind": "file", "where": "far.py", "source": "import no_such_module_here"}
+    broken = {**spec.job(), "foreign": far}
     with pytest.raises(ForeignCodeError, match="cannot be run: ModuleNotFoundError"):
         perform(broken)
 
@@ -445,7 +434,8 @@ def test_robots_of_different_size_share_a_table(tmp_path):
 
 
 def test_a_failed_write_leaves_the_old_tables(tmp_path, monkeypatch):
-    run_and_write(tmp_path, runs=1, trials=2)
+    found = run_and_write(tmp_path, runs=1, trials=2)
+    manifest = read_manifest(found.folder)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
 
     def full(*_):
@@ -453,7 +443,7 @@ def test_a_failed_write_leaves_the_old_tables(tmp_path, monkeypatch):
 
     monkeypatch.setattr(tables, "write_atomically", full)
     with pytest.raises(CoarticError, match="No space left on device"):
-        write_tables(tmp_path, "paper", [], {})
+        write_tables(Store(tmp_path), manifest)
     assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
 
 
@@ -521,15 +511,16 @@ def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):
     assert [cell.variant for cell in grid] == ["", "nullspace_gain=0.2"]
     for name, entry in KNOWN.items():
         if name.startswith("dual-process/"):
-            method = entry.method
-            for key, value in method.Parameters(trials=1).model_dump().items():
-                assert key == "trials" or getattr(method.condition, key) == value
+            method = entry.declared
+            condition = CLASSES[name].condition
+            for key, value in entry.complete({"trials": 1}).items():
+                assert key == "trials" or getattr(condition, key) == value
             assert ("secondary objectives" in method.told) == bool(method.secondary)
             assert bool(method.secondary) == name.endswith("-nullspace")
             assert ("Jacobian" in method.told) == name.endswith("-biased")
     for foreign in ("nullspace_gain", "bias"):  # told would no longer be right
         with pytest.raises(CoarticError, match=f"{foreign}: extra inputs"):
-            build(KNOWN["dual-process/EC4"], {foreign: 0.1})
+            KNOWN["dual-process/EC4"].complete({foreign: 0.1})
 
 
 def test_own_task_errors(tmp_path):
@@ -558,7 +549,6 @@ def test_every_sequence_is_sorted_and_bounded():
     many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
     with pytest.raises(CoarticError, match="8192 hand sequences; at most 4096"):
         hand_sequences(many)
-    assert tables._sequence_rows([many]) == []
 
 
 def test_damaged_results_are_named(results, tmp_path):
@@ -573,7 +563,7 @@ def test_damaged_results_are_named(results, tmp_path):
 def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
     folder = shutil.copytree(results.folder, tmp_path / "copy")
     table = folder / f"{name}.parquet"
-    read_all(folder)
+    load_results(folder)
     for content, why in (
         (None, "is missing"),
         (b"", "is damaged"),
@@ -582,84 +572,10 @@ def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
     ):
         table.unlink() if content is None else table.write_bytes(content)
         with pytest.raises(CoarticError, match=rf"{name}\.parquet {why}.*`coartic run` again"):
-            read_all(folder)
+            load_results(folder)
     pd.DataFrame({"x": [1]}).to_parquet(table)
-    with pytest.raises(CoarticError, match=rf"{name}\.parquet is damaged \(it has no column"):
-        read_all(folder)
-
-
-def test_lost_solutions_are_noticed(results, tmp_path):
-    folder = shutil.copytree(results.folder, tmp_path / "copy")
-    whole = pd.read_parquet(folder / "solutions.parquet")
-    first = results.runs.run_id.iloc[0]
-    whole[whole.run_id != first].to_parquet(folder / "solutions.parquet")
-    with pytest.raises(CoarticError, match=f"lacks the movements of 1 runs, {first} the first"):
-        load_results(folder).solutions()
-
-
-CUTS = {
-    "runs": [
-        (lambda t: t[: len(t) // 2], "lacks 7 of 14 planned runs"),
-        (lambda t: pd.concat([t, t[:1]]), "holds 1 rows twice"),
-        (lambda t: t.assign(run_id=t.run_id.where(t.index > 0, "x-y")), "lacks 1 of 14"),
-        (lambda t: t.assign(reward=t.reward.where(t.index > 0)), "has no reward"),
-        (lambda t: t.assign(hands=t.hands.where(t.index > 0)), "has no hands"),
-        (lambda t: t.assign(reward=t.reward.astype(str)), "'reward' does not hold numbers"),
-        (lambda t: t.drop(columns="reward"), "has no column 'reward'"),
-        (lambda t: t.drop(columns="told"), "has no column 'told'"),
-    ],
-    "solutions": [
-        (lambda t: t[:-1], "do not add up to their reward"),
-        (lambda t: t.assign(hand=t.hand.where(t.index > 0)), "has no goal or no hand"),
-        (lambda t: t.assign(goal=t.goal.where(t.index > 0)), "has no goal or no hand"),
-        (lambda t: t.assign(goal=t.goal + 1.0), "are not made with the hands"),
-        (lambda t: t.drop(columns="right_2"), "has no column 'right_2'"),
-        (lambda t: t.assign(right_2=np.nan), "'right_2' lacks numbers"),
-    ],
-    "sequences": [(lambda t: t[:-1], "of the 16 hand sequences of two-armed-2")],
-    "learning": [
-        (lambda t: t[: len(t) // 2], "lacks trials of"),
-        (lambda t: t[:-1], "has 149 of 150"),
-        (lambda t: t[1:], "not in order"),
-        (lambda t: pd.concat([t[:10], t[11:]]), "not in order"),
-        (lambda t: t[::-1], "not in order"),
-        (lambda t: t[:0], "has 0 of 150"),
-    ],
-}
-
-
-def read_all(folder):
-    found = load_results(folder)
-    return found.solutions(), found.paths(), found.learning()
-
-
-@pytest.mark.parametrize(
-    ("name", "cut", "words"), [(name, *case) for name, cases in CUTS.items() for case in cases]
-)
-def test_tables_that_are_not_whole_are_named(results, tmp_path, name, cut, words):
-    """A truncated table that is still Parquet gave wrong results without a word."""
-    folder = shutil.copytree(results.folder, tmp_path / "copy")
-    path = folder / f"{name}.parquet"
-    cut(pd.read_parquet(path)).to_parquet(path)
-    with pytest.raises(CoarticError, match=rf"{name}\.parquet is damaged \(.*{words}"):
-        read_all(folder)
-
-
-def test_paths_that_are_not_whole_are_named(tmp_path):
-    cells = suite_of(tmp_path, 'tasks = ["ascending"]\nmethods = ["nullspace-qp/none"]')
-    whole = run_and_write(tmp_path / "results", cells=cells, runs=1)
-    path = whole.folder / "paths.parquet"
-    table = whole.paths()
-    assert len(table) > 4
-    for cut, words in (
-        (table[:-1], "do not lead to their targets"),
-        (table[1:], "not in order"),
-        (table[table["order"] > 0], "do not lead to their targets"),
-        (table.drop(columns="base_x"), "no column 'base_x'"),
-    ):
-        cut.to_parquet(path)
-        with pytest.raises(CoarticError, match=words):
-            load_results(whole.folder).paths()
+    with pytest.raises(CoarticError, match=rf"{name}\.parquet is damaged \(its columns are not"):
+        load_results(folder)
 
 
 @pytest.mark.parametrize(
@@ -667,18 +583,15 @@ def test_paths_that_are_not_whole_are_named(tmp_path):
     [
         ([], "not an object"),
         ({"format": 2}, "have format 2"),
-        ({"format": 3}, "no 'specification'"),
-        ({"format": 3, "specification": {}, "environment": {}}, "'suite' that is a str"),
-        (lambda found: found["methods"].pop("dual-process/EC4"), "no method 'dual-process/EC4'"),
-        (lambda found: found["tasks"].pop("ascending"), "no task 'ascending'"),
-        (lambda found: found["methods"]["dual-process/EC4"].pop("code"), "no 'code' that is a"),
+        ({"format": FORMAT}, "specification: field required"),
+        (lambda found: found["specification"]["methods"].pop("dual-process/EC4"), "its seal"),
     ],
 )
 def test_manifests_that_are_none(results, tmp_path, content, words):
     folder = shutil.copytree(results.folder, tmp_path / "copy")
     if callable(content):
         edit, content = content, json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        edit(content["specification"])
+        edit(content)
     (folder / "manifest.json").write_text(json.dumps(content))
     with pytest.raises(CoarticError, match=words):
         load_results(folder)
@@ -691,21 +604,13 @@ def test_a_first_run_that_was_interrupted(results, tmp_path):
         load_results(folder)
 
 
-def test_columns_that_are_checked_are_those_written(results):
-    assert tables.FORMAT == FORMAT
-    for name in TEXT:
-        written = pq.read_schema(results.folder / f"{name}.parquet").names
-        joints = [column for column in written if column.startswith(("base", "left", "right"))]
-        assert {*TEXT[name], *NUMBERS[name]} == set(written) - set(joints)
-
-
 def test_manifest(results):
     manifest = json.loads((results.folder / "manifest.json").read_text(encoding="utf-8"))
     specification = manifest["specification"]
     assert specification["seed"] == 0
     assert specification["tasks"]["ascending"]["provenance"]["goals"]["status"] == "printed"
     assert "goals" in specification["methods"]["dual-process/EC2"]["told"]
-    assert len(specification["run_ids"]) == 14
+    assert sum(len(cell["run_ids"]) for cell in specification["cells"]) == 14
     assert np.isfinite(manifest["format"])
 
 

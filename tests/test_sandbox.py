@@ -1,6 +1,5 @@
 """Time limits and dying workers, seen from outside the method."""
 
-import json
 import os
 import signal
 import subprocess
@@ -11,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.executors import Local
-from benchmarks.harness import perform_plan
+from benchmarks.harness import perform_plan, record_of
 from benchmarks.methods import registry
-from benchmarks.sandbox import Sandbox
+from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import Cell, run_specs
@@ -44,25 +43,32 @@ def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path):
     assert (progress.done, progress.failed) == (7, 4)
     for spec in hung:
         record = store.read(spec.run_id)
-        assert (record["status"], record["reason"]) == ("timeout", "time limit of 1 s exceeded")
-        assert 1.0 <= record["timing"]["wall_s"] < 10.0
+        assert (record.status, record.reason) == ("timeout", "time limit of 1 s exceeded")
+        assert 1.0 <= record.timing.wall_s < 10.0
     for spec in dying:
         record = store.read(spec.run_id)
-        assert record["status"] == "crashed"
-        assert record["reason"] == "the worker process ended (exit code 7): last words"
+        assert record.status == "crashed"
+        assert record.reason == "the worker process ended (exit code 7): last words"
     for spec in good:
         record = store.read(spec.run_id)
-        assert record["status"] == "ok"
-        assert record["environment"]["threads"]["OMP_NUM_THREADS"] == "1"
+        assert record.status == "ok"
+        assert record.environment.threads["OMP_NUM_THREADS"] == "1"
+
+
+@pytest.fixture(autouse=True)
+def no_sandbox_before():
+    """Sandboxes of earlier tests are not taken for those of this one."""
+    close_all()
 
 
 def test_a_killed_worker_is_a_crash_with_its_signal(known):
     sandbox = Sandbox()
-    (spec,) = spec_of(known, "test/sleeps")
-    os.kill(sandbox._process.pid, signal.SIGKILL)
-    answer = sandbox.perform(spec.job())
-    assert answer["failure"] == "crashed"
-    assert "killed by SIGKILL" in answer["reason"]
+    (worker,) = workers_of(os.getpid())
+    os.kill(worker, signal.SIGKILL)
+    answer = sandbox.ask({"question": "prepare"}, 60.0)
+    assert isinstance(answer, Failure)
+    assert answer.killed
+    assert "killed by SIGKILL" in answer.reason
     assert not sandbox.alive
 
 
@@ -110,21 +116,21 @@ def test_a_method_that_kills_its_own_process_is_data_after_some_tries(known, tmp
     (spec,) = spec_of(known, "test/segfaults")
     perform_plan([spec], store, Local(1))
     record = store.read(spec.run_id)
-    assert record["status"] == "crashed"
-    assert "killed by SIGSEGV" in record["reason"]
+    assert record.status == "crashed"
+    assert "killed by SIGSEGV" in record.reason
 
 
 def test_one_sandbox_performs_many_jobs_and_says_warm(known):
-    sandbox = Sandbox()
+    keeper = Keeper()
     try:
         records = [
-            json.loads(sandbox.perform(spec.job())["record"])
+            record_of(keeper.perform(spec.job()), spec)
             for spec in spec_of(known, "dual-process/EC1", runs=3)
         ]
     finally:
-        sandbox.close()
-    assert [record["timing"]["warm"] for record in records] == [False, True, True]
-    assert all(record["status"] == "ok" for record in records)
+        keeper.close()
+    assert [record.timing.warm for record in records] == [False, True, True]
+    assert all(record.status == "ok" for record in records)
 
 
 @pytest.mark.parametrize("moment", ["at work", 0.3, 0.7, 1.0, 1.4])

@@ -9,17 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import store as store_module
-from benchmarks.harness import perform_plan
+from benchmarks.harness import perform_plan, record_of
 from benchmarks.specification import Limits
-from benchmarks.store import KEYS, Damage, RecordError, Store, encode
+from benchmarks.store import Damage, RecordError, Store
 from benchmarks.suites import run_specs
-from coartic import CoarticError
+from coartic import CoarticError, files
 
 from .test_harness import InProcess, paper_cells
 
 ROOT = Path(__file__).parent.parent
-RECORD = {**dict.fromkeys(KEYS), "run_id": "aa-bb", "reason": "∅", "rewards": [-3, None]}
 
 
 def specs(runs=3, **options):
@@ -44,13 +42,14 @@ def perform_counting(store, planned, **options):
 
 
 def test_a_record_comes_back(tmp_path):
-    store = Store(tmp_path)
-    store.open()
-    store.write("aa-bb", encode(RECORD))
-    store.close()
-    assert store.read("aa-bb") == RECORD
-    assert store.ids() == {"aa-bb"}
-    assert [path.name for path in store.records.glob("[!.]*")] == ["aa-bb.json"]
+    store, (spec,) = Store(tmp_path), specs(runs=1)
+    answers = InProcess().perform([spec.job()])
+    record = record_of(next(answers), spec)
+    with store.locked():
+        store.write(record)
+    assert store.read(spec.run_id) == record
+    assert store.ids() == {spec.run_id}
+    assert [path.name for path in store.records.glob("[!.]*")] == [f"{spec.run_id}.json"]
 
 
 @pytest.mark.parametrize(
@@ -69,18 +68,14 @@ def test_damage_is_noticed_reported_and_redone(harm, tmp_path):
     perform_counting(store, planned)
     whole = store.read(planned[1].run_id)
     path = store.path(planned[1].run_id)
-    data = path.read_bytes()
-    if b"-3" not in data:
-        data = data.replace(b"-319", b"-3")
-    path.write_bytes(harm(data))
+    path.write_bytes(harm(path.read_bytes()))
     with pytest.raises(RecordError, match=re.escape(str(path))):
         store.read(planned[1].run_id)
     progress, performed = perform_counting(store, planned)
     assert [damage.path for damage in progress.damaged] == [path]
     assert performed == [planned[1].run_id]
     again = store.read(planned[1].run_id)
-    for key in ("score", "solution", "rewards", "details"):
-        assert again[key] == whole[key]
+    assert again.result() == whole.result()
 
 
 def test_a_record_under_a_wrong_name_is_damage(tmp_path):
@@ -111,10 +106,7 @@ def test_other_code_makes_records_stale(tmp_path):
         """Workers that have the changed code, too."""
 
         def perform(self, jobs):
-            for job in jobs:
-                (answer,) = super().perform([{**job, "code": planned[0].entry.code}])
-                record = {**json.loads(answer["record"]), "run_id": job["run_id"]}
-                yield {**answer, "run_id": job["run_id"], "record": encode(record)}
+            yield from super().perform({**job, "code": planned[0].entry.code} for job in jobs)
 
     changed = [
         dataclasses.replace(spec, entry=dataclasses.replace(spec.entry, code="c0ffee"))
@@ -136,7 +128,8 @@ def test_workers_with_other_code_are_refused(tmp_path):
     class Elsewhere:
         def perform(self, jobs):
             for job in jobs:
-                yield {"run_id": job["run_id"], "failure": "foreign", "reason": "other code"}
+                said = {"error": "other code", "foreign_code": True, "answer": None}
+                yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
 
     with pytest.raises(CoarticError, match="other code"):
         perform_plan([foreign], Store(tmp_path), Elsewhere())
@@ -186,16 +179,16 @@ def test_timeouts_are_redone_under_a_longer_limit_or_on_demand(tmp_path):
     progress = perform_plan(short, store, Slow())
     assert progress.failed == 1
     record = store.read(short[0].run_id)
-    assert (record["status"], record["meter"], record["score"]) == ("timeout", None, None)
+    assert (record.status, record.meter, record.solution) == ("timeout", None, None)
     assert perform_counting(store, short)[1] == []
     assert perform_plan(specs(runs=1, limits=Limits(2.0)), store, Slow()).done == 1
     assert len(perform_counting(store, short, retry_failed=True)[1]) == 1
-    assert store.read(short[0].run_id)["status"] == "ok"
+    assert store.read(short[0].run_id).status == "ok"
 
 
 def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
     store, planned = Store(tmp_path), specs(runs=3)
-    real = store_module.os.fsync
+    real = os.fsync
     calls = []
 
     def full(descriptor):
@@ -204,7 +197,7 @@ def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
         real(descriptor)
 
-    monkeypatch.setattr(store_module.os, "fsync", full)
+    monkeypatch.setattr(files.os, "fsync", full)
     with pytest.raises(CoarticError, match="No space left on device"):
         perform_counting(store, planned)
     monkeypatch.undo()
@@ -216,19 +209,19 @@ def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
 def test_left_over_parts_are_cleared(tmp_path):
     store = Store(tmp_path)
     store.records.mkdir()
-    (store.records / ".dead.part").write_text("half a rec")
-    store.open()
-    store.close()
-    assert list(store.records.glob("*.part")) == []
+    for folder in (tmp_path, store.records):
+        (folder / f".coartic-{'a' * 32}.part").write_text("half a rec")
+        (folder / ".mine.part").write_text("the user's")
+    with store.locked():
+        pass
+    assert sorted(path.name for path in tmp_path.rglob("*.part")) == [".mine.part"] * 2
 
 
 def test_one_suite_at_a_time(tmp_path):
     """A second writer is told so, and goes ahead once the first is done."""
     one, two = Store(tmp_path), Store(tmp_path)
-    one.open()
-    with pytest.raises(CoarticError, match="another suite is at work"):
+    with one.locked(), pytest.raises(CoarticError, match="another suite is at work"):
         perform_counting(two, specs(runs=1))
-    one.close()
     assert perform_counting(two, specs(runs=1))[0].done == 1
 
 
@@ -255,7 +248,7 @@ def test_something_else_in_place_of_a_record(tmp_path):
 def test_unwritable_folder(tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(CoarticError, match="cannot write to"):
-        Store(tmp_path / "file" / "below").open()
+        Store(tmp_path / "file" / "below").locked().__enter__()
 
 
 def test_nothing_of_a_results_folder_is_unpickled():
