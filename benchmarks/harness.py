@@ -34,6 +34,8 @@ from coartic.record import (
 from coartic.text import plain
 
 Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
+MOST_TRIALS = 1_000_000
+"""Trials whose rewards are kept of a method that is not built in."""
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
 RETRIED = frozenset({"timeout", "crashed"})
 
@@ -171,29 +173,52 @@ def record_of(answer: Answer, spec: RunSpec) -> Record:
         raise CoarticError(plain(said.error or "other code"))
     if said.answer is None:
         return _failure(spec, "crashed", said.error or "it gave no answer")
+    false = _false_claim(spec, said.answer)
+    if false is not None:
+        return _failure(spec, *false)
     try:
         record = _record(spec, said.answer, **_scores(spec, said.answer))
-    except _ClaimError as error:
-        record = _record(spec, said.answer.model_copy(update=error.update))
+    except _UnsolvedError as error:
+        unsolved = {"status": error.status, "reason": str(error)}
+        record = _record(spec, said.answer.model_copy(update=unsolved))
     problem = record.disagreement()
     if problem is not None:
         return _failure(spec, "solver-failed", f"what it states contradicts itself: {problem}")
     return record
 
 
-class _ClaimError(Exception):
-    """A run is not what its worker states."""
+class _UnsolvedError(Exception):
+    """What a run hands over as a solution is none."""
 
     def __init__(self, status: Status, reason: str) -> None:
         super().__init__(reason)
-        self.update = {"status": status, "reason": reason}
+        self.status = status
+
+
+def _false_claim(spec: RunSpec, outcome: Outcome) -> tuple[Status, str] | None:
+    """The outcome of a run that claims what its method may not; None where it does not."""
+    told = spec.entry.declared.told
+    used = {*outcome.used}
+    if any(row.kind == "corrective" and row.target is None for row in outcome.solution):
+        used.add(Information.CORRECTIVE_PROCESS)
+    undeclared = sorted(used - {*told})
+    trials = len(outcome.rewards)
+    if undeclared:
+        return "crashed", f"the method used {undeclared[0].value!r}, which it does not declare"
+    if spec.entry.foreign is not None and trials > MOST_TRIALS:
+        return "solver-failed", f"it states {trials} rewards; at most {MOST_TRIALS} are kept"
+    if outcome.bound is not None and not spec.method.startswith(SEARCH):
+        return (
+            "solver-failed",
+            f"it states a bound, which is for methods {SEARCH}* of this project",
+        )
+    return None
 
 
 def _scores(spec: RunSpec, outcome: Outcome) -> dict[str, Solved]:
-    """The scores of what an outcome hands over; _ClaimError where there is none to be had."""
+    """The scores of what an outcome hands over; _UnsolvedError where there is none to be had."""
     if outcome.status != "ok":
         return {}
-    _check_claims(spec, outcome)
     return {
         name: _solved(spec, [row.movement() for row in movements])
         for name in ("solution", "initial", "replay")
@@ -201,35 +226,15 @@ def _scores(spec: RunSpec, outcome: Outcome) -> dict[str, Solved]:
     }
 
 
-def _check_claims(spec: RunSpec, outcome: Outcome) -> None:
-    told = spec.entry.declared.told
-    undeclared = sorted(set(outcome.used) - set(told))
-    if undeclared:
-        raise _ClaimError(
-            "crashed", f"the method used {undeclared[0]!r}, which it does not declare"
-        )
-    if Information.CORRECTIVE_PROCESS not in told and any(
-        row.kind == "corrective" and row.target is None for row in outcome.solution
-    ):
-        raise _ClaimError(
-            "crashed",
-            f"the method used {Information.CORRECTIVE_PROCESS.value!r}, which it does not declare",
-        )
-    if outcome.bound is not None and not spec.method.startswith(SEARCH):
-        raise _ClaimError(
-            "solver-failed", f"it states a bound, which only methods {SEARCH}* of this project may"
-        )
-
-
 def _solved(spec: RunSpec, movements: Sequence[Movement]) -> Solved:
     """A solution's score, executed once, and once more from what would be stored."""
     try:
         found = solved(spec.task, movements, spec.model)
     except IncompleteError as error:
-        raise _ClaimError("infeasible", str(error)) from None
+        raise _UnsolvedError("infeasible", str(error)) from None
     except (CoarticError, TypeError, ValueError, OverflowError) as error:
         reason = f"the solution cannot be executed: {error}"
-        raise _ClaimError("solver-failed", reason) from None
+        raise _UnsolvedError("solver-failed", reason) from None
     again = solved(spec.task, [row.movement() for row in found.movements], spec.model)
     if again != found:
         raise AssertionError(f"run {spec.run_id}: {found.reward} re-executes to {again.reward}")

@@ -71,11 +71,11 @@ class Sandbox:
     def __init__(self) -> None:
         try:
             self._guard = subprocess.Popen(
-                [sys.executable, "-m", "benchmarks.guard", str(os.getpid())],
+                [sys.executable, "-P", "-m", "benchmarks.guard", str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                env={**os.environ, **THREADS},
+                env={**os.environ, **THREADS, "PYTHONPATH": _path()},
                 start_new_session=True,  # Ctrl-C is for the parent
             )
         except OSError as error:
@@ -318,6 +318,11 @@ def close_all() -> None:
         _idle.clear()
     for sandbox in sandboxes:
         sandbox.close()
+
+
+def _path() -> str:
+    """Where this process finds its modules, for one that must find the same."""
+    return os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
 
 
 def _signal_name(number: int) -> str:

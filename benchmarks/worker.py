@@ -77,7 +77,9 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
     foreign = None if job["foreign"] is None else Foreign(**job["foreign"])
     try:
         method_class = _method(name, foreign)
-        code = built_in_code(method_class.__module__) if foreign is None else _foreign_code(foreign)
+        code = (
+            built_in_code(method_class.__module__) if foreign is None else _foreign_code(foreign)
+        )
     except CoarticError as error:
         raise ForeignCodeError(f"method {name!r}: {error}") from None
     if code != job["code"]:

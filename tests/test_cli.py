@@ -8,9 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from benchmarks.specification import run_seed
 from benchmarks.store import Store, encode
 from coartic import __version__, cli
+from coartic.record import run_seed
 
 from .test_task import BAD, GOOD
 

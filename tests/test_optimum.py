@@ -95,7 +95,7 @@ def test_searches_find_what_is_shipped(method, parameters):
     assert session.meter.solver_iterations > 50
     if method is BranchAndBound:
         assert result.details["proven_optimal"] is True
-        assert result.details["proven_bound"] == -304
+        assert result.bound == -304
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from benchmarks.methods import build, registry
+from benchmarks.methods import registry
 from coartic import CoarticError
 
 ROOT = Path(__file__).parent.parent
@@ -88,7 +88,7 @@ def test_a_changed_file_makes_its_records_stale(tmp_path):
     )  # fmt: skip
     assert "0 were there, 1 done" in coartic(*command).stdout
     assert "1 were there, 0 done" in coartic(*command).stdout
-    method.write_text(method.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    method.write_text(method.read_text(encoding="utf-8") + "\nCHANGED = 1\n", encoding="utf-8")
     changed = coartic(*command)
     assert "0 were there, 1 done" in changed.stdout
     assert "1 records were made by other code and are not used" in changed.stderr
@@ -152,13 +152,13 @@ def test_a_method_that_cannot_say_where_it_applies(tmp_path):
             "from coartic.method import Method\nclass A(Method):\n    name = 'a b'\n"
             "    title = citation = 'x'\n    told = frozenset()\n"
             "    def solve(self, session): ...",
-            "an id is text without spaces or commas",
+            "A: name: string should match pattern",
         ),
         (
             "from coartic.method import Method\nclass A(Method):\n    name = 'dual-process/EC1'\n"
             "    title = citation = 'x'\n    told = frozenset()\n"
             "    def solve(self, session): ...",
-            "method id 'dual-process/EC1' is already taken (built in)",
+            "method id 'dual-process/EC1' is reserved",
         ),
     ],
 )
@@ -177,11 +177,11 @@ def test_method_file_that_is_not_there(tmp_path):
 
 def test_parameters_are_validated():
     entry = registry([METHOD])["nearest-hand"]
-    assert build(entry, {"reluctance": 0.5}).parameters.reluctance == 0.5
+    assert entry.complete({"reluctance": 0.5}) == {"reluctance": 0.5}
     with pytest.raises(CoarticError, match="'nearest-hand': reluctance: input should be greater"):
-        build(entry, {"reluctance": -1.0})
+        entry.complete({"reluctance": -1.0})
     with pytest.raises(CoarticError, match="Its parameters: reluctance"):
-        build(entry, {"reluctant": 1.0})
+        entry.complete({"reluctant": 1.0})
 
 
 def test_the_readme_shows_the_example_as_it_is():
