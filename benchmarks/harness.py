@@ -138,7 +138,7 @@ class Outcome(Plain):
     initial: Handed = ()
     replay: Handed = ()
     bound: Reward | None = None
-    details: Details = {}
+    details: Details = Field(default_factory=dict)
     used: tuple[Information, ...] = ()
     meter: Spent | None = None
     rewards: tuple[Reward | None, ...] = ()

@@ -26,7 +26,7 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
     """
     line = " | ".join(part.strip() for part in text.splitlines() if part.strip())
     shown = "".join(
-        c if c.isprintable() else c.encode("unicode_escape").decode() for c in line[:most]
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in line[: most + 1]
     )
     return shown if len(shown) <= most else shown[: most - 1] + "…"
 

@@ -4,19 +4,23 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
+from benchmarks import sandbox
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan, record_of
 from benchmarks.methods import registry
+from benchmarks.reproduce import perform_once
 from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import Cell, run_specs
-from coartic import load_task
+from coartic import CoarticError, load_task
 
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
@@ -175,3 +179,86 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     while marked():
         assert time.monotonic() < deadline, marked()
         time.sleep(0.05)
+
+
+def sleepers():
+    """Processes that methods have left behind."""
+    return [p for p in psutil.process_iter(["cmdline"]) if "61.7" in (p.info["cmdline"] or [])]
+
+
+def test_what_a_method_starts_ends_with_it(known, tmp_path):
+    """Also where it has left for a session of its own, and whether its run ends or is ended."""
+    store = Store(tmp_path)
+    left = spec_of(known, "test/leaver")
+    stayed = spec_of(known, "test/stayer", Limits(1.0))
+    perform_plan([*left, *stayed], store, Local(1))
+    assert [store.read(spec.run_id).status for spec in (*left, *stayed)] == ["ok", "timeout"]
+    close_all()
+    assert sleepers() == []
+
+
+def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known, tmp_path):
+    store = Store(tmp_path)
+    names = ("test/leaver", "test/good", "dual-process/EC1", "test/leaver")
+    keeper = Keeper()
+    workers = []
+    try:
+        for name in names:
+            (spec,) = spec_of(known, name)
+            record = record_of(keeper.perform(spec.job()), spec)
+            assert record.status == "ok"
+            workers += [workers_of(os.getpid())[-1:], record.details.get("pid")]
+    finally:
+        keeper.close()
+    assert len({tuple(w) for w in workers[::2]}) == 4, store  # none is used for another method
+
+
+def test_the_clock_stops_where_the_run_is_stopped(known):
+    (spec,) = spec_of(known, "test/naps", Limits(1.0))
+    keeper = Keeper()
+    stop = threading.Timer(0.3, lambda: [os.kill(p, signal.SIGSTOP) for p in workers_of(own)])
+    go_on = threading.Timer(2.0, lambda: [os.kill(p, signal.SIGCONT) for p in workers_of(own)])
+    own = os.getpid()
+    try:
+        (warm,) = spec_of(known, "test/good")
+        keeper.perform({**warm.job(), "owner": spec.job()["owner"]})
+        stop.start()
+        go_on.start()
+        record = record_of(keeper.perform(spec.job()), spec)
+    finally:
+        keeper.close()
+    assert record.status == "ok"
+    assert record.timing.wall_s > 1.5
+
+
+def test_what_is_kept_of_a_run_is_bounded(known, monkeypatch):
+    (spec,) = spec_of(known, "test/chatterbox")
+    record = perform_once(spec)
+    assert record.status == "crashed"
+    assert "exit code 3" in record.reason
+    assert len(record.reason) < 1100
+    assert "\x1b" not in record.reason
+    (spec,) = spec_of(known, "test/hoarder")
+    assert "at most 65536 are kept" in perform_once(spec).reason
+    monkeypatch.setattr(sandbox, "LARGEST_ANSWER", 1 << 20)
+    assert "it answered with more than 1 MiB" in perform_once(spec).reason
+
+
+def test_a_score_is_what_the_solution_gives_elsewhere(known):
+    """Whatever the method does to its own process."""
+    (honest,) = spec_of(known, "test/good")
+    (cheat,) = spec_of(known, "test/stepper")
+    assert perform_once(cheat).solution == perform_once(honest).solution
+    (prover,) = spec_of(known, "test/prover")
+    assert "states a bound, which is for methods optimum/*" in perform_once(prover).reason
+
+
+def test_a_worker_that_cannot_start_is_a_sentence(known, monkeypatch):
+    monkeypatch.setattr(sandbox.sys, "executable", "/bin/false")
+    (spec,) = spec_of(known, "dual-process/EC1")
+    close_all()
+    with pytest.raises(CoarticError, match=r"a worker process did not start: .*\(exit code 1\)"):
+        perform_once(spec)
+    monkeypatch.setattr(sandbox.sys, "executable", "/no/such/python")
+    with pytest.raises(CoarticError, match="did not start: No such file or directory"):
+        list(Local(1).perform([spec.job()]))

@@ -230,3 +230,81 @@ class SegFaults(Good):
 
         os.kill(os.getpid(), signal.SIGSEGV)
         return Result(())
+
+
+class Naps(Good):
+    """Takes a while, in which it can be stopped from outside."""
+
+    name = "test/naps"
+
+    def solve(self, session):
+        time.sleep(0.5)
+        return Result(by_correction(session))
+
+
+class Leaver(Good):
+    """Leaves a process of a session of its own behind."""
+
+    name = "test/leaver"
+
+    def solve(self, session):
+        import os
+
+        if not os.fork():
+            os.setsid()
+            if not os.fork():
+                os.execvp("sleep", ["sleep", "61.7"])
+            os._exit(0)
+        return Result(by_correction(session), {"pid": os.getpid()})
+
+
+class Stayer(Leaver):
+    """Does so, and never returns."""
+
+    name = "test/stayer"
+
+    def solve(self, session):
+        super().solve(session)
+        time.sleep(3600)
+        return Result(())
+
+
+class Chatterbox(Good):
+    """Prints a lot, hands over too much, and then dies."""
+
+    name = "test/chatterbox"
+
+    def solve(self, session):
+        import os
+
+        for _ in range(2000):
+            os.write(2, b"\x1b[31m" + b"noise " * 1000 + b"\n")
+        os._exit(3)
+
+
+class Hoarder(Good):
+    name = "test/hoarder"
+
+    def solve(self, session):
+        return Result(by_correction(session), {"all": "x" * 3_000_000})
+
+
+class Stepper(Good):
+    """Takes giant steps, and says so nowhere."""
+
+    name = "test/stepper"
+
+    def solve(self, session):
+        import benchmarks.harness
+        import coartic.record
+
+        session.model = session.model._replace(step=1.0)
+        benchmarks.harness.solved = coartic.record.solved = None
+        return Result(by_correction(session))
+
+
+class Prover(Good):
+    name = "test/prover"
+
+    def solve(self, session):
+        return Result(by_correction(session), bound=-1)
