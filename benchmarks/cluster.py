@@ -141,8 +141,8 @@ class Dask:
                 raise TypeError("the answer is not that of the run")
         except KilledWorker:
             answer = crashed(run_id, "every worker that tried this run died")
-        except CancelledError as problem:
-            answer = self.lost(problem)
+        except CancelledError:  # by Dask itself, when it loses the scheduler
+            answer = self.lost(ConnectionError("the connection was closed"))
         except (CoarticError, SandboxError) as problem:
             answer = CoarticError(str(problem))
         except Exception as problem:
