@@ -1,4 +1,4 @@
-"""Where runs are performed: on this machine, or on a Dask cluster.
+"""Where runs are performed: on this machine, or on a Dask cluster (``benchmarks.cluster``).
 
 An executor takes jobs and yields their answers in any order. It may lose some (a
 worker dies, the pool breaks): the harness asks again for what is missing.
@@ -12,7 +12,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-from benchmarks.sandbox import Keeper, SandboxError, failure, keeper, supervise
+from benchmarks.sandbox import Keeper, SandboxError, keeper
 from coartic import CoarticError
 
 Job = dict[str, Any]
@@ -74,54 +74,3 @@ class Local:
             if answered < len(jobs):
                 for own in keepers:
                     own.dismiss()
-
-
-class Dask:
-    """A Dask scheduler, which has the project installed on its workers."""
-
-    def __init__(self, address: str, *, timeout_s: float = 30.0) -> None:
-        self.address = address
-        self.timeout_s = timeout_s
-
-    def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
-        """Answers as they come. Runs of a worker that dies are performed by another."""
-        from distributed import Client, as_completed
-        from distributed.scheduler import KilledWorker
-
-        try:
-            client = Client(self.address, timeout=self.timeout_s)  # type: ignore[no-untyped-call]
-        except (OSError, TimeoutError, ValueError) as problem:
-            raise CoarticError(f"no Dask scheduler at {self.address}: {problem}") from None
-        with client, contextlib.ExitStack() as cleanup:
-            futures = {
-                client.submit(supervise, job, pure=False, retries=2): job["run_id"] for job in jobs
-            }
-            cleanup.callback(client.cancel, list(futures))
-            cleanup.enter_context(_lost_scheduler(self.address))
-            for future in as_completed(list(futures)):  # type: ignore[no-untyped-call]
-                error = future.exception()
-                if isinstance(error, KilledWorker):
-                    reason = "every worker that tried this run died"
-                    yield failure(futures[future], "crashed", reason, 0.0)
-                elif isinstance(error, SandboxError):
-                    raise CoarticError(str(error))
-                elif error is not None:
-                    raise error
-                else:
-                    yield future.result()
-
-
-@contextlib.contextmanager
-def _lost_scheduler(address: str) -> Iterator[None]:
-    """One sentence for all the ways in which a scheduler that goes away shows."""
-    from concurrent.futures import CancelledError
-
-    from distributed.comm.core import CommClosedError
-
-    try:
-        yield
-    except (CancelledError, CommClosedError, OSError) as error:
-        raise CoarticError(
-            f"lost the Dask scheduler at {address} ({type(error).__name__}); what is done is "
-            "kept, and the same command goes on from there"
-        ) from None

@@ -136,7 +136,8 @@ def run(
         int | None, typer.Option(min=1, help="Most physical trials a run may make.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler, tcp://host:port, instead of this machine.")
+        str | None,
+        typer.Option(help="Dask scheduler, tcp:// or tls://host:port, instead of this machine."),
     ] = None,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Perform timeouts and crashes again.")
@@ -152,7 +153,8 @@ def run(
     from analysis.comparison import compare, plain
     from analysis.methods import methods_frame
     from analysis.results import load_results
-    from benchmarks.executors import Dask, Local
+    from benchmarks.cluster import Dask
+    from benchmarks.executors import Local
     from benchmarks.harness import perform_plan
     from benchmarks.methods import registry
     from benchmarks.specification import Limits
@@ -186,7 +188,7 @@ def run(
             progress = perform_plan(
                 [spec for _, spec in planned],
                 store,
-                Dask(scheduler) if scheduler else Local(jobs),
+                Local(jobs) if scheduler is None else Dask(scheduler, say=display.line),
                 retry_failed=retry_failed,
                 redo=redo,
                 watch=display.update,
@@ -648,13 +650,13 @@ class _Display:
         self.done = progress.done
         if spec is None:
             for damage in progress.damaged:
-                self._line(f"{damage.reason}; this run is performed again")
+                self.line(f"{damage.reason}; this run is performed again")
             if progress.stale:
-                self._line(
+                self.line(
                     f"{len(progress.stale)} records were made by other code and are not used"
                 )
             if progress.present:
-                self._line(f"{progress.present} of {progress.total} runs are already there")
+                self.line(f"{progress.present} of {progress.total} runs are already there")
         if self._console.is_terminal:
             self._live(progress, spec)
         else:
@@ -684,16 +686,17 @@ class _Display:
             return
         self._last = now
         if finished:
-            self._line(f"{progress.total} of {progress.total} runs, {progress.failed} failed")
+            self.line(f"{progress.total} of {progress.total} runs, {progress.failed} failed")
             return
         left = progress.total - progress.present - progress.done
         seconds = (now - self._started) / (progress.done - 1) * left
-        self._line(
+        self.line(
             f"{progress.present + progress.done} of {progress.total} runs, "
             f"{progress.failed} failed, about {seconds:.0f} s left"
         )
 
-    def _line(self, text: str) -> None:
+    def line(self, text: str) -> None:
+        """Show a line above the progress."""
         self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
