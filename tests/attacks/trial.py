@@ -1,0 +1,220 @@
+"""A hostile method let loose on a checkout, and what came of it."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import traceback
+import unicodedata
+from pathlib import Path
+
+import pandas as pd
+
+from coartic import execute, load_task
+from coartic.frames import movements_from
+
+from .checkout import left_behind, read_json, run, size_of
+from .methods import Attack
+
+TASK = "ascending"
+BUILT_IN = ("dual-process/EC1", "corrective-alone/given", "random-search/climbing")
+LIMIT_S = 90.0  # of a whole suite
+RUN_LIMIT_S = 4.0
+LARGEST_FOLDER = 20_000_000
+LONGEST_REASON = 2000
+_SUITE = """
+title = "Small"
+description = "Built-in methods beside another one."
+runs = 2
+trials = 30
+"""
+_CELLS = """
+[[cells]]
+tasks = ["%s"]
+methods = [%s]
+"""
+_RESULTS = ["task", "method", "run", "seed", "status", "reason", "hands", "reward", "trials"]
+_RESULTS += ["replay_reward", "initial_reward", "best_trial", "movement_ticks", "parameters"]
+
+
+def _cells(*methods: str) -> str:
+    return _CELLS % (TASK, ", ".join(f'"{name}"' for name in methods))
+
+
+def clean_run(root: Path, folder: Path) -> Path:
+    """A results folder of the built-in methods alone. Raises RuntimeError where that fails."""
+    folder.mkdir(parents=True)
+    (folder / "clean.toml").write_text(_SUITE + _cells(*BUILT_IN))
+    ended = run(root, ["run", "clean.toml", "--out", "out", "--jobs", "1"], folder, limit=300)
+    if ended.code != 0:
+        raise RuntimeError(f"the suite does not even run by itself: {ended.text[-2000:]}")
+    return folder / "out"
+
+
+def hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
+    """Run a suite with the attack in it; what did not hold, each as a short sentence."""
+    folder.mkdir(parents=True)
+    try:
+        return _hold(attack, root, clean, folder)
+    except Exception:
+        return [f"cannot be judged: {traceback.format_exc(limit=-2)[-400:]!r}"]
+    finally:
+        left_behind(0.0)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
+    parts = [_cells(attack.method.replace("\\", "\\\\")), _cells(*BUILT_IN)]
+    (folder / "suite.toml").write_text(
+        _SUITE + "".join(reversed(parts) if attack.after_others else parts)
+    )
+    command = ["run", "suite.toml", "--out", "out", "--jobs", "1"]
+    command += ["--time-limit", f"{RUN_LIMIT_S:g}"]
+    paths = []
+    if attack.installed:
+        paths = [_install(attack, folder / "plugins")]
+    else:
+        (folder / "hostile.py").write_text(attack.source, encoding="utf-8")
+        command += ["--method-file", "hostile.py"]
+    ended = run(root, command, folder, limit=LIMIT_S, paths=paths)
+    remained = left_behind()
+    found = []
+    if remained:
+        found.append(f"left {len(remained)} processes: {remained[0]}")
+    if ended.code is None:
+        found.append("never ended")
+    if "Traceback" in ended.text:
+        found.append(f"a traceback: {ended.last_line}")
+    if any(_hidden(c) for c in ended.text):
+        found.append("control characters on the terminal")
+    allowed = {
+        "recorded": (0, 1),
+        "refused": (2,),
+        "either": (0, 1, 2),
+        "seen": (0, 1, 2),
+        "ended": (0, 1, 2, 130, -2, -9, -15),
+    }[attack.expects]
+    if ended.code is not None and ended.code not in allowed:
+        found.append(f"exit code {ended.code} where it should be {attack.expects}")
+    if ended.code == 2 and not ended.refused:
+        found.append("exit code 2 without a sentence")
+    size = size_of(folder / "out") + size_of(folder / "tmp")
+    size += sum(path.stat().st_size for path in folder.glob("said-*.txt"))
+    if size > LARGEST_FOLDER and attack.id != "exhaust/disk":
+        found.append(f"left {size / 1e6:.0f} MB")
+
+    out = folder / "out"
+    if attack.expects == "ended" and ended.code not in (0, 1):
+        (folder / "again.toml").write_text(_SUITE + _cells(*BUILT_IN))
+        again = run(root, ["run", "again.toml", *command[2:6]], folder, limit=LIMIT_S)
+        if again.code != 0:
+            found.append(f"the suite does not go on: {again.last_line}")
+    if not (out / "manifest.json").exists():
+        if ended.code in (0, 1):
+            found.append("no tables")
+        return found
+    read = run(root, ["compare", str(clean), "out"], folder, limit=60)
+    if read.code != 0:
+        if not (attack.expects == "seen" and read.refused and read.names):
+            found.append(f"the folder is not read: {read.last_line}")
+        return found
+    return found + _forged(attack, clean, out)
+
+
+def _install(attack: Attack, site: Path) -> Path:
+    """The attack as a package with an entry point, in a folder for the Python path."""
+    about = site / "hostile_plugin-1.0.dist-info"
+    about.mkdir(parents=True)
+    (site / "hostile_plugin.py").write_text(attack.source)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: hostile-plugin\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[coartic.methods]\nhostile = hostile_plugin:Hostile\n"
+    )
+    return site
+
+
+def _forged(attack: Attack, clean: Path, out: Path) -> list[str]:
+    """What the tables say and should not."""
+    found = []
+    runs, due = (pd.read_parquet(folder / "runs.parquet") for folder in (out, clean))
+    built_in = runs.method.isin(BUILT_IN)
+    theirs, ours = runs[~built_in], runs[built_in]
+    if not _same(ours[_RESULTS], due[_RESULTS]):
+        found.append("the results of other methods differ")
+    else:
+        ids = dict(zip(ours.run_id, due.run_id, strict=True))
+        for name in ("solutions", "learning"):
+            table, clean_table = (
+                pd.read_parquet(folder / f"{name}.parquet") for folder in (out, clean)
+            )
+            table = table[table.run_id.isin(ids)]
+            table = table.assign(run_id=table.run_id.astype(str).map(ids))
+            if not _same(table, clean_table.assign(run_id=clean_table.run_id.astype(str))):
+                found.append(f"the {name} of other methods differ")
+    manifest = read_json(out / "manifest.json")["specification"]
+    if manifest["tasks"] != read_json(clean / "manifest.json")["specification"]["tasks"]:
+        found.append("the task is another one")
+    if attack.expects == "recorded" and theirs.empty:
+        found.append("it is not in the tables")
+    reserved = theirs.method.str.startswith(("optimum/", "dual-process/"))
+    if reserved.any():
+        found.append(f"it is called {theirs.method[reserved].iloc[0]}")
+    if (theirs.proven_bound.notna() & (theirs.status == "ok")).any():
+        found.append(f"its word is a proven bound: {theirs.proven_bound.dropna().iloc[0]}")
+    if (theirs.reason.str.len() > LONGEST_REASON).any():
+        found.append(f"a reason of {theirs.reason.str.len().max()} characters")
+    texts = [str(value) for name in theirs for value in theirs[name]]
+    texts += [str(manifest["methods"]), (out / "comparison.md").read_text()]
+    if any(_hidden(c) for text in texts for c in text[:100_000]):
+        found.append("control characters in what is kept")
+    return found + _scores(theirs, out)
+
+
+def _scores(runs: pd.DataFrame, out: Path) -> list[str]:
+    """Whether stored solutions, executed here, give what the tables say of them."""
+    solutions, paths = (
+        pd.read_parquet(out / f"{name}.parquet") for name in ("solutions", "paths")
+    )
+    task = load_task(TASK)
+    for row in runs[runs.status == "ok"].itertuples():
+        rows, waypoints = (table[table.run_id == row.run_id] for table in (solutions, paths))
+        try:
+            made = execute(task, movements_from(task, rows, waypoints))
+        except Exception as error:
+            return [f"its solution of {row.reward} cannot be executed: {error}"]
+        ticks = [movement.ticks for movement in made.movements]
+        if (made.reward, made.hands) != (row.reward, row.hands):
+            return [f"it scored {row.reward} {row.hands}, worth {made.reward} {made.hands}"]
+        if ticks != rows.sort_values("order").ticks.tolist():
+            return ["its movements took other times than stored"]
+    return []
+
+
+def _same(a: pd.DataFrame, b: pd.DataFrame) -> bool:
+    """Whether two tables hold the same, whatever the numbers of their rows."""
+    return a.reset_index(drop=True).equals(b.reset_index(drop=True))
+
+
+def _hidden(c: str) -> bool:
+    return c not in "\n\t" and unicodedata.category(c) in ("Cc", "Cf", "Cs")
+
+
+def main() -> None:
+    """One attack by name, for a closer look: its findings and where its folder is."""
+    from tempfile import mkdtemp
+
+    from .checkout import adopt_orphans
+    from .methods import ATTACKS
+
+    adopt_orphans()
+    root = Path(sys.argv[1]).resolve()
+    base = Path(mkdtemp(prefix="coartic-attacks-"))
+    clean = clean_run(root, base / "clean")
+    for name in sys.argv[2:]:
+        folder = base / name.replace("/", "-")
+        folder.mkdir()
+        print(name, _hold(ATTACKS[name], root, clean, folder), folder)
+
+
+if __name__ == "__main__":
+    main()
