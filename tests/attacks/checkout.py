@@ -107,6 +107,9 @@ def run(
         return Ended(code, (head + file.read()).decode(errors="replace"))
 
 
+_ours: set[int] = set()  # processes that are to live on
+
+
 class Driver:
     """One process of a checkout that runs many commands, each as if it were alone."""
 
@@ -120,6 +123,7 @@ class Driver:
             text=True,
             env={**os.environ, "PYTHONPATH": str(root)},
         )
+        _ours.add(self._process.pid)
 
     def run(self, *arguments: str | Path) -> Ended:
         """One command."""
@@ -133,6 +137,7 @@ class Driver:
 
     def close(self) -> None:
         """End the process."""
+        _ours.discard(self._process.pid)
         self._process.kill()
         self._process.wait()
 
@@ -144,15 +149,12 @@ def adopt_orphans() -> None:
 
 
 def descendants() -> list[int]:
-    """Process ids of all that run below this process; the dead among them are buried."""
-    with contextlib.suppress(ChildProcessError):
-        while os.waitpid(-1, os.WNOHANG)[0]:
-            pass
+    """Process ids of all that run below this process, but for drivers."""
     parents: dict[int, int] = {}
     for entry in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError, ValueError):
             state, parent = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
-            if state != "Z":
+            if state != "Z" and int(entry.name) not in _ours:
                 parents[int(entry.name)] = int(parent)
     found: list[int] = []
     below = {os.getpid()}

@@ -449,23 +449,25 @@ def finished(root: Path, folder: Path) -> Path:
 Command = Callable[..., Ended]
 
 
-def accepted(command: Command, whole: Path, edited: Path, edit_id: str) -> list[str]:
-    """Commands that do not refuse an edited folder with a sentence that names what is wrong."""
-    found = []
+def accepted(command: Command, whole: Path, edited: Path, name: str) -> list[str]:
+    """The first command that does not refuse an edited folder and name what is wrong with it.
+
+    Empty where every command that reads it does.
+    """
     asked: list[tuple[str | Path, ...]] = [
         ("compare", whole, edited),
         ("cite", edited),
         ("analyse", edited),
     ]
-    if edit_id.startswith("records/"):
+    if name.startswith("records/"):
         asked.append(("show", records_of(whole)[0].stem, "--in", edited))
     for words in asked:
         ended = command(*words)
         if not ended.refused:
-            found.append(f"{words[0]} ends with {ended.code}, {ended.last_line!r}")
-        elif not ended.names and words[0] != "show":
-            found.append(f"{words[0]} does not say what is wrong: {ended.last_line!r}")
-    return found
+            return [f"{words[0]} ends with {ended.code}, {ended.last_line!r}"]
+        if not ended.names and words[0] != "show":
+            return [f"{words[0]} does not say what is wrong: {ended.last_line!r}"]
+    return []
 
 
 def outcomes(root: Path, folder: Path, chosen: str) -> Iterator[tuple[str, list[str] | str]]:

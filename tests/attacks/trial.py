@@ -6,6 +6,7 @@ import shutil
 import sys
 import traceback
 import unicodedata
+from functools import cache
 from pathlib import Path
 
 import pandas as pd
@@ -13,7 +14,7 @@ import pandas as pd
 from coartic import execute, load_task
 from coartic.frames import movements_from
 
-from .checkout import left_behind, read_json, run, size_of
+from .checkout import Driver, left_behind, read_json, run, size_of
 from .methods import Attack
 
 TASK = "ascending"
@@ -34,7 +35,14 @@ tasks = ["%s"]
 methods = [%s]
 """
 _RESULTS = ["task", "method", "run", "seed", "status", "reason", "hands", "reward", "trials"]
-_RESULTS += ["replay_reward", "initial_reward", "best_trial", "movement_ticks", "parameters"]
+_RESULTS += [
+    "replay_reward",
+    "initial_reward",
+    "best_trial",
+    "movement_ticks",
+    "parameters",
+    "run_id",
+]
 
 
 def _cells(*methods: str) -> str:
@@ -49,6 +57,11 @@ def clean_run(root: Path, folder: Path) -> Path:
     if ended.code != 0:
         raise RuntimeError(f"the suite does not even run by itself: {ended.text[-2000:]}")
     return folder / "out"
+
+
+@cache
+def _driver(root: Path) -> Driver:
+    return Driver(root, Path.cwd())
 
 
 def hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
@@ -113,7 +126,7 @@ def _hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
         if ended.code in (0, 1):
             found.append("no tables")
         return found
-    read = run(root, ["compare", str(clean), "out"], folder, limit=60)
+    read = _driver(root).run("compare", clean, out)
     if read.code != 0:
         if not (attack.expects == "seen" and read.refused and read.names):
             found.append(f"the folder is not read: {read.last_line}")
@@ -136,20 +149,16 @@ def _install(attack: Attack, site: Path) -> Path:
 def _forged(attack: Attack, clean: Path, out: Path) -> list[str]:
     """What the tables say and should not."""
     found = []
-    runs, due = (pd.read_parquet(folder / "runs.parquet") for folder in (out, clean))
+    runs, due = (_table(folder, "runs") for folder in (out, clean))
     built_in = runs.method.isin(BUILT_IN)
     theirs, ours = runs[~built_in], runs[built_in]
     if not _same(ours[_RESULTS], due[_RESULTS]):
         found.append("the results of other methods differ")
     else:
-        ids = dict(zip(ours.run_id, due.run_id, strict=True))
         for name in ("solutions", "learning"):
-            table, clean_table = (
-                pd.read_parquet(folder / f"{name}.parquet") for folder in (out, clean)
-            )
-            table = table[table.run_id.isin(ids)]
-            table = table.assign(run_id=table.run_id.astype(str).map(ids))
-            if not _same(table, clean_table.assign(run_id=clean_table.run_id.astype(str))):
+            table, clean_table = (_table(folder, name) for folder in (out, clean))
+            table = table[table.run_id.isin(ours.run_id)]
+            if not _same(table, clean_table):
                 found.append(f"the {name} of other methods differ")
     manifest = read_json(out / "manifest.json")["specification"]
     if manifest["tasks"] != read_json(clean / "manifest.json")["specification"]["tasks"]:
@@ -188,6 +197,11 @@ def _scores(runs: pd.DataFrame, out: Path) -> list[str]:
         if ticks != rows.sort_values("order").ticks.tolist():
             return ["its movements took other times than stored"]
     return []
+
+
+def _table(folder: Path, name: str) -> pd.DataFrame:
+    table = pd.read_parquet(folder / f"{name}.parquet", dtype_backend="numpy_nullable")
+    return table.astype({"run_id": "string"})
 
 
 def _same(a: pd.DataFrame, b: pd.DataFrame) -> bool:
