@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import inspect
 import json
 import os
 import re
@@ -21,23 +22,6 @@ PART_OF_A_FOLDER = re.compile(
     r"|methods\.csv|[0-9a-f]{16}-[0-9a-f]{12}"
 )
 """A file or a run that a refusal names."""
-_DRIVER = """
-import contextlib, io, json, sys, traceback
-from coartic.cli import main
-for line in sys.stdin:
-    said = io.StringIO()
-    sys.argv = ["coartic", *json.loads(line)]
-    code = 0
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-        try:
-            main()
-        except SystemExit as end:
-            code = 0 if end.code is None else end.code if isinstance(end.code, int) else 1
-        except BaseException:
-            code = 1
-            said.write(traceback.format_exc())
-    print(json.dumps([code, said.getvalue()]), flush=True)
-"""
 
 
 @dataclass(frozen=True)
@@ -107,6 +91,41 @@ def run(
         return Ended(code, (head + file.read()).decode(errors="replace"))
 
 
+def in_process(arguments: Sequence[str]) -> tuple[int, str]:
+    """Run a command in this process: its exit code, and what it said."""
+    import contextlib
+    import io
+    import sys
+    import traceback
+    import warnings
+    from unittest.mock import patch
+
+    from coartic.cli import main
+
+    said, code = io.StringIO(), 0
+    with (
+        patch.object(sys, "argv", ["coartic", *map(str, arguments)]),
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(said),
+        warnings.catch_warnings(),  # main has its own way of showing them
+    ):
+        try:
+            main()
+        except SystemExit as end:
+            code = 0 if end.code is None else end.code if isinstance(end.code, int) else 1
+        except BaseException:
+            code = 1
+            said.write(traceback.format_exc())
+    return code, said.getvalue()
+
+
+_DRIVER = f"""
+from __future__ import annotations
+{inspect.getsource(in_process)}
+import json, sys
+for line in sys.stdin:
+    print(json.dumps(in_process(json.loads(line))), flush=True)
+"""
 _ours: set[int] = set()  # processes that are to live on
 
 

@@ -33,7 +33,6 @@ from coartic.method import Information, Method, MethodError, Parameters, Result,
 from coartic.model import PAPER
 from coartic.solution import Execution, Movement
 
-MARK = os.environ.get("COARTIC_TEST_MARK", "none")
 FAR = PAPER._replace(step=1.0)
 
 
@@ -93,7 +92,7 @@ def suite_process():
 def sleeper(**options):
     """A process that ends by itself in a minute."""
     return subprocess.Popen(
-        [sys.executable, "-c", "import time; time.sleep(60)", MARK],
+        [sys.executable, "-c", "import time; time.sleep(60)", "hostile"],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options
     )
 
@@ -946,7 +945,7 @@ attack(
     "has something to do when the command ends",
     before="""
     def last():
-        os.write(2, b"Traceback of nobody\\n")
+        (results_folder() / "runs.parquet").write_bytes(b"forged")
         os._exit(0)
     atexit.register(last)
     """,
@@ -1053,11 +1052,9 @@ attack(
     "title/escape",
     "puts escape sequences, lines and HTML into its title",
     declares='title = "\\x1b]0;owned\\x07 a\\nb <script>alert(1)</script>"',
-    expects="refused",
+    expects="either",
 )
-attack(
-    "title/long", "has a title of a megabyte", declares='title = "t" * 2**20', expects="refused"
-)
+attack("title/long", "has a title of a megabyte", declares='title = "t" * 2**20', expects="either")
 attack("title/none", "has no title", declares="title = None", expects="refused")
 attack("citation/bytes", "has bytes for a citation", declares='citation = b"x"', expects="refused")
 attack("told/text", "says in a word what it is told", declares='told = "goals"', expects="refused")

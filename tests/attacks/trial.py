@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 import traceback
 import unicodedata
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,15 +17,23 @@ import pandas as pd
 from coartic import execute, load_task
 from coartic.frames import movements_from
 
-from .checkout import Driver, left_behind, read_json, run, size_of
-from .methods import Attack
+from .checkout import Driver, Ended, adopt_orphans, left_behind, read_json, run, size_of
+from .methods import ATTACKS, Attack, Expectation
 
 TASK = "ascending"
 BUILT_IN = ("dual-process/EC1", "corrective-alone/given", "random-search/climbing")
 LIMIT_S = 90.0  # of a whole suite
 RUN_LIMIT_S = 4.0
 LARGEST_FOLDER = 20_000_000
-LONGEST_REASON = 2000
+LONGEST_TEXT = 2000
+CODES: dict[Expectation, tuple[int, ...]] = {
+    "recorded": (0, 1),
+    "refused": (2,),
+    "either": (0, 1, 2),
+    "seen": (0, 1, 2),
+    "ended": (0, 1, 2, 130, -2, -9, -15),
+}
+"""Exit codes of the command, by what is expected."""
 _SUITE = """
 title = "Small"
 description = "Built-in methods beside another one."
@@ -68,7 +79,7 @@ def hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
     """Run a suite with the attack in it; what did not hold, each as a short sentence."""
     folder.mkdir(parents=True)
     try:
-        return _hold(attack, root, clean, folder)
+        return let_loose([attack], root, clean, folder)
     except Exception:
         return [f"cannot be judged: {traceback.format_exc(limit=-2)[-400:]!r}"]
     finally:
@@ -76,46 +87,28 @@ def hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
-    parts = [_cells(attack.method.replace("\\", "\\\\")), _cells(*BUILT_IN)]
+def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) -> list[str]:
+    """As :func:`hold`, in a folder that is there and stays; several attacks share a suite.
+
+    Several have to have the same expectation.
+    """
+    attack = attacks[0]
+    hostile = [_named(a) for a in attacks] if len(attacks) > 1 else [attack]
+    parts = [_cells(*(a.method for a in hostile)), _cells(*BUILT_IN)]
     (folder / "suite.toml").write_text(
         _SUITE + "".join(reversed(parts) if attack.after_others else parts)
     )
     command = ["run", "suite.toml", "--out", "out", "--jobs", "1"]
     command += ["--time-limit", f"{RUN_LIMIT_S:g}"]
     paths = []
-    if attack.installed:
-        paths = [_install(attack, folder / "plugins")]
-    else:
-        (folder / "hostile.py").write_text(attack.source, encoding="utf-8")
-        command += ["--method-file", "hostile.py"]
+    for number, one in enumerate(hostile):
+        if one.installed:
+            paths.append(_install(one, folder / "plugins"))
+        else:
+            (folder / f"hostile{number}.py").write_text(one.source, encoding="utf-8")
+            command += ["--method-file", f"hostile{number}.py"]
     ended = run(root, command, folder, limit=LIMIT_S, paths=paths)
-    remained = left_behind()
-    found = []
-    if remained:
-        found.append(f"left {len(remained)} processes: {remained[0]}")
-    if ended.code is None:
-        found.append("never ended")
-    if "Traceback" in ended.text:
-        found.append(f"a traceback: {ended.last_line}")
-    if any(_hidden(c) for c in ended.text):
-        found.append("control characters on the terminal")
-    allowed = {
-        "recorded": (0, 1),
-        "refused": (2,),
-        "either": (0, 1, 2),
-        "seen": (0, 1, 2),
-        "ended": (0, 1, 2, 130, -2, -9, -15),
-    }[attack.expects]
-    if ended.code is not None and ended.code not in allowed:
-        found.append(f"exit code {ended.code} where it should be {attack.expects}")
-    if ended.code == 2 and not ended.refused:
-        found.append("exit code 2 without a sentence")
-    size = size_of(folder / "out") + size_of(folder / "tmp")
-    size += sum(path.stat().st_size for path in folder.glob("said-*.txt"))
-    if size > LARGEST_FOLDER and attack.id != "exhaust/disk":
-        found.append(f"left {size / 1e6:.0f} MB")
-
+    found = _manners(attack, ended, folder)
     out = folder / "out"
     if attack.expects == "ended" and ended.code not in (0, 1):
         (folder / "again.toml").write_text(_SUITE + _cells(*BUILT_IN))
@@ -123,15 +116,43 @@ def _hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
         if again.code != 0:
             found.append(f"the suite does not go on: {again.last_line}")
     if not (out / "manifest.json").exists():
-        if ended.code in (0, 1):
-            found.append("no tables")
-        return found
+        return found + ["no tables"] * (ended.code in (0, 1))
     read = _driver(root).run("compare", clean, out)
     if read.code != 0:
         if not (attack.expects == "seen" and read.refused and read.names):
             found.append(f"the folder is not read: {read.last_line}")
         return found
-    return found + _forged(attack, clean, out)
+    return found + _forged(hostile, clean, out)
+
+
+def _named(attack: Attack) -> Attack:
+    """The same under a name of its own."""
+    name = f"hostile/{attack.id.replace('/', '-')}"
+    source = attack.source.replace('    name = "hostile"\n', f'    name = "{name}"\n', 1)
+    return replace(attack, method=name, source=source)
+
+
+def _manners(attack: Attack, ended: Ended, folder: Path) -> list[str]:
+    """How the command ended, what it said, and what is left behind."""
+    found = []
+    remained = left_behind()
+    if remained:
+        found.append(f"left {len(remained)} processes: {remained[0]}")
+    if ended.code is None:
+        found.append("never ended")
+    elif ended.code not in CODES[attack.expects]:
+        found.append(f"exit code {ended.code} where it should be {attack.expects}")
+    if "Traceback" in ended.text:
+        found.append(f"a traceback: {ended.last_line}")
+    if any(_hidden(c) for c in ended.text):
+        found.append("control characters on the terminal")
+    if ended.code == 2 and not ended.refused:
+        found.append("exit code 2 without a sentence")
+    size = size_of(folder / "out") + size_of(folder / "tmp")
+    size += sum(path.stat().st_size for path in folder.glob("said-*.txt"))
+    if size > LARGEST_FOLDER and attack.id != "exhaust/disk":
+        found.append(f"left {size / 1e6:.0f} MB")
+    return found
 
 
 def _install(attack: Attack, site: Path) -> Path:
@@ -146,7 +167,7 @@ def _install(attack: Attack, site: Path) -> Path:
     return site
 
 
-def _forged(attack: Attack, clean: Path, out: Path) -> list[str]:
+def _forged(attacks: Sequence[Attack], clean: Path, out: Path) -> list[str]:
     """What the tables say and should not."""
     found = []
     runs, due = (_table(folder, "runs") for folder in (out, clean))
@@ -163,17 +184,20 @@ def _forged(attack: Attack, clean: Path, out: Path) -> list[str]:
     manifest = read_json(out / "manifest.json")["specification"]
     if manifest["tasks"] != read_json(clean / "manifest.json")["specification"]["tasks"]:
         found.append("the task is another one")
-    if attack.expects == "recorded" and theirs.empty:
-        found.append("it is not in the tables")
+    lost = {a.method for a in attacks if a.expects == "recorded"} - set(theirs.method)
+    if lost:
+        found.append(f"not in the tables: {', '.join(lost)}")
     reserved = theirs.method.str.startswith(("optimum/", "dual-process/"))
     if reserved.any():
         found.append(f"it is called {theirs.method[reserved].iloc[0]}")
     if (theirs.proven_bound.notna() & (theirs.status == "ok")).any():
         found.append(f"its word is a proven bound: {theirs.proven_bound.dropna().iloc[0]}")
-    if (theirs.reason.str.len() > LONGEST_REASON).any():
-        found.append(f"a reason of {theirs.reason.str.len().max()} characters")
-    texts = [str(value) for name in theirs for value in theirs[name]]
-    texts += [str(manifest["methods"]), (out / "comparison.md").read_text()]
+    texts = [str(value) for name in theirs for value in theirs[name] if name != "parameters"]
+    texts += [str(text) for item in manifest["methods"].values() for text in item.values()]
+    longest = max(map(len, texts), default=0)
+    if longest > LONGEST_TEXT:
+        found.append(f"keeps a text of {longest} characters")
+    texts.append((out / "comparison.md").read_text())
     if any(_hidden(c) for text in texts for c in text[:100_000]):
         found.append("control characters in what is kept")
     return found + _scores(theirs, out)
@@ -214,20 +238,11 @@ def _hidden(c: str) -> bool:
 
 
 def main() -> None:
-    """One attack by name, for a closer look: its findings and where its folder is."""
-    from tempfile import mkdtemp
-
-    from .checkout import adopt_orphans
-    from .methods import ATTACKS
-
+    """``ROOT FOLDER ID...``: these attacks in one suite; what did not hold, as JSON."""
+    root, base, names = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), sys.argv[3:]
     adopt_orphans()
-    root = Path(sys.argv[1]).resolve()
-    base = Path(mkdtemp(prefix="coartic-attacks-"))
     clean = clean_run(root, base / "clean")
-    for name in sys.argv[2:]:
-        folder = base / name.replace("/", "-")
-        folder.mkdir()
-        print(name, _hold(ATTACKS[name], root, clean, folder), folder)
+    print(json.dumps(let_loose([ATTACKS[name] for name in names], root, clean, base)))
 
 
 if __name__ == "__main__":
