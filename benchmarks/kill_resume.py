@@ -3,11 +3,11 @@
 ``python -m benchmarks.kill_resume [--kills 100] [--seed 0]`` runs a small suite once without
 interruption, then again and again under SIGKILL at random times, each time going on in the
 same folder, until the wanted number of kills has hit. Each folder has two turns: kills anywhere
-in the length of a whole suite, until it is complete, and then in that of a suite whose runs are
-all done, which only makes the tables and the comparison. Every folder that gets completed is
-compared with the uninterrupted one: same runs, each once, the same tables apart from timings,
-no half-written file. No process of a killed suite may outlive it, and nothing of it may stay in
-shared memory. Exit code 1 otherwise.
+in the length of a whole suite, until it is complete, and then in the later half of one whose
+runs are all done, which only makes the tables and the comparison. Every folder that gets
+completed is compared with the uninterrupted one: same runs, each once, the same tables apart
+from timings, no half-written file. No process of a killed suite may outlive it, and nothing of
+it may stay in shared memory. Exit code 1 otherwise.
 """
 
 from __future__ import annotations
@@ -96,8 +96,8 @@ class _Killer:
         counts = self.counts
         while counts.kills < self.kills:
             folder = self.base / f"folder-{counts.folders}"
-            self._until_completed(folder, self.span)
-            self._until_completed(folder, self.tables_span)
+            self._until_completed(folder, 0.0, self.span)
+            self._until_completed(folder, self.tables_span / 2, self.tables_span)
             counts.folders += 1
             counts.differing += not _same(self.whole, folder, self.total)
             print(counts, flush=True)
@@ -107,13 +107,13 @@ class _Killer:
         )
         return counts
 
-    def _until_completed(self, folder: Path, span: float) -> None:
+    def _until_completed(self, folder: Path, earliest: float, latest: float) -> None:
         """Start the suite in a folder, and kill it some times, until it ends by itself."""
         until = min(self.counts.kills + _KILLS_A_TURN, self.kills)
         while True:
             started = time.time()
             suite = self._start(folder)
-            delay = self.rng.uniform(0.0, span) if self.counts.kills < until else None
+            delay = self.rng.uniform(earliest, latest) if self.counts.kills < until else None
             try:
                 code = suite.wait(delay)
             except subprocess.TimeoutExpired:
