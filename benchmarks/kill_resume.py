@@ -1,21 +1,27 @@
-"""Kills a suite at random times, resumes it, and checks that nothing is lost or doubled.
+"""Kills a suite at random times, resumes it, and checks that nothing is lost, doubled or left.
 
-``python -m benchmarks.kill_resume [--kills 50] [--seed 0]`` runs a small suite once
-without interruption, then again and again under SIGKILL at random times, each time going
-on in the same folder, until the wanted number of kills has hit. Every folder that gets
-completed is compared with the uninterrupted one: same runs, each once, and the same
-tables apart from timings. Exit code 1 where anything differs.
+``python -m benchmarks.kill_resume [--kills 100] [--seed 0]`` runs a small suite once without
+interruption, then again and again under SIGKILL at random times, each time going on in the
+same folder, until the wanted number of kills has hit. Each folder has two turns: kills anywhere
+in the length of a whole suite, until it is complete, and then in the later half of one whose
+runs are all done, which only makes the tables and the comparison. Every folder that gets
+completed is compared with the uninterrupted one: same runs, each once, the same tables apart
+from timings, no half-written file. No process of a killed suite may outlive it, and nothing of
+it may stay in shared memory. Exit code 1 otherwise.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import random
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import pandas as pd
@@ -25,65 +31,148 @@ from coartic.tables import TIMINGS
 
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
 SUITE = ("run", "quick", "--runs", "8", "--trials", "6000")
+SHARED_MEMORY = Path("/dev/shm")
+_MARK = "COARTIC_KILL_RESUME"
+_KILLS_A_TURN = 5
+_GRACE_S = 10.0  # in which the kernel ends a killed suite's workers
+
+
+@dataclass
+class Counts:
+    """What was done and what was found."""
+
+    kills: int = 0
+    mid_runs: int = 0
+    """Kills with some runs done and some not."""
+    mid_tables: int = 0
+    """Kills with some tables written anew and some not."""
+    folders: int = 0
+    """Folders that got completed."""
+    differing: int = 0
+    """Folders with lost or doubled runs, different tables or half-written files."""
+    outlived: int = 0
+    """Kills that a process of the suite outlived."""
+    shared: int = 0
+    """Entries in shared memory of suites that are gone."""
+
+    @property
+    def failures(self) -> int:
+        """How often something did not hold."""
+        return self.differing + self.outlived + self.shared
 
 
 def main() -> None:
     """Kill, resume, compare, and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    rng = random.Random(options.seed)
     with tempfile.TemporaryDirectory() as folder:
-        whole = Path(folder) / "whole"
+        counts = _Killer(Path(folder), options.kills, random.Random(options.seed)).kill_all()
+    for field in fields(counts):
+        print(f"{field.name:10} {getattr(counts, field.name)}")
+    sys.exit(counts.failures > 0)
+
+
+class _Killer:
+    def __init__(self, base: Path, kills: int, rng: random.Random) -> None:
+        self.base = base
+        self.kills = kills
+        self.rng = rng
+        self.whole = base / "whole"
+        self.counts = Counts()
+        self.pids: set[int] = set()
+        self.span = self._time_of(self.whole)
+        self.tables_span = self._time_of(self.whole)
+        self.files = len([path for path in self.whole.iterdir() if path.is_file()])
+        self.total = len(pd.read_parquet(self.whole / "runs.parquet"))
+        print(
+            f"uninterrupted: {self.total} runs in {self.span:.1f} s; "
+            f"their tables alone {self.tables_span:.1f} s"
+        )
+
+    def kill_all(self) -> Counts:
+        """Until the wanted number of kills has hit."""
+        counts = self.counts
+        while counts.kills < self.kills:
+            folder = self.base / f"folder-{counts.folders}"
+            self._until_completed(folder, 0.0, self.span)
+            self._until_completed(folder, self.tables_span / 2, self.tables_span)
+            counts.folders += 1
+            counts.differing += not _same(self.whole, folder, self.total)
+            print(counts, flush=True)
+        counts.shared = sum(
+            not self.pids.isdisjoint(map(int, re.findall(r"\d+", path.name)))
+            for path in SHARED_MEMORY.glob("*")
+        )
+        return counts
+
+    def _until_completed(self, folder: Path, earliest: float, latest: float) -> None:
+        """Start the suite in a folder, and kill it some times, until it ends by itself."""
+        until = min(self.counts.kills + _KILLS_A_TURN, self.kills)
+        while True:
+            started = time.time()
+            suite = self._start(folder)
+            delay = self.rng.uniform(earliest, latest) if self.counts.kills < until else None
+            try:
+                code = suite.wait(delay)
+            except subprocess.TimeoutExpired:
+                suite.send_signal(signal.SIGKILL)
+                suite.wait()
+                self._count_kill(folder, started)
+                continue
+            if code != 0:
+                raise SystemExit(f"resuming ended with exit code {code}")
+            return
+
+    def _count_kill(self, folder: Path, started: float) -> None:
+        anew = [
+            path
+            for path in folder.glob("[!.]*")
+            if path.is_file() and path.stat().st_mtime >= started
+        ]
+        self.counts.kills += 1
+        self.counts.mid_runs += 0 < len(Store(folder).ids()) < self.total
+        self.counts.mid_tables += 0 < len(anew) < self.files
+        deadline = time.monotonic() + _GRACE_S
+        while (left := _marked(folder)) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        self.counts.outlived += bool(left)
+
+    def _time_of(self, folder: Path) -> float:
         clock = time.monotonic()
-        _start(whole).wait()
-        span = time.monotonic() - clock
-        total = len(pd.read_parquet(whole / "runs.parquet"))
-        print(f"uninterrupted: {total} runs in {span:.1f} s")
+        if self._start(folder).wait() != 0:
+            raise SystemExit("the suite does not even run uninterrupted")
+        return time.monotonic() - clock
 
-        kills = mid_suite = folders = differing = 0
-        while kills < options.kills:
-            interrupted = Path(folder) / f"folder-{folders}"
-            folders += 1
-            while True:
-                suite = _start(interrupted)
-                # Up to the length of the suite when this folder's turn still has kills.
-                delay = rng.uniform(0.0, span) if kills < options.kills else None
-                try:
-                    code = suite.wait(delay)
-                except subprocess.TimeoutExpired:
-                    suite.send_signal(signal.SIGKILL)
-                    suite.wait()
-                    kills += 1
-                    kept = len(Store(interrupted).ids())
-                    mid_suite += 0 < kept < total
-                    continue
-                if code != 0:
-                    raise SystemExit(f"resuming ended with exit code {code}")
-                break
-            differing += not _same(whole, interrupted, total)
-            print(f"{kills} kills, {folders} folders completed, {differing} differ", flush=True)
-    print(
-        f"\n{kills} random SIGKILLs, each followed by a resume ({mid_suite} of them with some "
-        f"runs done and some not); {folders} folders completed; lost runs, doubled runs or "
-        f"different tables in {differing}."
-    )
-    sys.exit(differing > 0)
+    def _start(self, folder: Path) -> subprocess.Popen[bytes]:
+        suite = subprocess.Popen(
+            [sys.executable, "-m", "coartic", *SUITE, "--out", str(folder)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, _MARK: str(folder)},
+        )
+        self.pids.add(suite.pid)
+        return suite
 
 
-def _start(folder: Path) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "coartic", *SUITE, "--out", str(folder)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+def _marked(folder: Path) -> list[int]:
+    """Process ids of those that a suite in this folder started (Linux)."""
+    mark = f"{_MARK}={folder}\0".encode()
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark in (entry / "environ").read_bytes():
+                found.append(int(entry.name))
+        except OSError:  # gone, or another user's
+            continue
+    return found
 
 
 def _same(whole: Path, interrupted: Path, total: int) -> bool:
-    """Whether two folders hold the same runs, each once, and the same tables."""
+    """Whether two folders hold the same runs, each once, the same tables, and no more files."""
     store = Store(interrupted)
-    if len(store.ids()) != total or list(store.records.glob("*.part")):
+    if len(store.ids()) != total or list(interrupted.rglob("*.part")):
         return False
     for table in TABLES:
         a, b = (pd.read_parquet(path / f"{table}.parquet") for path in (whole, interrupted))
