@@ -10,7 +10,6 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import json
-import os
 import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from coartic import CoarticError
+from coartic.files import write_atomically as write_atomically
 
 _PREFIX = "sha256:"
 KEYS = frozenset(
@@ -172,20 +172,3 @@ def decode(data: bytes, path: Path) -> dict[str, Any]:
         raise RecordError(f"{path}: is damaged: {', '.join(sorted(missing))} missing")
     found: dict[str, Any] = record
     return found
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all, also after a power cut.
-
-    A power cut may undo the rename; then the old file, or none, is there.
-    """
-    part = path.parent / f".{uuid.uuid4().hex}.part"
-    try:
-        with part.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise

@@ -32,6 +32,7 @@ _PRESENTATION = {
     "__init__.py",
     "__main__.py",
     "cli.py",
+    "files.py",
     "frames.py",
     "reference.py",
     "trajectory.py",

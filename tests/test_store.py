@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import store as store_module
 from benchmarks.harness import perform_plan
 from benchmarks.specification import Limits
 from benchmarks.store import KEYS, Damage, RecordError, Store, encode
@@ -195,7 +194,7 @@ def test_timeouts_are_redone_under_a_longer_limit_or_on_demand(tmp_path):
 
 def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
     store, planned = Store(tmp_path), specs(runs=3)
-    real = store_module.os.fsync
+    real = os.fsync
     calls = []
 
     def full(descriptor):
@@ -204,7 +203,7 @@ def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
         real(descriptor)
 
-    monkeypatch.setattr(store_module.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(CoarticError, match="No space left on device"):
         perform_counting(store, planned)
     monkeypatch.undo()
