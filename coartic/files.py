@@ -109,7 +109,7 @@ def publish(folder: Path, files: Mapping[str, bytes], *, owner: str, alone: bool
             for place in reversed(found.folders):
                 if not _is_above(place, files):
                     (folder / place).rmdir()
-            if fresh or gone or final != listing:
+            if final != listing:
                 _write_listing(folder, final)
 
 
@@ -134,6 +134,7 @@ def write_outputs(files: Mapping[Path, bytes], *, replace: bool) -> None:
     check_outputs(files, replace=replace)
     for path, data in files.items():
         with _errors(path):
+            clear_leftovers(path.parent)
             write_atomically(path, data)
 
 

@@ -233,6 +233,21 @@ def test_leftovers_are_those_of_the_dead(tmp_path):
         clear_leftovers(tmp_path / "nowhere")
 
 
+def test_a_writer_at_work_keeps_its_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "fsync", lambda number: clear_leftovers(tmp_path))
+    write_atomically(tmp_path / "a", b"1")
+    publish(tmp_path, {"b": b"2"}, owner="analyse", alone=False)
+    assert contents(tmp_path) == {"a": b"1", "b": b"2"}
+
+
+def test_the_lock_is_no_link(tmp_path):
+    (tmp_path / "t").mkdir()
+    (tmp_path / "t" / f".coartic-{'0' * 32}.part").symlink_to(tmp_path / "new")
+    with pytest.raises(CoarticError, match="cannot write"):
+        publish(tmp_path / "t", NEW, owner="report", alone=True)
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_write_that_fails_leaves_nothing(tmp_path, monkeypatch):
     write_atomically(tmp_path / "a", b"before")
 
@@ -441,7 +456,9 @@ def test_single_files(tmp_path):
             use({tmp_path / "new.md": b"", tmp_path / "file.md": b""}, replace=False)
     assert names == sorted(path.name for path in tmp_path.iterdir())
     assert (tmp_path / "file.md").read_bytes() == b"mine"
+    (tmp_path / PART).write_bytes(b"half a fi")
     write_outputs({tmp_path / "new.md": b"1", tmp_path / "file.md": b"2"}, replace=True)
+    assert not (tmp_path / PART).exists()
     assert (tmp_path / "file.md").read_bytes() == b"2"
     assert (tmp_path / "somebody's").read_bytes() == b"years of work"
 
