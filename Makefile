@@ -37,8 +37,7 @@ speed: $(READY)
 	$(BIN)/python -m benchmarks.speed
 
 example: $(READY)  # the report in the repository, of what make benchmark left
-	$(BIN)/coartic report $(OUT)/comparison --out benchmarks/example
-	rm -f benchmarks/example/figures/*.pdf benchmarks/example/figures/*.png benchmarks/example/figures/*.csv
+	$(BIN)/coartic report $(OUT)/comparison --out benchmarks/example --formats svg
 
 setup: $(READY)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 
 from analysis.figures.robot import MARKERS
 from coartic import CoarticError, Trajectory
+from coartic.files import check_outputs, write_outputs
 from coartic.robot import Array
 
 FORMATS = (".gif", ".mp4")
@@ -67,15 +69,21 @@ def timing(ticks: int, speed: float | None = None) -> Timing:
 
 
 def animate(
-    panels: Sequence[Panel], path: Path, *, speed: float | None = None, width: int = 800
+    panels: Sequence[Panel],
+    path: Path,
+    *,
+    speed: float | None = None,
+    width: int = 800,
+    replace: bool = False,
 ) -> Timing:
     """Draw movements side by side, all from their first tick, into ``path``; their timing.
 
     ``speed`` is in ticks per second, ``width`` of the picture in pixels. A movement that ends
-    before the others stands still. Raises CoarticError for an ending that is not in
-    :data:`FORMATS`, for MP4 without ffmpeg, and where the file cannot be written.
+    before the others stands still. Without ``replace`` no file is written over. Raises
+    CoarticError for an ending that is not in :data:`FORMATS`, for MP4 without ffmpeg, and where
+    the file cannot be written.
     """
-    check_output(path)
+    check_output(path, replace=replace)
     ticks = max(panel.trajectory.ticks for panel in panels)
     if not ticks:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
@@ -83,11 +91,14 @@ def animate(
     figure, scenes = _figure(panels, width)
     writer = _writer(path, timed)
     try:
-        with writer.saving(figure, str(path), _DPI):
-            for row in [*timed.rows, *timed.rows[-1:] * timed.held]:
-                for scene in scenes:
-                    scene.show(row)
-                writer.grab_frame()
+        with tempfile.TemporaryDirectory(prefix="coartic-") as folder:
+            film = Path(folder) / f"film{path.suffix.lower()}"
+            with writer.saving(figure, str(film), _DPI):
+                for row in [*timed.rows, *timed.rows[-1:] * timed.held]:
+                    for scene in scenes:
+                        scene.show(row)
+                    writer.grab_frame()
+            write_outputs({path: film.read_bytes()}, replace=replace)
     except OSError as error:
         raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
     except subprocess.CalledProcessError as error:
@@ -95,10 +106,10 @@ def animate(
     return timed
 
 
-def check_output(path: Path) -> None:
+def check_output(path: Path, *, replace: bool = False) -> None:
     """Raises CoarticError for what cannot be written: before anything is drawn.
 
-    An ending that is not supported, MP4 without ffmpeg, a folder that is not there.
+    An ending that is not supported, MP4 without ffmpeg, what :func:`check_outputs` refuses.
     """
     from matplotlib.animation import FFMpegWriter
 
@@ -106,8 +117,7 @@ def check_output(path: Path) -> None:
         raise CoarticError(f"--out {path}: the name must end in {' or '.join(FORMATS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
-    if not path.parent.is_dir():
-        raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+    check_outputs([path], replace=replace)
 
 
 class _Scene:

@@ -108,6 +108,7 @@ MethodFiles = Annotated[
     typer.Option("--method-file", readable=False, help="Methods of your own (Python)."),
 ]
 Records = Annotated[Path, typer.Option("--in", help="Folder to look for the run in.")]
+Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 
 
 @app.command()
@@ -313,7 +314,7 @@ def analyse(
     from analysis.results import load_results
     from analysis.signatures.page import signatures_page
     from analysis.study import Study
-    from coartic.files import write_atomically
+    from coartic.files import publish
 
     results = load_results(folder)
     study = Study(results)
@@ -341,11 +342,8 @@ def analyse(
         "pareto.csv": pareto,
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
-    try:
-        for name, text in pages.items():
-            write_atomically(folder / name, text.encode())
-    except OSError as error:
-        raise CoarticError(f"cannot write to {folder}: {error.strerror or error}") from None
+    files = {name: text.encode() for name, text in pages.items()}
+    publish(folder, files, owner="analyse", alone=False)
     _print(
         _console(),
         "Claims",
@@ -434,23 +432,23 @@ def draw(
         list[Path] | None,
         typer.Option(readable=False, help="A task of your own (TOML); may be repeated."),
     ] = None,
+    replace: Replace = False,
 ) -> None:
     """Draw start configuration and goals of tasks."""
-    from analysis.figures.plot import FORMATS, write
+    from analysis.figures.plot import FORMATS, picture
     from analysis.figures.tasks import tasks_plot
+    from coartic.files import check_outputs, write_outputs
 
     if out.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}")
+    check_outputs([out], replace=replace)
     names = _names(tasks, "--tasks")
     if not names and not task_file:
         names = list(builtin_tasks())
     chosen = [load_task(name) for name in dict.fromkeys(names)] + [
         load_task(path) for path in task_file or []
     ]
-    try:
-        write(tasks_plot(chosen), out)
-    except OSError as error:
-        raise CoarticError(f"cannot write {out}: {error.strerror or error}") from None
+    write_outputs({out: picture(tasks_plot(chosen), out.suffix.lower())}, replace=replace)
     print(f"{', '.join(task.name for task in chosen)} drawn in {out}.")
 
 
@@ -467,21 +465,33 @@ def report(
             "'\"a x=1, y=2\",b' with parameters."
         ),
     ] = None,
+    formats: Annotated[
+        str, typer.Option(help="Files of each figure: svg and any of pdf, png, csv.")
+    ] = "pdf,svg,png,csv",
 ) -> None:
-    """Write a report: page with player, tables, figures, numbers for LaTeX, traces."""
+    """Write a report: page with player, tables, figures, numbers for LaTeX, traces.
+
+    A folder that holds anything else than an earlier report, unchanged, is refused.
+    """
     from analysis.report.build import build, write
+    from analysis.report.write import check_report_folder
     from analysis.results import load_results
     from analysis.study import Study
 
     started = time.monotonic()
     study = Study(load_results(folder))
     out = folder / "report" if out is None else out
-    made = build(study, None if methods is None else _labels(methods, "--methods"))
+    check_report_folder(out, folder)
+    made = build(
+        study,
+        None if methods is None else _labels(methods, "--methods"),
+        [f".{name}" for name in _names(formats, "--formats")],
+    )
     write(made, study, out)
     print(
         f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
         f"it: report.md, {len(made.document.tables())} tables (tables/, CSV and LaTeX), "
-        f"{len(made.plots)} figures (figures/, PDF, SVG, PNG and their data), numbers.tex."
+        f"{len(made.plots)} figures (figures/, as {formats}), numbers.tex."
     )
 
 
@@ -510,24 +520,22 @@ def compare(
         Path | None, typer.Option(help="Page to write (.md), with a table beside it (.csv).")
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Table to write (.csv).")] = None,
+    replace: Replace = False,
 ) -> None:
     """Compare two results folders cell by cell: versions, machines, parameters."""
     from analysis.versions import compare_versions, load_pair
-    from coartic.files import write_atomically
+    from coartic.files import check_outputs, write_outputs
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
         if path is not None and path.suffix.lower() != ending:
             raise CoarticError(f"{option} {path}: the name must end in {ending}")
-    found = compare_versions(*load_pair(first, second))
     if out is not None and csv is None:
         csv = out.with_suffix(".csv")
+    check_outputs(filter(None, (out, csv)), replace=replace)
+    found = compare_versions(*load_pair(first, second))
     texts = {out: found.to_markdown(), csv: found.cells.to_csv(index=False)}
-    written = [path for path in texts if path is not None]
-    for path in written:
-        try:
-            write_atomically(path, texts[path].encode())
-        except OSError as error:
-            raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
+    written = {path: text.encode() for path, text in texts.items() if path is not None}
+    write_outputs(written, replace=replace)
     console = _console()
     for table in (found.differing, found.table):
         _print(console, table.title, table.columns, table.rows, wrap=table is found.differing)
@@ -552,6 +560,7 @@ def animate(
         typer.Option(min=0.1, max=10_000, help="Ticks per second; by default some 10 s in all."),
     ] = None,
     width: Annotated[int, typer.Option(min=200, max=3840, help="Width in pixels.")] = 800,
+    replace: Replace = False,
 ) -> None:
     """Show a run's solution tick by tick, alone or beside another one."""
     from analysis.animation import Panel, check_output
@@ -559,7 +568,7 @@ def animate(
     from benchmarks.reproduce import find_record, trajectory_of
     from coartic import corrective_trial, initial_hands, trajectory
 
-    check_output(out)
+    check_output(out, replace=replace)
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run id")
     panels = []
@@ -572,7 +581,7 @@ def animate(
         task = panels[0].trajectory.task
         movements = corrective_trial(task, initial_hands(task)).movements
         panels.insert(0, Panel(f"{task.name}: initial solution", trajectory(task, movements)))
-    timed = film(panels, out, speed=speed, width=width)
+    timed = film(panels, out, speed=speed, width=width, replace=replace)
     print(
         f"{' beside '.join(panel.title for panel in panels)} in {out}: "
         f"{len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second."

@@ -127,11 +127,11 @@ def test_gif(moves, tmp_path):
 def test_mp4_goes_to_ffmpeg(moves, tmp_path, capfd):
     """Every frame, with even sides, through a program that keeps what it is given."""
     fake = tmp_path / "ffmpeg"
-    fake.write_text('#!/bin/sh\nfor out; do :; done\necho "$@" >"$out.args"\ncat >"$out"\n')
+    fake.write_text('#!/bin/sh\nfor out; do :; done\necho "$@" >"$0.args"\ncat >"$out"\n')
     fake.chmod(0o755)
     with rc_context({"animation.ffmpeg_path": str(fake)}):
         timed = animate([Panel("a", moves)], tmp_path / "a.mp4", speed=2000, width=301)
-    words = (tmp_path / "a.mp4.args").read_text().split()
+    words = (tmp_path / "ffmpeg.args").read_text().split()
     width, height = map(int, words[words.index("-s") + 1].split("x"))
     assert (width % 2, height % 2) == (0, 0)
     frames = len(timed.rows) + timed.held
@@ -142,7 +142,8 @@ def test_mp4_goes_to_ffmpeg(moves, tmp_path, capfd):
         rc_context({"animation.ffmpeg_path": str(fake)}),
         pytest.raises(CoarticError, match="ffmpeg failed: .*no such codec"),
     ):
-        animate([Panel("a", moves)], tmp_path / "a.mp4", speed=2000, width=300)
+        animate([Panel("a", moves)], tmp_path / "b.mp4", speed=2000, width=300)
+    assert sorted(os.listdir(tmp_path)) == ["a.mp4", "ffmpeg", "ffmpeg.args"]
 
 
 def test_a_record_gives_its_own_trajectory(folder):
@@ -190,8 +191,14 @@ def test_command(folder, tmp_path, monkeypatch, capsys):
     )
     with Image.open(out) as film:
         assert film.width == 240
-    code, text, _ = call(monkeypatch, capsys, "animate", one, "--initial", *fast)
+    before = out.read_bytes()
+    code, _, error = call(monkeypatch, capsys, "animate", one, "--initial", *fast)
+    assert (code, out.read_bytes()) == (2, before)
+    assert f"{out} is there already; add --replace to write over it" in error
+    code, text, _ = call(monkeypatch, capsys, "animate", one, "--initial", *fast, "--replace")
     assert code == 0
+    assert out.read_bytes() != before
+    out = tmp_path / "b.gif"
     assert text.startswith("two-armed-1: initial solution beside two-armed-1: dual-process/EC3")
     broken = tmp_path / "damaged" / "records"
     broken.mkdir(parents=True)

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.store import Store, encode
 from coartic import __version__, cli
+from coartic.files import LISTING
 from coartic.record import run_seed
 
 from .test_task import BAD, GOOD
@@ -300,6 +301,13 @@ def test_draw(monkeypatch, capsys, tmp_path):
     )
     assert code == 0
     assert text.startswith("mine drawn in")
+    before = own.read_bytes()
+    code, _, error = call(monkeypatch, capsys, "draw", "--tasks", "ascending", "--out", own)
+    assert (code, own.read_bytes()) == (2, before)
+    assert f"{own} is there already; add --replace to write over it" in error
+    replace = ("draw", "--tasks", "ascending", "--out", own, "--replace")
+    assert call(monkeypatch, capsys, *replace)[0] == 0
+    assert own.read_bytes() != before
 
 
 def test_titles_are_text_not_formulas(monkeypatch, capsys, tmp_path):
@@ -342,6 +350,16 @@ def test_analyse(monkeypatch, capsys, tmp_path):
     }
     assert call(monkeypatch, capsys, "analyse", out)[0] == 0
     assert written == {name: (out / name).read_bytes() for name in names}
+    (out / "claims.md").write_text("annotated")
+    (out / LISTING).rename(tmp_path / "listing")  # as in a folder of an older version
+    code, _, error = call(monkeypatch, capsys, "analyse", out)
+    assert code == 2
+    assert "holds claims.md, not listed there as written by `coartic analyse`" in error
+    (tmp_path / "listing").rename(out / LISTING)
+    code, _, error = call(monkeypatch, capsys, "analyse", out)
+    assert code == 2
+    assert "holds claims.md, changed since `coartic analyse` wrote it; move it away" in error
+    assert (out / "claims.md").read_text() == "annotated"
     code, _, error = call(monkeypatch, capsys, "analyse", tmp_path)
     assert code == 2
     assert "not a results folder" in error

@@ -29,8 +29,8 @@ def undrawn(monkeypatch):
     """Reports without figures, which take long and have tests of their own."""
     monkeypatch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
     monkeypatch.setattr(
-        analysis.report.build, "save",
-        lambda plot, folder: (folder / f"{plot.id}.svg").write_text(SVG, encoding="utf-8"),
+        analysis.report.build, "rendered",
+        lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
     )  # fmt: skip
 
 
@@ -207,16 +207,56 @@ def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):
     near = refused(monkeypatch, capsys, "report", odd.folder, "--methods", "dual-process/EC44")
     assert "did you mean 'dual-process/EC4'" in near
     assert "empty name" in refused(monkeypatch, capsys, "report", odd.folder, "--methods", "a,,b")
-    # A report folder that is none.
+    assert "choose of .pdf" in refused(
+        monkeypatch, capsys, "report", odd.folder, "--formats", "png"
+    )
+    # Somebody's folder, whose page has the name of ours.
     thesis = tmp_path / "thesis"
     thesis.mkdir()
-    (thesis / "thesis.tex").write_text("years of work")
+    (thesis / "report.html").write_text("years of work")
+    (thesis / "thesis.tex").write_text("more years of work")
+    before = everything(tmp_path)
     error = refused(monkeypatch, capsys, "report", odd.folder, "--out", thesis)
-    assert "is no report" in error
-    assert [path.name for path in thesis.iterdir()] == ["thesis.tex"]
+    assert (
+        "holds report.html, thesis.tex, not listed there as written by `coartic report`" in error
+    )
+    assert everything(tmp_path) == before
+    before = everything(odd.folder.parent)
+    for place, words_ in (
+        (odd.folder, "holds the results themselves"),
+        (odd.folder.parent, "holds the results themselves"),
+        (odd.folder / "records", "is among the records"),
+        (odd.folder / "records" / "report", "is among the records"),
+    ):
+        assert words_ in refused(monkeypatch, capsys, "report", odd.folder, "--out", place)
+    assert everything(odd.folder.parent) == before
     # A file where a folder should be: what a disk that is read only answers, for root too.
     error = refused(monkeypatch, capsys, "report", odd.folder, "--out", tmp_path / "file" / "r")
     assert "cannot write" in error
+
+
+def everything(folder):
+    return {path: path.is_dir() or path.read_bytes() for path in folder.rglob("*")}
+
+
+def test_a_report_is_made_again_where_nobody_changed_it(
+    monkeypatch, capsys, tmp_path, odd, undrawn
+):
+    home = tmp_path / "report"
+    command = ("report", odd.folder, "--out", home, "--formats", "svg")
+    assert call(monkeypatch, capsys, *command)[0] == 0
+    before = everything(tmp_path)
+    assert "as SVG." in (home / "report.md").read_text(encoding="utf-8")
+    assert call(monkeypatch, capsys, *command)[0] == 0
+    assert everything(tmp_path) == before
+    with (home / "report.md").open("a", encoding="utf-8") as page:
+        page.write("A thought of mine.")
+    before = everything(tmp_path)
+    error = refused(monkeypatch, capsys, *command)
+    assert "holds report.md, changed since `coartic report` wrote it; move it away" in error
+    assert everything(tmp_path) == before
+    (home / "report.md").rename(tmp_path / "mine.md")
+    assert call(monkeypatch, capsys, *command)[0] == 0
 
 
 @pytest.mark.parametrize("name", ["runs", "solutions", "learning", "sequences", "manifest"])

@@ -112,8 +112,8 @@ def report_of(study, folder):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
         patch.setattr(
-            analysis.report.build, "save",
-            lambda plot, folder: (folder / f"{plot.id}.svg").write_text(SVG, encoding="utf-8"),
+            analysis.report.build, "rendered",
+            lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
         )  # fmt: skip
         write(build(study), study, folder)
     return folder

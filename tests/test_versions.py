@@ -355,7 +355,13 @@ def test_command(first, tmp_path, monkeypatch, capsys):
     table = pd.read_csv(tmp_path / "page.csv")
     assert list(table.verdict) == ["different", "identical", "identical"]
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
-    call(monkeypatch, capsys, "compare", first, second, "--out", page)
+    (tmp_path / "page.csv").write_text("of somebody else's")
+    page.unlink()
+    code, _, error = call(monkeypatch, capsys, "compare", first, second, "--out", page)
+    assert (code, page.exists()) == (2, False)
+    assert f"{tmp_path / 'page.csv'} is there already; add --replace" in error
+    assert (tmp_path / "page.csv").read_text() == "of somebody else's"
+    call(monkeypatch, capsys, "compare", first, second, "--out", page, "--replace")
     assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     code, text, _ = call(monkeypatch, capsys, "compare", first, second)
     assert code == 0
@@ -369,6 +375,7 @@ def test_command(first, tmp_path, monkeypatch, capsys):
         ((first, second, "--out", "page.html"), "the name must end in .md"),
         ((first, second, "--csv", "table.txt"), "the name must end in .csv"),
         ((first, second, "--out", "/dev/null/x.md"), "cannot write /dev/null/x.md"),
+        ((first, second, "--out", second / "records" / "x.md"), "is among the records"),
     ):
         code, _, error = call(monkeypatch, capsys, "compare", *arguments)
         assert code == 2

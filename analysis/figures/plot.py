@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import io
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +17,10 @@ from PIL import Image
 from analysis.figures.style import GREY, INK, PAPER, RC
 from analysis.figures.svg import compact
 from coartic import CoarticError
+from coartic.files import write_atomically
 
 FORMATS = (".png", ".svg", ".pdf")
+FILES = (*FORMATS, ".csv")
 DPI = 300
 _NO_DATE = {
     ".pdf": {"CreationDate": None},
@@ -44,37 +47,55 @@ class Plot:
     """What is drawn, tidy: enough to draw it again."""
 
 
-def write(plot: Plot, path: Path) -> None:
-    """Write the figure alone to ``path`` in the format of its ending (:data:`FORMATS`).
+def picture(plot: Plot, ending: str) -> bytes:
+    """The figure as a file with this ending, one of :data:`FORMATS`.
 
-    The same figure gives the same bytes: ids are salted, no date is written. Raises
-    CoarticError for other endings and OSError where it cannot be written.
+    The same figure gives the same bytes: ids are salted, no date is written.
     """
-    ending = path.suffix.lower()
-    if ending not in FORMATS:
-        raise CoarticError(f"{path}: the name of a figure must end in {', '.join(FORMATS)}")
     with rc_context(RC):
         _settle(plot.figure)
         stream = io.BytesIO()
         plot.figure.savefig(stream, format=ending[1:], dpi=DPI, metadata=_NO_DATE[ending])
-    path.write_bytes(_smaller(stream, ending))
+    return _smaller(stream, ending)
+
+
+def rendered(plot: Plot, endings: Collection[str] = FILES) -> dict[str, bytes]:
+    """The figure's files by their names, ``<id>.png`` (300 dpi), ``.svg``, ``.pdf`` and
+    ``<id>.csv``, those of ``endings``.
+    """
+    files = {
+        f"{plot.id}{ending}": picture(plot, ending) for ending in FORMATS if ending in endings
+    }
+    if ".csv" in endings:
+        table = plot.data.to_csv(index=False, lineterminator="\n", float_format="%.8g")
+        files[f"{plot.id}.csv"] = table.encode()
+    return files
+
+
+def write(plot: Plot, path: Path) -> None:
+    """Write the figure alone to ``path`` in the format of its ending (:data:`FORMATS`).
+
+    Raises CoarticError for other endings and OSError where it cannot be written.
+    """
+    ending = path.suffix.lower()
+    if ending not in FORMATS:
+        raise CoarticError(f"{path}: the name of a figure must end in {', '.join(FORMATS)}")
+    write_atomically(path, picture(plot, ending))
 
 
 def save(plot: Plot, folder: Path) -> list[Path]:
-    """Write ``<id>.png`` (300 dpi), ``.svg``, ``.pdf`` and ``<id>.csv`` into ``folder``.
+    """Write the figure's files (:func:`rendered`) into ``folder``, over those of these names.
 
     The folder is made if it is not there. Raises CoarticError where they cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        paths = [folder / f"{plot.id}{ending}" for ending in FORMATS]
-        for path in paths:
-            write(plot, path)
-        table = folder / f"{plot.id}.csv"
-        plot.data.to_csv(table, index=False, lineterminator="\n", float_format="%.8g")
+        files = rendered(plot)
+        for name, data in files.items():
+            write_atomically(folder / name, data)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror or error}") from None
-    return [*paths, table]
+    return [folder / name for name in files]
 
 
 def svg_text(plot: Plot) -> str:

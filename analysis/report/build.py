@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +13,7 @@ from analysis.claims import judge
 from analysis.claims.page import FITTED
 from analysis.claims.register import Judged
 from analysis.figures import Figures, Plot, all_figures
-from analysis.figures.plot import save, svg_text
+from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.frontier.frames import area_frame, for_both_arms, targets_frame
 from analysis.inference.across_tasks import scores_frame
 from analysis.pairs.overall import combined, overall_frame
@@ -37,10 +38,11 @@ from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
 from analysis.report.text import escaped
 from analysis.report.trace import FILE, trace_json
-from analysis.report.write import write_report
+from analysis.report.write import check_report_folder, write_report
 from analysis.results import Results
 from analysis.study import Study
 from analysis.table import Table
+from coartic import CoarticError
 
 MOST_TASKS = 8
 """More would make a report that nobody reads."""
@@ -54,6 +56,7 @@ _FIGURES = {
     "Figure 8": "learned-reward",
 }
 """Ours by the paper's."""
+_FORMATS = {".pdf": "PDF", ".svg": "SVG", ".png": "PNG", ".csv": "CSV (the data behind it)"}
 
 
 @dataclass(frozen=True)
@@ -63,14 +66,24 @@ class Report:
     document: Document
     plots: tuple[Plot, ...]
     numbers: tuple[Number, ...]
+    formats: tuple[str, ...] = FILES
+    """Endings of the figures' files."""
 
 
-def build(study: Study, methods: Sequence[str] | None = None) -> Report:
+def build(
+    study: Study, methods: Sequence[str] | None = None, formats: Sequence[str] = FILES
+) -> Report:
     """Everything a report holds. A section that the runs do not allow is left out.
 
-    ``methods``: labels that the figures show instead of their own choice; CoarticError for
-    one that the folder does not have.
+    ``methods``: labels that the figures show instead of their own choice; ``formats``: endings of
+    the figures' files, ``.svg`` among them. Raises CoarticError for a method that the folder does
+    not have, and for other formats.
     """
+    if ".svg" not in formats or not set(formats) <= _FORMATS.keys():
+        raise CoarticError(
+            f"figures as {', '.join(formats)}: choose of {', '.join(_FORMATS)}, .svg among them, "
+            "which report.md shows"
+        )
     figures = all_figures(study, MOST_TASKS, methods)
     numbers = tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
@@ -111,7 +124,7 @@ def build(study: Study, methods: Sequence[str] | None = None) -> Report:
         _signatures(study, shown("context"), shown("signatures")),
         _section("more-figures", "More figures", shown("")),
         _section("limitations", "Limitations", [Bullets(limitations(study))]),
-        _about(study, figures, numbers),
+        _about(study, figures, numbers, formats),
     ]  # fmt: skip
     document = Document(
         _title(study.results),
@@ -119,21 +132,23 @@ def build(study: Study, methods: Sequence[str] | None = None) -> Report:
         _lead(study.results),
         {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
     )
-    return Report(document, figures.plots, numbers)
+    return Report(document, figures.plots, numbers, tuple(formats))
 
 
 def write(report: Report, study: Study, folder: Path) -> None:
     """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
 
-    Raises CoarticError where it cannot be written.
+    Raises CoarticError where it cannot be written, or something is in the way.
     """
+    check_report_folder(folder, study.results.folder)
     about = [f"Headline values of {_title(study.results)}.", _lead(study.results)]
     about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study.results, report.document, report.numbers),
     }
-    write_report(report.document, report.plots, folder, extra, save=save)
+    render = partial(rendered, endings=report.formats)
+    write_report(report.document, report.plots, folder, extra, render=render)
 
 
 def _title(results: Results) -> str:
@@ -265,13 +280,17 @@ def _evidence(study: Study, table: Table, claim: str) -> DataTable:
     )
 
 
-def _about(study: Study, figures: Figures, numbers: Iterable[Number]) -> Section:
+def _about(
+    study: Study, figures: Figures, numbers: Iterable[Number], formats: Sequence[str]
+) -> Section:
     count = sum(1 for number in numbers for _ in number.companions())
+    *others, last = (name for ending, name in _FORMATS.items() if ending in formats)
+    drawn = f"{', '.join(others)} and {last}" if others else last
     example = next((n.macro for n in numbers if n.cells), f"{PREFIX}...")
     items = [
         "Every row of a table leads to its runs: by the last column of `report.html`, and by "
         "`tables/runs.csv`. Every table is in `tables/` as "
-        "CSV and LaTeX, every figure in `figures/` as PDF, SVG, PNG and CSV (the data behind it).",
+        f"CSV and LaTeX, every figure in `figures/` as {drawn}.",
         f"`numbers.tex` has {count} macros, such as `\\{example}`.",
         f"`coartic trace {example}` and `coartic trace TABLE ROW COLUMN` name the runs, the "
         "commit, the specification and the command behind a number; `coartic reproduce RUN` "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
@@ -13,8 +13,22 @@ from analysis.report.latex import latex_inputs, latex_tables
 from analysis.report.markdown import markdown
 from analysis.report.tables_csv import runs_csv, table_csv
 from coartic import CoarticError
+from coartic.files import check_folder, publish
 
 Plot = TypeVar("Plot")
+_OWNER = "report"
+
+
+def check_report_folder(folder: Path, results: Path) -> None:
+    """Raises CoarticError where no report of ``results`` may be written into ``folder``.
+
+    It is the results folder, above it or among records, or holds what no report wrote.
+    """
+    if Path(os.path.realpath(results)).is_relative_to(os.path.realpath(folder)):
+        raise CoarticError(
+            f"{folder} holds the results themselves; a report has a folder of its own"
+        )
+    check_folder(folder, owner=_OWNER, alone=True)
 
 
 def write_report(
@@ -23,38 +37,23 @@ def write_report(
     folder: Path,
     extra: Mapping[str, str] | None = None,
     *,
-    save: Callable[[Plot, Path], object],
+    render: Callable[[Plot], Mapping[str, bytes]],
 ) -> None:
-    """Write ``folder`` anew: what it held is replaced when all of the new report is there.
+    """Write a report into ``folder``, in the place of an earlier one.
 
-    ``report.html`` stands alone; ``report.md`` links to ``figures/``, where ``save`` puts
-    each plot, at least as ``ID.svg``; ``tables/`` holds CSV and LaTeX, ``tables.tex`` inputs
-    the latter; ``extra`` are further text files by name. The same document gives the same
-    bytes. Raises ValueError where a figure of the document is not among the plots,
-    CoarticError where the folder is not a report or cannot be written.
+    ``report.html`` stands alone; ``report.md`` links to ``figures/`` with what ``render`` makes
+    of each plot: contents by file name, at least ``ID.svg``; ``tables/`` holds CSV and LaTeX,
+    ``tables.tex`` inputs the latter; ``extra`` are further text files by name. The same
+    document gives the same bytes. Raises ValueError where a figure of the document is not among
+    the plots, CoarticError as :func:`coartic.files.publish` for a folder that is a report's alone.
     """
-    if not _replaceable(folder):
-        raise CoarticError(
-            f"{folder} is there and is no report: it has no report.html; move it away"
-        )
-    part = folder.with_name(f".{folder.name}.part")
-    old = folder.with_name(f".{folder.name}.old")
-    try:
-        shutil.rmtree(part, ignore_errors=True)
-        (part / "tables").mkdir(parents=True)
-        (part / "figures").mkdir()
-        for plot in plots:
-            save(plot, part / "figures")
-        lost = [f.id for f in document.figures() if not (part / f"figures/{f.id}.svg").is_file()]
-        if lost:
-            raise ValueError(f"figures without a plot: {', '.join(lost)}")
-        for name, text in {**_texts(document), **(extra or {})}.items():
-            (part / name).write_text(text, encoding="utf-8", newline="\n")
-        _replace(part, folder, old)
-    except OSError as error:
-        raise CoarticError(f"cannot write {folder}: {error.strerror or error}") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+    figures = {f"figures/{name}": data for plot in plots for name, data in render(plot).items()}
+    lost = [f.id for f in document.figures() if f"figures/{f.id}.svg" not in figures]
+    if lost:
+        raise ValueError(f"figures without a plot: {', '.join(lost)}")
+    texts = {**_texts(document), **(extra or {})}
+    files = figures | {name: text.encode() for name, text in texts.items()}
+    publish(folder, files, owner=_OWNER, alone=True)
 
 
 def _texts(document: Document) -> dict[str, str]:
@@ -68,24 +67,3 @@ def _texts(document: Document) -> dict[str, str]:
     texts |= {f"tables/{table.id}.csv": table_csv(table) for table in document.tables()}
     texts |= {f"tables/{name}.tex": text for name, text in latex_tables(document).items()}
     return texts
-
-
-def _replaceable(folder: Path) -> bool:
-    """Whether there is nothing, an empty folder or an older report."""
-    if not folder.is_dir():
-        return not folder.exists()
-    return (folder / "report.html").is_file() or not any(folder.iterdir())
-
-
-def _replace(new: Path, folder: Path, old: Path) -> None:
-    """Put a folder in another's place; the other stays where that fails."""
-    if folder.exists():
-        shutil.rmtree(old, ignore_errors=True)
-        folder.rename(old)
-    try:
-        new.rename(folder)
-    except OSError:
-        if old.exists():
-            old.rename(folder)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
