@@ -156,29 +156,6 @@ def cells_frame(first: Results, second: Results) -> pd.DataFrame:
     over runs, time in s.
     """
     here, there = _cells(first), _cells(second)
-    return VersionComparison(
-        (first.folder, second.folder),
-        differing,
-        same,
-        cells_frame(first, second),
-        (_only(here, there), _only(there, here)),
-        _notes(first, second),
-    )
-
-
-def cells_frame(first: Results, second: Results) -> pd.DataFrame:
-    """One row per cell that both folders have, in the order of the first one's plan.
-
-    ``n_*`` runs, ``solved_*`` those with a solution, ``mean_*`` reward; ``shared`` seeds and
-    ``identical`` runs among them: the same status, joints, ticks and rewards of all trials.
-    ``difference`` is the mean of B less that of A with its 95 % BCa interval (``low``,
-    ``high``), ``paired`` by seed where at least three are shared; ``p`` is of the two-sided bootstrap test, ``p_adjusted``
-    after Holm over all cells tested. ``verdict`` is ``identical`` (every run), ``equivalent``,
-    ``undecided`` or ``different`` (:class:`~analysis.inference.equivalence.Equivalence`,
-    ``margin`` in ticks), ``no interval`` (fewer than three runs) or ``not compared``
-    (``remarks`` say why). ``SPENT_*`` are medians over runs, time in s.
-    """
-    here, there = _cells(first), _cells(second)
     tasks = _differing_tasks(first, second)
     code = _codes(first), _codes(second)
     rows = []
