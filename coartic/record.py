@@ -34,7 +34,7 @@ from coartic.method import Information, Meter
 from coartic.model import MotionModel
 from coartic.robot import Hand
 from coartic.solution import Execution, Kind, Movement, execute, other_arm_travel
-from coartic.task import Task, parse_task
+from coartic.task import INITIAL_POLICIES, Task, parse_task
 from coartic.text import LONGEST_REASON, Line, printable
 
 RECORD_FORMAT: Literal[2] = 2
@@ -282,6 +282,7 @@ class Record(Plain):
         reward = None if self.solution is None else self.solution.reward
         learner = self.method.startswith(METHOD_PREFIX)
         spent = self.meter
+        failed = sum(r is None for r in self.rewards)
         laws: Sequence[tuple[bool, str]] = (
             (
                 self.run_id == f"{self.specification.key()}-{self.code}",
@@ -289,6 +290,7 @@ class Record(Plain):
             ),
             ((self.status == "ok") == (reward is not None), "status and solution"),
             ((self.status == "ok") == (not self.reason), "status and reason"),
+            (self.status != "ok" or spent is not None, "it is solved, and nothing was spent"),
             (set(self.used) <= set(self.told), "it used what it was not told"),
             (
                 self.bound is None or self.method.startswith(SEARCH),
@@ -303,12 +305,25 @@ class Record(Plain):
                 "more rewards than trials",
             ),
             (
-                spent is None or sum(r is None for r in self.rewards) <= spent.failed_trials,
+                spent is None or failed <= spent.failed_trials,
                 "more failed rewards than failed trials",
             ),
             (
                 spent is None or -sum(r or 0 for r in self.rewards) <= spent.movement_ticks,
                 "its trials' rewards are more than its ticks",
+            ),
+            (
+                not (learner and spent and self.rewards)
+                or self.specification.task.get("initial_hands") in INITIAL_POLICIES
+                or (spent.trials, spent.failed_trials) == (len(self.rewards), failed),
+                "its counts of trials are not those of its rewards",
+            ),
+            (
+                not (learner and spent and self.rewards)
+                or failed > 0
+                or self.specification.task.get("initial_hands") in INITIAL_POLICIES
+                or spent.movement_ticks == -sum(r or 0 for r in self.rewards),
+                "its ticks are not those of its trials",
             ),
             (
                 not learner or reward == best,
