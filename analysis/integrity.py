@@ -122,7 +122,10 @@ def _check_plan(path: Path, plan: Plan) -> None:
         ours = method.origin == BUILT_IN
         left = {name: method.defaults.get(name) for name in cell.complete if name != "trials"}
         laws = (
-            (len(cell.run_ids) in (1, plan.runs), "has another number of runs"),
+            (
+                len(cell.run_ids) == (plan.runs if method.stochastic else 1),
+                "has another number of runs",
+            ),
             (cell.variant == variant_of(cell.parameters, method.defaults), "has another variant"),
             (cell.complete == {**cell.complete, **cell.parameters}, "has other parameters"),
             (

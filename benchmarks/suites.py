@@ -324,9 +324,7 @@ def _plan(suite: Suite, runs: int, seed: int, planned: Sequence[tuple[Cell, RunS
         tasks={cell.task.name: cell.task.model_dump(mode="json") for cell in cells},
         methods={
             cell.method: DeclaredMethod(
-                **cell.entry.declared.model_dump(
-                    include={"title", "citation", "told", "secondary", "defaults"}
-                ),
+                **cell.entry.declared.model_dump(exclude={"name", "frozen", "quick"}),
                 origin=cell.entry.origin,
                 code=cell.entry.code,
             )

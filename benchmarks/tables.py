@@ -16,9 +16,12 @@ from coartic.tables import Manifest, parquet_options, tables_of
 def write_tables(store: Store, manifest: Manifest) -> dict[str, Record]:
     """Write all tables of a plan from its records, each atomically, and the manifest last.
 
-    Returns the records by run id. Raises CoarticError where the disk does not take them.
+    Returns the records by run id. Raises CoarticError where one contradicts itself, and where
+    the disk does not take a table.
     """
     records = {run_id: store.read(run_id) for run_id in manifest.specification.run_ids}
+    for record in records.values():
+        record.check()
     try:
         for name, table in tables_of(manifest, records).items():
             sink = io.BytesIO()

@@ -22,6 +22,7 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     JsonValue,
@@ -62,6 +63,13 @@ def _is_small(details: dict[str, Any]) -> dict[str, Any]:
     return details
 
 
+def _is_whole(meter: Any) -> Any:
+    missing = isinstance(meter, dict) and Meter().as_dict().keys() - meter.keys()
+    if missing:
+        raise ValueError(f"lacks {', '.join(sorted(missing))}")
+    return meter
+
+
 def _counts(meter: Meter) -> Meter:
     for name, value in meter.as_dict().items():
         if not 0 <= value <= LARGEST_COUNT:
@@ -70,7 +78,7 @@ def _counts(meter: Meter) -> Meter:
 
 
 Details = Annotated[dict[Line, JsonValue], AfterValidator(_is_small)]
-Spent = Annotated[Meter, AfterValidator(_counts)]
+Spent = Annotated[Meter, BeforeValidator(_is_whole), AfterValidator(_counts)]
 
 
 class RecordError(CoarticError):

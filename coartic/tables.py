@@ -110,6 +110,8 @@ class DeclaredMethod(Plain):
     citation: Line
     told: tuple[Information, ...]
     secondary: tuple[Line, ...]
+    stochastic: bool
+    """Whether its cells have as many runs as the plan says; the others have one."""
     defaults: dict[Line, JsonValue]
     """Its parameters; None for one that has no default."""
     origin: Line

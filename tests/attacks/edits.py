@@ -6,8 +6,10 @@ there is to edit is read from the folder itself, so that every column and key ha
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -318,8 +320,10 @@ def manifest_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
     yield one("cells reversed", "cells", change=lambda x: x[::-1])
     yield one("cell doubled", "cells", change=lambda x: [*x, x[0]])
     yield one("cell dropped", "cells", change=lambda x: x[1:])
-    yield one("runs reversed", "run_ids", change=lambda x: x[::-1])
-    yield one("run doubled", "run_ids", change=lambda x: [*x, x[0]])
+    runs = ("cells", 0, "run_ids")
+    yield one("runs reversed", *runs, change=lambda x: x[::-1])
+    yield one("run doubled", *runs, change=lambda x: [*x, x[0]])
+    yield one("run left out", *runs, change=lambda x: x[:-1])
     yield one("variant", "cells", 0, "variant", change=lambda x: "noise_sd=0.1")
     yield one("parameters", "cells", 0, "parameters", change=lambda x: {"noise_sd": 0.1})
     yield one("told all", "methods", "dual-process/EC1", "told", change=lambda x: [*x, "goals"])
@@ -387,7 +391,12 @@ def dropped_everywhere(run_id: str, folder: Path) -> None:
     """A run that nobody should see, left out of every table, the manifest and the records."""
     for name in TABLES[:-1]:
         change_rows(name, lambda rows: [r for r in rows if r["run_id"] != run_id], folder)
-    change_manifest(lambda m: m["specification"]["run_ids"].remove(run_id), folder)
+
+    def leave_out(manifest: dict[str, Any]) -> None:
+        for cell in manifest["specification"]["cells"]:
+            cell["run_ids"] = [other for other in cell["run_ids"] if other != run_id]
+
+    change_manifest(leave_out, folder)
     (folder / "records" / f"{run_id}.json").unlink()
 
 
@@ -428,11 +437,37 @@ def consistent_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
     yield "together/another learning curve", curve
 
 
+UNSEEN = re.compile(
+    r"sealed/manifest/(environment.*|limits/time_s|specification/(suite|methods/\*/(title|citation)))"
+)
+"""Edits of a manifest whose seal was made anew, of words and surroundings that nothing else in a
+folder repeats."""
+
+
+def _sealed(edit: Edit, folder: Path) -> None:
+    """An edit of the manifest by somebody who knows how it is sealed."""
+    edit(folder)
+    path = folder / "manifest.json"
+    content = read_json(path)
+    content.pop("seal", None)
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    content["seal"] = hashlib.sha256(text.encode()).hexdigest()
+    path.write_text(json.dumps(content), encoding="utf-8")
+
+
+def sealed_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
+    """The edits of the manifest, and a run left out everywhere, each with a seal that fits."""
+    harms = {f"manifest/{what}" for what in HARM}
+    for name, edit in (*manifest_edits(folder), *consistent_edits(folder)):
+        if name not in harms and not UNSEEN.fullmatch(f"sealed/{name}"):
+            yield f"sealed/{name}", partial(_sealed, edit)
+
+
 def edits(folder: Path) -> dict[str, Edit]:
     """Every edit of a folder that was made from :data:`SUITE`, by id."""
     return {
         name: edit
-        for kind in (table_edits, manifest_edits, record_edits, consistent_edits)
+        for kind in (table_edits, manifest_edits, record_edits, consistent_edits, sealed_edits)
         for name, edit in kind(folder)
     }
 

@@ -89,59 +89,69 @@ def _learnt(by: int) -> Callable[[Record], None]:
     def change(record: Record) -> None:
         best, reward = record["rewards"].index(_best(record)), _best(record) + by
         record["rewards"][best] = reward
-        record["details"]["best_trial"] = best
 
     return change
 
 
-BETTER = (put("score", "reward", by=10), put("score", "ticks_by_goal", 0, by=-10))
-forge("reward better", put("score", "reward", by=10))
+BETTER = (put("solution", "reward", by=10), put("solution", "ticks_by_goal", 0, by=-10))
+forge("reward better", put("solution", "reward", by=10))
 forge("reward and ticks better", *BETTER)
-forge("reward, ticks and movements better", *BETTER, put("solution", 0, "ticks", by=-10))
+forge(
+    "reward, ticks and movements better", *BETTER, put("solution", "movements", 0, "ticks", by=-10)
+)
 forge(
     "reward, ticks, movements and curve better",
     *BETTER,
-    put("solution", 0, "ticks", by=-10),
+    put("solution", "movements", 0, "ticks", by=-10),
     _learnt(10),
 )
-forge("reward worse", put("score", "reward", by=-10), put("score", "ticks_by_goal", 0, by=10))
+forge(
+    "reward worse", put("solution", "reward", by=-10), put("solution", "ticks_by_goal", 0, by=10)
+)
 forge(
     "ticks moved to another goal",
-    put("score", "ticks_by_goal", to=lambda t: [t[0] - 1, t[1] + 1, *t[2:]]),
+    put("solution", "ticks_by_goal", to=lambda t: [t[0] - 1, t[1] + 1, *t[2:]]),
 )
-forge("movement's ticks", put("solution", 0, "ticks", by=1))
-forge("hands", put("score", "hands", to="LRL"))
+forge("movement's ticks", put("solution", "movements", 0, "ticks", by=1))
+forge("hands", put("solution", "hands", to="LRL"))
 forge(
     "hands of score and movement",
-    put("score", "hands", to=lambda hands: "L" + hands[1:]),
-    put("solution", 0, "hand", to="left"),
+    put("solution", "hands", to=lambda hands: "L" + hands[1:]),
+    put("solution", "movements", 0, "hand", to="left"),
 )
-forge("corrections", put("score", "corrections", to=0), method=GIVEN)
-forge("other arm's travel", put("score", "other_arm_travel", by=0.5))
+forge("corrections", put("solution", "corrections", to=0), method=GIVEN)
+forge("other arm's travel", put("solution", "other_arm_travel", by=0.5))
 for _name, _value in {
     "text": "-300", "float": -300.5, "true": True, "NaN": math.nan, "huge": -(10**30),
     "list": [-300], "positive": 300, "none": None,
 }.items():  # fmt: skip
-    forge(f"reward is {_name}", put("score", "reward", to=_value))
-forge("ticks are text", put("score", "ticks_by_goal", to=["141", "60", "118"]))
-forge("hands are a list", put("score", "hands", to=["R", "R", "R"]))
-forge("score has more", put("score", to=lambda score: {**score, "stars": 5}))
-forge("score lacks hands", gone("score", "hands"))
+    forge(f"reward is {_name}", put("solution", "reward", to=_value))
+forge("ticks are text", put("solution", "ticks_by_goal", to=["141", "60", "118"]))
+forge("hands are a list", put("solution", "hands", to=["R", "R", "R"]))
+forge("score has more", put("solution", to=lambda score: {**score, "stars": 5}))
+forge("score lacks hands", gone("solution", "hands"))
 
-forge("replay better", put("details", "replay_reward", by=20))
-forge("replay's hands", put("details", "replay_hands", to="LLL"))
-forge("initial reward worse", put("details", "initial_reward", by=-30))
+forge("replay better", put("replay", "reward", by=20))
+forge("replay's hands", put("replay", "hands", to="LLL"))
+forge("initial reward worse", put("initial", "reward", by=-30))
 forge(
     "initial reward worse, in the curve too",
-    put("details", "initial_reward", by=-30),
+    put("initial", "reward", by=-30),
     put("rewards", 0, by=-30),
 )
-forge("initial hands", put("details", "initial_hands", to="LLL"))
-forge("best trial is another", put("details", "best_trial", by=1))
-forge("best trial is beyond the last", put("details", "best_trial", to=10**6))
-forge("learner's details gone", put("details", to={}))
-forge("replay is text", put("details", "replay_reward", to="x"))
-forge("replay is none", put("details", "replay_reward", to=None))
+forge("initial hands", put("initial", "hands", to="LLL"))
+forge("replay gone", put("replay", to=None), unseen=PERFORM)
+forge("initial gone", put("initial", to=None))
+forge("replay's movement", put("replay", "movements", 0, "target", 7, by=0.1))
+forge("initial's movement", put("initial", "movements", 0, "target", 7, by=0.1))
+forge("initial is the solution", lambda record: record.update(initial=record["solution"]))
+forge(
+    "replay is the solution",
+    lambda record: record.update(replay=record["solution"]),
+    unseen=PERFORM,
+)
+forge("replay is text", put("replay", "reward", to="x"))
+forge("replay is none", put("replay", "reward", to=None))
 
 forge("a better trial", put("rewards", 5, by=300))
 forge("a trial more", put("rewards", to=lambda r: [*r, r[-1]]))
@@ -162,8 +172,8 @@ forge("a trial that is a list", put("rewards", 3, to=[-320]))
 forge("rewards are text", put("rewards", to="none"))
 forge("a worse trial", put("rewards", 7, by=-40), unseen=PERFORM)
 
-JOINT = ("solution", 1, "right_2")
-forge("solution by 1e-3", put(*JOINT, by=1e-3))
+JOINT = ("solution", "movements", 1, "target", 7)  # right_2
+forge("solution by 1e-3", put(*JOINT, by=1e-3), unseen=PERFORM)
 forge("solution by 0.1", put(*JOINT, by=0.1))
 forge("solution by an ulp", put(*JOINT, to=other), unseen=PERFORM)
 forge("joint is NaN", put(*JOINT, to=math.nan))
@@ -172,48 +182,58 @@ forge("joint is huge", put(*JOINT, to=1e300))
 forge("joint so far that executing it takes years", put(*JOINT, to=1e13))
 forge("joint is text", put(*JOINT, to="0.1"))
 forge("joint is missing", gone(*JOINT))
-forge("a joint more", put("solution", 1, to=lambda m: {**m, "left_9": 0.0}))
-forge("movement dropped", put("solution", to=lambda s: s[:-1]))
-forge("movement doubled", put("solution", to=lambda s: [s[0], *s]))
-forge("movements reversed", put("solution", to=lambda s: s[::-1]))
-forge("no movements", put("solution", to=[]))
-forge("order", put("solution", 0, "order", to=2))
-forge("goal that is not there", put("solution", 0, "goal", to=99))
-forge("goal is text", put("solution", 0, "goal", to="1"))
-forge("hand that is not there", put("solution", 0, "hand", to="third"))
-forge("kind unknown", put("solution", 0, "kind", to="teleport"))
+forge("a joint more", put("solution", "movements", 1, "target", to=lambda q: [*q, 0.0]))
+forge("movement dropped", put("solution", "movements", to=lambda s: s[:-1]))
+forge("movement doubled", put("solution", "movements", to=lambda s: [s[0], *s]))
+forge("movements reversed", put("solution", "movements", to=lambda s: s[::-1]))
+forge("no movements", put("solution", "movements", to=[]))
+forge("goal that is not there", put("solution", "movements", 0, "goal", to=99))
+forge("goal is text", put("solution", "movements", 0, "goal", to="1"))
+forge("hand that is not there", put("solution", "movements", 0, "hand", to="third"))
+forge("kind unknown", put("solution", "movements", 0, "kind", to="teleport"))
 forge(
     "kind another",
-    put("solution", 0, "kind", to=lambda k: "planned" if k == "corrective" else "corrective"),
+    put(
+        "solution",
+        "movements",
+        0,
+        "kind",
+        to=lambda k: "planned" if k == "corrective" else "corrective",
+    ),
     method=GIVEN,
 )
-forge("movement's ticks negative", put("solution", 0, "ticks", to=-5))
-forge("movement's ticks huge", put("solution", 0, "ticks", to=10**30))
+forge("movement's ticks negative", put("solution", "movements", 0, "ticks", to=-5))
+forge("movement's ticks huge", put("solution", "movements", 0, "ticks", to=10**30))
 forge("solution is a text", put("solution", to="straight ahead"))
-forge("movement is a list", put("solution", 0, to=[1, 2]))
-forge("waypoint moved", put("solution", 0, "waypoints", 3, "right_2", by=0.05), method=PATHS)
-forge("last waypoint moved", put("solution", 0, "waypoints", -1, "right_2", by=0.05), method=PATHS)
-forge("waypoints gone", put("solution", 0, "waypoints", to=[]), method=PATHS)
-forge("waypoint is none", put("solution", 0, "waypoints", 3, to=None), method=PATHS)
-forge("waypoints where there are none", put("solution", 0, to=lambda m: {**m, "waypoints": []}))
+forge("movement is a list", put("solution", "movements", 0, to=[1, 2]))
+forge("waypoint moved", put("solution", "movements", 0, "waypoints", 3, 7, by=0.05), method=PATHS)
+forge(
+    "last waypoint moved",
+    put("solution", "movements", 0, "waypoints", -1, 7, by=0.05),
+    method=PATHS,
+)
+forge("waypoints gone", put("solution", "movements", 0, "waypoints", to=[]), method=PATHS)
+forge("waypoint is none", put("solution", "movements", 0, "waypoints", 3, to=None), method=PATHS)
+forge(
+    "waypoints where there are none",
+    put("solution", "movements", 0, to=lambda m: {**m, "waypoints": []}),
+)
 
 forge("status unknown", put("status", to="perfect"))
 forge("status is a number", put("status", to=7))
 forge("status is none", put("status", to=None))
-forge("ok without score", put("score", to=None))
+forge("ok without score", put("solution", to=None))
 forge("crashed with a score", put("status", to="crashed"), put("reason", to="x"))
 forge(
     "crashed without a reason",
     put("status", to="crashed"),
-    put("score", to=None),
-    put("solution", to=[]),
+    put("solution", to=None),
 )
 forge(
     "a bad run hidden as a timeout",
     put("status", to="timeout"),
     put("reason", to="time limit of 600 s exceeded"),
-    put("score", to=None),
-    put("solution", to=[]),
+    put("solution", to=None),
     put("details", to={}),
     put("rewards", to=[]),
     put("meter", to=None),
@@ -225,32 +245,28 @@ forge(
     "reason with an escape sequence",
     put("reason", to="\x1b[2J"),
     put("status", to="crashed"),
-    put("score", to=None),
-    put("solution", to=[]),
+    put("solution", to=None),
 )
 forge(
     "reason of a megabyte",
     put("reason", to="r" * 2**20),
     put("status", to="crashed"),
-    put("score", to=None),
-    put("solution", to=[]),
+    put("solution", to=None),
 )
 forge("reason is a number", put("reason", to=7))
 
 forge("details are a list", put("details", to=[1]))
 forge("details are text", put("details", to="x"))
 forge("details of a megabyte", put("details", to=lambda d: {**d, "more": "d" * 2**20}))
-forge("a bound of the learner's", put("details", to=lambda d: {**d, "proven_bound": -100}))
-forge(
-    "a bound of another's", put("details", to=lambda d: {**d, "proven_bound": -319}), method=GIVEN
-)
-forge("bound below the reward", put("details", "proven_bound", to=-1000), method=OPTIMUM)
-forge("bound one below the reward", put("details", "proven_bound", by=-1), method=OPTIMUM)
-forge("bound is text", put("details", "proven_bound", to="tight"), method=OPTIMUM)
-forge("bound is a fraction", put("details", "proven_bound", to=-291.5), method=OPTIMUM)
-forge("bound is true", put("details", "proven_bound", to=True), method=OPTIMUM)
-forge("bound is huge", put("details", "proven_bound", to=10**30), method=OPTIMUM)
-forge("a weaker bound", put("details", "proven_bound", by=20), method=OPTIMUM, unseen=PERFORM)
+forge("a bound of the learner's", put("bound", to=-100))
+forge("a bound of another's", put("bound", to=-319), method=GIVEN)
+forge("bound below the reward", put("bound", to=-1000), method=OPTIMUM)
+forge("bound one below the reward", put("bound", by=-1), method=OPTIMUM)
+forge("bound is text", put("bound", to="tight"), method=OPTIMUM)
+forge("bound is a fraction", put("bound", to=-291.5), method=OPTIMUM)
+forge("bound is true", put("bound", to=True), method=OPTIMUM)
+forge("bound is huge", put("bound", to=10**30), method=OPTIMUM)
+forge("a weaker bound", put("bound", by=20), method=OPTIMUM, unseen=PERFORM)
 
 forge("told nothing", put("told", to=[]))
 forge("told all", put("told", to=lambda told: sorted([*told, "goals", "Jacobian"])))
@@ -263,7 +279,7 @@ forge("meter is text", put("meter", "jacobians", to="few"))
 forge("meter is a fraction", put("meter", "jacobians", to=0.5))
 forge("meter is huge", put("meter", "jacobians", to=10**30))
 forge("no meter though it is ok", put("meter", to=None))
-forge("a counter less", gone("meter", "jacobians"))
+forge("a counter is missing", gone("meter", "jacobians"))
 forge("fewer Jacobians", put("meter", "jacobians", by=-1), unseen=PERFORM)
 
 SPECIFICATION = "specification"
@@ -308,7 +324,7 @@ forge("packages are a list", put("environment", "packages", to=[1]))
 forge("environment is none", put("environment", to=None))
 
 forge("a key more", lambda record: record.update(stars=5))
-for _key in ("score", "solution", "rewards", "details", "meter", "timing", "environment", "told"):
+for _key in ("solution", "replay", "rewards", "details", "meter", "timing", "environment", "told"):
     forge(f"no {_key}", gone(_key))
 
 
@@ -348,10 +364,9 @@ def forge_in(folder: Path, forgery: Forgery) -> Path:
 
 def solution_of_another(record: Record, source: Record) -> None:
     """The solution of one method under the name of another, with all that goes with it."""
-    for key in ("solution", "score"):
-        record[key] = copy.deepcopy(source[key])
-    record["rewards"][3] = record["score"]["reward"]
-    record["details"]["best_trial"] = 3
+    record["solution"] = copy.deepcopy(source["solution"])
+    record["rewards"][3] = record["solution"]["reward"]
+    record["meter"]["movement_ticks"] = -sum(record["rewards"])
 
 
 def says(folder: Path) -> dict[str, list[dict[str, Any]]]:
