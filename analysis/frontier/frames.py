@@ -379,8 +379,8 @@ def _bootstrap_mean(values: Array, seed: int) -> tuple[Array, Array, Array]:
     if len(values) < 2:
         nothing = np.full(values.shape[1], math.nan)
         return values.mean(axis=0), nothing, nothing
-    draws = _draws(len(values), seed)
-    weights = (draws[:, :, None] == np.arange(len(values))).mean(axis=1)
+    drawn = [np.bincount(draw, minlength=len(values)) for draw in _draws(len(values), seed)]
+    weights = np.array(drawn) / len(values)
     means = spread.within(weights @ values, values)
     tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(means, [tail, 1 - tail], axis=0)

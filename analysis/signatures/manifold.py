@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
-from analysis.inference.spread import mean, sd
+from analysis.inference.spread import sd
 from analysis.inference.statistics import CONFIDENCE
 from coartic import Hand, Task
 from coartic.robot import Array
@@ -105,8 +105,11 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     free, bound = null.shape[1], complement.shape[1]
     nothing = Synergy(*[math.nan] * 8)
     n = len(configurations)
-    lines = int(np.linalg.matrix_rank(configurations - mean(configurations)))
-    if not lines or not free or not bound:
+    if n < 2 or not free or not bound:
+        return nothing
+    # From a run, not from the mean, which rounding takes off the line that two postures make.
+    lines = int(np.linalg.matrix_rank(configurations - configurations[0]))
+    if not lines:
         return nothing
     parts = [configurations @ basis for basis in (null, complement)]
     sums = [float(((part - part.mean(axis=0)) ** 2).sum()) for part in parts]
