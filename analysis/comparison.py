@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.inference.equivalence import MARGIN, difference
+from analysis.inference.spread import sd
 from analysis.inference.statistics import CONFIDENCE
 from analysis.methods import methods_notes, methods_tables
 from analysis.published import (
@@ -260,7 +261,7 @@ def _summary_text(summary: Summary | None) -> str:
 def _mean_sd(rewards: Rewards) -> str:
     if len(rewards) == 0:
         return f"{NONE} (0)"
-    spread = f" ± {np.std(rewards, ddof=1):.1f}" if len(rewards) > 1 else ""
+    spread = f" ± {sd(rewards):.1f}" if len(rewards) > 1 else ""
     return f"{np.mean(rewards):.1f}{spread} ({len(rewards)})"
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.inference.spread import sd
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import Optimum, locks_base, optima
 from analysis.results import CellRuns, Results
@@ -149,7 +150,7 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
         "runs": len(cell.runs),
         "solved": len(good),
         "reward": mean,
-        "reward_sd": float(np.std(rewards, ddof=1)) if len(rewards) > 1 else math.nan,
+        "reward_sd": sd(rewards),
         "gap": best.reward - mean if best else math.nan,
         "gap_share": (best.reward - mean) / -best.reward if best and best.reward else math.nan,
         "gap_still": best_still.reward - mean if best_still else math.nan,

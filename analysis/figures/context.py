@@ -82,9 +82,10 @@ def context(
         len(places), 1, squeeze=False, sharex=True,
         height_ratios=[len(group) + 1 for _, group in places],
     )[:, 0]  # fmt: skip
+    farthest = float(data[["equivalent", "other"]].max().max()) or 1.0  # all the same: any scale
     for axes, ((task, where), group) in zip(panels, places, strict=True):
         _panel(axes, group)
-        axes.set_xlim(0, 1.12 * data[["equivalent", "other"]].max().max())
+        axes.set_xlim(0, 1.12 * farthest)
         axes.set_title(textwrap.fill(f"{task}: {where}", 31))
     panels[-1].set_xlabel("difference per root of dimension\n(length unit, rad)")
     if len(places) > 1:

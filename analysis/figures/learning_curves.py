@@ -183,7 +183,7 @@ def _panel(
     axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
     if log:
         log_axis(axes)
-    axes.set_xlim(1, data.trial.max())
+    axes.set_xlim(1, max(2, data.trial.max()))
     axes.set_title(heading(task))
 
 

@@ -90,7 +90,8 @@ def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
     columns = "method signature value places unit why_not"
     data = pd.DataFrame(rows, columns=columns.split())
     by_name = data.groupby("signature").value
-    spread = by_name.transform("std").replace(0.0, math.nan)
+    differ = by_name.transform("min") < by_name.transform("max")
+    spread = by_name.transform("std").where(differ)
     standard = (data.value - by_name.transform("mean")) / spread
     return data.assign(standardised=standard.where(data.value.isna(), standard.fillna(0.0)))
 

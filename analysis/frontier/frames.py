@@ -18,6 +18,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from analysis.frontier.progress import SPENDS, Progress, progress
+from analysis.inference import spread
 from analysis.inference.statistics import CONFIDENCE
 from analysis.inference.survival import kaplan_meier_median
 from analysis.methods import STILL, methods_frame, solve_times
@@ -378,12 +379,12 @@ def _bootstrap_mean(values: Array, seed: int) -> tuple[Array, Array, Array]:
     if len(values) < 2:
         nothing = np.full(values.shape[1], math.nan)
         return values.mean(axis=0), nothing, nothing
-    draws = _draws(len(values), seed)
-    weights = (draws[:, :, None] == np.arange(len(values))).mean(axis=1)
-    means = weights @ values
+    drawn = [np.bincount(draw, minlength=len(values)) for draw in _draws(len(values), seed)]
+    weights = np.array(drawn) / len(values)
+    means = spread.within(weights @ values, values)
     tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(means, [tail, 1 - tail], axis=0)
-    return values.mean(axis=0), low, high
+    return spread.mean(values), low, high
 
 
 @cache

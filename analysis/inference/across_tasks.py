@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from analysis.inference import spread
 from analysis.inference.statistics import (
     CONFIDENCE,
     RESAMPLES,
@@ -150,7 +151,7 @@ def task_mean(
     """
 
     def statistic(*strata: Array, axis: int = -1) -> Array:
-        return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
+        return np.asarray(sum(spread.mean(runs, axis) for runs in strata) / len(strata))
 
     return bootstrap_estimate(
         f"mean over {len(values)} tasks, stratified",

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
+from analysis.inference.spread import mean, variance
 from analysis.inference.statistics import (
     CONFIDENCE,
     FEWEST,
@@ -64,7 +65,7 @@ def difference(ours: ArrayLike, published: Summary, *, margin: float | None = No
     point.
     """
     values = sample(ours)
-    value = float(values.mean()) - published.mean
+    value = float(mean(values)) - published.mean
     margin = MARGIN * abs(published.mean) if margin is None else _positive(margin)
     spread = published.sd is not None and published.runs > 1
     found = Equivalence(
@@ -77,7 +78,7 @@ def difference(ours: ArrayLike, published: Summary, *, margin: float | None = No
     )
     if len(values) < 2:
         return replace(found, note="no interval: fewer than 2 values")
-    variances = [float(values.var(ddof=1)) / len(values)]
+    variances = [float(variance(values)) / len(values)]
     freedoms = [len(values) - 1]
     if published.sd is not None and spread:
         variances.append(published.sd**2 / published.runs)
@@ -109,7 +110,7 @@ def bootstrap_equivalence(
     values in a sample: no interval. No spread in any: a point.
     """
     samples, margin = samples_of(first, second), _positive(margin)
-    means = [float(values.mean()) for values in samples]
+    means = [float(mean(values)) for values in samples]
     value = means[0] - sum(means[1:])
     found = Equivalence(
         estimate=value,

@@ -29,6 +29,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import optimize, special, stats
 
+from analysis.inference import spread
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
@@ -343,7 +344,7 @@ def middle_mean(values: Array, axis: int = -1, weights: Array | None = None) -> 
     ends = np.cumsum((shares / shares.sum())[order], axis=-1)
     starts = np.concatenate([np.zeros_like(ends[..., :1]), ends[..., :-1]], axis=-1)
     inside = np.clip(ends, 0.25, 0.75) - np.clip(starts, 0.25, 0.75)
-    return np.asarray((inside * ordered).sum(axis=-1) / inside.sum(axis=-1))
+    return spread.within((inside * ordered).sum(axis=-1) / inside.sum(axis=-1), values, -1)
 
 
 def higher(first: Array, second: Array) -> Array:
@@ -410,7 +411,7 @@ def permutation_test(
     a, b = sample(first), sample(second)
     exact = math.comb(len(a) + len(b), len(a)) <= resamples
     found = Inference(
-        float(a.mean() - b.mean()),
+        float(_difference(a, b)),
         (len(a), len(b)),
         f"{_TAILS[alternative]} {_drawn(exact, resamples)} permutation test, studentised",
     )
@@ -446,7 +447,7 @@ def sign_flip_test(
     differences = _differences(first, second) if np.ndim(second) else samples_of(first, second)[0]
     exact = 2 ** len(differences) <= resamples
     found = Inference(
-        float(differences.mean()),
+        float(_mean(differences)),
         (len(differences),),
         f"{_TAILS[alternative]} {_drawn(exact, resamples)} sign-flip test of paired differences",
     )
@@ -497,7 +498,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 def standard_error(samples: tuple[Array, ...]) -> float:
     """Of the mean of one sample, or of the difference of two; a variance for each."""
-    return math.sqrt(sum(float(values.var(ddof=1)) / len(values) for values in samples))
+    return math.sqrt(sum(float(spread.variance(values)) / len(values) for values in samples))
 
 
 def studentised_null(
@@ -510,10 +511,10 @@ def studentised_null(
     centre = float(np.concatenate(samples).mean())
     difference, variance = np.zeros(resamples), np.zeros(resamples)
     for values, sign in zip(samples, (1, -1), strict=False):
-        shifted = values - values.mean() + (centre if len(samples) > 1 else 0.0)
+        shifted = values - spread.mean(values) + (centre if len(samples) > 1 else 0.0)
         drawn = shifted[rng.integers(len(values), size=(resamples, len(values)))]
-        difference += sign * drawn.mean(axis=1)
-        variance += drawn.var(axis=1, ddof=1) / len(values)
+        difference += sign * spread.mean(drawn, 1)
+        variance += spread.variance(drawn, 1) / len(values)
     return _ratio(difference, variance)
 
 
@@ -524,9 +525,9 @@ def _ratio(difference: Array, variance: Array) -> Array:
 
 def _bounded_t(first: Array, second: Array, axis: int = -1) -> Array:
     """Welch's t through the arc tangent: the same order, and no infinity to trip scipy."""
-    variance = first.var(axis, ddof=1) / first.shape[axis]
-    variance = variance + second.var(axis, ddof=1) / second.shape[axis]
-    return np.asarray(np.arctan(_ratio(first.mean(axis) - second.mean(axis), variance)))
+    variance = spread.variance(first, axis) / first.shape[axis]
+    variance = variance + spread.variance(second, axis) / second.shape[axis]
+    return np.asarray(np.arctan(_ratio(_difference(first, second, axis=axis), variance)))
 
 
 def _p_value(null: Array, observed: Array, alternative: Alternative) -> float:
@@ -573,7 +574,7 @@ def _differences(first: ArrayLike, second: ArrayLike) -> Array:
 
 
 def _mean(values: Array, axis: int = -1) -> Array:
-    return np.asarray(values.mean(axis))
+    return spread.mean(values, axis)
 
 
 def _difference(*groups: Array, axis: int = -1) -> Array:

@@ -27,6 +27,7 @@ import pandas as pd
 
 from analysis.frontier.frames import SHARES
 from analysis.inference.sample_size import runs_needed, smallest_difference
+from analysis.inference.spread import sd
 from analysis.inference.statistics import (
     Inference,
     bootstrap_test,
@@ -162,8 +163,8 @@ def _row(study: Study, pair: Pair) -> dict[str, Any]:
         "n_second": len(b),
         "mean_first": _mean(a),
         "mean_second": _mean(b),
-        "sd_first": _sd(a),
-        "sd_second": 0.0 if pair.known and len(b) else _sd(b),
+        "sd_first": sd(a),
+        "sd_second": 0.0 if pair.known and len(b) else sd(b),
     }
     row |= _inference(pair, a, b)
     first, second = (study.methods[task, cell.label] for cell in (pair.first, pair.second))
@@ -258,7 +259,3 @@ def _letters(told: set[str]) -> str:
 
 def _mean(values: Array) -> float:
     return float(values.mean()) if len(values) else math.nan
-
-
-def _sd(values: Array) -> float:
-    return float(values.std(ddof=1)) if len(values) > 1 else math.nan

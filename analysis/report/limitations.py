@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from analysis.inference.sample_size import POWER, smallest_difference
+from analysis.inference.spread import sd
 from analysis.inference.statistics import FEWEST
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
@@ -148,10 +149,10 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
         rewards = cell.good.reward.to_numpy(dtype=np.float64)
         if len(rewards) < 2 or best is None or not best.reward or cell.variant:
             continue
-        sd = float(np.std(rewards, ddof=1))
-        if sd == 0 or label.removeprefix(LEARNER) not in ("EC1", "EC2", "EC3", "EC4"):
+        spread = sd(rewards)
+        if spread == 0 or label.removeprefix(LEARNER) not in ("EC1", "EC2", "EC3", "EC4"):
             continue
-        ticks = smallest_difference(sd, sd, len(rewards))
+        ticks = smallest_difference(spread, spread, len(rewards))
         found.append(
             f"{task} {label.removeprefix(LEARNER)} {ticks:.1f} ticks "
             f"({_percent(ticks / -best.reward, 1)}, n = {len(rewards)})"

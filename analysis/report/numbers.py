@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.inference.spread import sd
 from analysis.inference.statistics import (
     Inference,
     difference_of_means,
@@ -249,11 +250,10 @@ def _cell(
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
     found = mean(rewards, seed=SEED)
     who = f"{label} on {task}"
-    spread = float(np.std(rewards, ddof=1)) if len(rewards) > 1 else math.nan
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
     yield Number(
         f"{PREFIX}{name}Reward", f"mean learned reward{solved}", found.estimate, 1,
-        "ticks", found.low, found.high, spread, len(rewards),
+        "ticks", found.low, found.high, sd(rewards), len(rewards),
         _how(found), (key,), who,
     )  # fmt: skip
     if cell.variant:

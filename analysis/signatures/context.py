@@ -15,11 +15,10 @@ from itertools import combinations
 
 import numpy as np
 
+from analysis.inference.spread import mean
 from analysis.signatures.permutation import RESAMPLES, divisions, p_values
 from coartic import Task
 from coartic.robot import Array
-
-_SAME = 1e-12  # spread below which configurations are the same but for rounding
 
 
 def shared_goals(first: Task, second: Task) -> int:
@@ -47,7 +46,7 @@ def distance(first: Array, second: Array) -> float:
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Mixed units (see the module).
     """
-    return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
+    return float(np.linalg.norm(mean(first) - mean(second)))
 
 
 def context_dependence(first: Array, second: Array) -> float:
@@ -61,9 +60,9 @@ def context_dependence(first: Array, second: Array) -> float:
     freedom = len(first) + len(second) - 2
     if freedom < 1:
         return math.nan
-    squares = sum(((group - group.mean(axis=0)) ** 2).sum() for group in (first, second))
+    squares = sum(((group - mean(group)) ** 2).sum() for group in (first, second))
     spread = float(np.sqrt(squares / freedom))
-    return distance(first, second) / spread if spread > _SAME else math.nan
+    return distance(first, second) / spread if spread else math.nan
 
 
 def permutation_p(
@@ -84,19 +83,24 @@ def permutation_p(
     """
     if min(len(first), len(second)) < 2:
         return math.nan
-    if basis is not None:
-        first, second = first @ basis, second @ basis
-    return float(_apart(first[:, None], second[:, None], rng, resamples)[0])
+    return float(_apart(first[:, None], second[:, None], rng, resamples, basis)[0])
 
 
-def _apart(first: Array, second: Array, rng: np.random.Generator, resamples: int) -> Array:
+def _apart(
+    first: Array,
+    second: Array,
+    rng: np.random.Generator,
+    resamples: int,
+    basis: Array | None = None,
+) -> Array:
     """p-value at each of k ticks, shape ``(k,)``; groups have shape ``(runs, k, dof)``.
 
     Runs are permuted as wholes: the same divisions at every tick.
     """
     pool = np.concatenate([first, second])
-    pool = pool - pool.mean(axis=0)
-    pool[:, np.ptp(pool, axis=0) < _SAME] = 0.0
+    pool = pool - mean(pool)
+    if basis is not None:
+        pool = pool @ basis
     weights, exact = divisions(len(first), len(second), rng, resamples)
     own = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
     flat = pool.reshape(len(pool), -1)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.inference import spread
 from analysis.results import Results
 from analysis.signatures.cell import Cell, cells_of, last_ticks, postures
 from analysis.signatures.context import (
@@ -261,10 +262,12 @@ def _synergies(cell: Cell) -> Iterator[Signature]:
         hand = runs[0].hands[number - 1]
         joints = movable(task, hand)
         q = postures(runs, number)
-        found = synergy(q[:, joints], task.robot.jacobian(q.mean(axis=0), hand)[:, joints])
+        found = synergy(q[:, joints], task.robot.jacobian(spread.mean(q), hand)[:, joints])
         where = f"{goal}, {hand} hand, {runs[0].execution.hands}"
         why = "runs do not differ" if math.isnan(found.z) else ""
-        untested = why or ("fewer than three runs" if len(runs) < 3 else "")
+        untested = why
+        if not why and math.isnan(found.p):
+            untested = "fewer than three runs" if len(runs) < 3 else "runs differ along one line"
         squared = f"squared ({MIXED})"
         n = len(runs)
         yield Signature(names[0], where, found.within, n=n, unit=squared, why_not=why)
@@ -324,18 +327,20 @@ def _of_contexts(
     pooled = np.concatenate(q)
     few = min(map(len, q)) < 2
     why = "one run a context: no spread within contexts, no test" if few else ""
-    spread = context_dependence(q[0], q[1])
-    if not few and math.isnan(spread):
+    dependence = context_dependence(q[0], q[1])
+    if not few and math.isnan(dependence):
         why = "runs do not differ within contexts"
 
     def p(name: str, basis: Array | None = None) -> float:
         return math.nan if few else permutation_p(q[0], q[1], _rng(seed, name, where), basis=basis)
 
     yield Signature(CONTEXT[0], where, distance(q[0], q[1]), n=n, unit=MIXED)
-    yield Signature(CONTEXT[1], where, spread, p=p(CONTEXT[1]), n=n, unit="pooled SD", why_not=why)
+    yield Signature(
+        CONTEXT[1], where, dependence, p=p(CONTEXT[1]), n=n, unit="pooled SD", why_not=why
+    )
     joints = movable(task, hand)
-    jacobian = task.robot.jacobian(pooled.mean(axis=0), hand)[:, joints]
-    difference = q[0].mean(axis=0) - q[1].mean(axis=0)
+    jacobian = task.robot.jacobian(spread.mean(pooled), hand)[:, joints]
+    difference = spread.mean(q[0]) - spread.mean(q[1])
     parts = motor_equivalence(difference[joints], jacobian)
     for name, value, basis in zip(CONTEXT[2:4], parts, subspaces(jacobian), strict=True):
         whole = np.zeros((task.robot.dof, basis.shape[1]))

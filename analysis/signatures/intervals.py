@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from analysis.inference import spread
 from analysis.inference.statistics import CONFIDENCE
 
 
@@ -22,12 +23,16 @@ class Interval(NamedTuple):
 
 
 def mean(values: ArrayLike) -> Interval:
-    """Mean of values (n,) with Student's interval; without one for a single value."""
+    """Mean of values (n,) with Student's interval; without one for a single value.
+
+    Of equal values the interval is that point.
+    """
     known = np.asarray(values, dtype=np.float64)
-    centre = float(known.mean())
+    centre = float(spread.mean(known))
     if len(known) < 2:
         return Interval(centre, math.nan, math.nan)
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(known) - 1) * stats.sem(known))
+    error = spread.sd(known) / math.sqrt(len(known))
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(known) - 1)) * error
     return Interval(centre, centre - half, centre + half)
 
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from analysis.inference.spread import mean
 from analysis.inference.statistics import CONFIDENCE
 from analysis.signatures.permutation import orders, p_values
 from coartic import Task
@@ -26,7 +27,6 @@ from coartic.robot import Array
 
 LEAST = 3
 """Positions of the moving goal that make a family."""
-_SAME = 1e-12  # spread below which configurations are the same but for rounding
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
     reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(x) - 2))
     slopes = []
     for joint in means.T:
-        if np.ptp(joint) < _SAME:
+        if np.ptp(joint) == 0:
             slopes.append(Slope(0.0, 0.0, 0.0, 1.0))
             continue
         fit = stats.linregress(x, joint)
@@ -141,8 +141,7 @@ def slope_norm(
     position. Raises ValueError for fewer than three positions.
     """
     x, means = _by_position(configurations, positions)
-    means = means - means.mean(axis=0)
-    means[:, np.ptp(means, axis=0) < _SAME] = 0.0
+    means = means - mean(means)
     centred = x - x.mean()
     weights = centred / (centred**2).sum()
     ways, exact = orders(len(x), rng)
@@ -156,6 +155,4 @@ def _by_position(configurations: Array, positions: Sequence[float] | Array) -> t
     places, of_run = np.unique(np.asarray(positions, dtype=np.float64), return_inverse=True)
     if len(places) < LEAST:
         raise ValueError(f"a slope needs {LEAST} positions of a goal that moves")
-    means = np.zeros((len(places), configurations.shape[1]))
-    np.add.at(means, of_run, configurations)
-    return places, means / np.bincount(of_run)[:, None]
+    return places, np.array([mean(configurations[of_run == k]) for k in range(len(places))])

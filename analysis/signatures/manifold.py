@@ -13,9 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
+from analysis.inference.spread import sd
 from analysis.inference.statistics import CONFIDENCE
 from coartic import Hand, Task
 from coartic.robot import Array
+
+_PROJECTED = 1e-24
+"""Sum of squares that rounding alone leaves of a projection."""
 
 
 def movable(task: Task, hand: Hand) -> Array:
@@ -71,7 +75,7 @@ class Synergy(NamedTuple):
     z: float
     """Fisher-like transform of ΔV, -∞ to ∞."""
     low: float
-    """Interval of z at 95 %; NaN below three runs."""
+    """Interval of z at 95 %; NaN where the jackknife has nothing to go by."""
     high: float
     neutral: float
     """z where both variances are equal, ½ ln(d_ucm/d_ort)."""
@@ -91,9 +95,11 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     they allow correlated joints and unequal variances within either space; with markedly
     skewed scatter about 7 % of nulls are rejected at 5 % (analysis/signatures/nulls.py).
 
-    All NaN below two runs, for a space of dimension 0 and where runs do not differ. Caveat: a
-    hit confines the hand to the goal's disc, so some ΔV > 0 comes from the task's geometry
-    alone; compare methods, and less so with zero.
+    All NaN below two runs, for a space of dimension 0 and where runs do not differ, or differ
+    in one of the spaces only. No interval and no test where they differ along one line (as any
+    two do): without whichever run, z is the same. Caveat: a hit confines the hand to the goal's
+    disc, so some ΔV > 0 comes from the task's geometry alone; compare methods, and less so with
+    zero.
     """
     null, complement = subspaces(jacobian)
     free, bound = null.shape[1], complement.shape[1]
@@ -101,30 +107,35 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     n = len(configurations)
     if n < 2 or not free or not bound:
         return nothing
+    # From a run, not from the mean, which rounding takes off the line that two postures make.
+    lines = int(np.linalg.matrix_rank(configurations - configurations[0]))
+    if not lines:
+        return nothing
     parts = [configurations @ basis for basis in (null, complement)]
     sums = [float(((part - part.mean(axis=0)) ** 2).sum()) for part in parts]
-    if min(sums) <= 1e-24:
+    if min(sums) <= _PROJECTED:
         return nothing
     within, orthogonal = sums[0] / (n - 1) / free, sums[1] / (n - 1) / bound
     delta = (within - orthogonal) * (free + bound) / (free * within + bound * orthogonal)
     z = 0.5 * math.log(sums[0] / sums[1])
     neutral = 0.5 * math.log(free / bound)
-    if n < 3:
-        return Synergy(within, orthogonal, delta, z, math.nan, math.nan, neutral, math.nan)
+    untested = Synergy(within, orthogonal, delta, z, math.nan, math.nan, neutral, math.nan)
     left = [_leave_one_out(part, total) for part, total in zip(parts, sums, strict=True)]
-    if min(map(np.min, left)) <= 1e-24:
-        return Synergy(within, orthogonal, delta, z, math.nan, math.nan, neutral, math.nan)
+    if lines < 2 or min(map(np.min, left)) <= _PROJECTED:
+        return untested
     pseudo = n * z - (n - 1) * 0.5 * np.log(left[0] / left[1])
     # About the full sample's z, not the pseudo-values' mean, so that the interval holds it.
-    error = float(pseudo.std(ddof=1)) / math.sqrt(n)
+    error = sd(pseudo) / math.sqrt(n)
+    if not error:
+        return untested
     reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * error
     p = 2.0 * float(stats.t.sf(abs(z - neutral) / error, n - 1))
     return Synergy(within, orthogonal, delta, z, z - reach, z + reach, neutral, p)
 
 
 def _leave_one_out(part: Array, total: float) -> Array:
-    """Sum of squares about the mean without each of the runs in turn."""
+    """Sum of squares about the mean without each of the runs in turn; 0 for its rounding."""
     n = len(part)
     own = ((part - part.mean(axis=0)) ** 2).sum(axis=1)
     rest: Array = total - own * n / (n - 1)
-    return rest
+    return np.where(rest > n * np.finfo(np.float64).eps * total, rest, 0.0)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import pandas as pd
 
 from analysis.inference.statistics import holm
+from analysis.signatures.frame import NO_RUN
 from analysis.study import Study
 from analysis.table import NONE, Table
 from coartic import Task
@@ -108,8 +110,8 @@ def signatures_page(study: Study) -> str:
             ("Synergy: ΔV z", _SYNERGY, _synergy(task, own)),
             ("Synergy: V_ucm, V_ort and ΔV", _VARIANCE, _variance(task)),
         ]
-        for title, text, columns in tables:
-            parts += _by_method(title, text, own, labels[name], columns)
+        found = [_by_method(title, text, own, labels[name], cols) for title, text, cols in tables]
+        parts += list(chain.from_iterable(found)) or [f"{NO_RUN.capitalize()}."]
     parts += _contexts(frame, labels)
     parts += _slopes(frame, labels)
     if any(task.reconstructed for task in study.results.tasks.values()):

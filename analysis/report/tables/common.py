@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
+from analysis.inference.spread import sd
 from analysis.inference.statistics import mean
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.slugs import slugs
@@ -46,10 +46,10 @@ def mean_of(rewards: Any) -> Estimate | None:
     if not len(rewards):
         return None
     found = mean(rewards, seed=SEED)
-    sd = float(np.std(rewards, ddof=1)) if len(rewards) > 1 else None
+    spread = finite(sd(rewards))
     if math.isnan(found.low):
-        return Estimate(found.estimate, sd)
-    return Estimate(found.estimate, sd, found.low, found.high)
+        return Estimate(found.estimate, spread)
+    return Estimate(found.estimate, spread, found.low, found.high)
 
 
 def with_interval(value: float, low: float, high: float) -> Value:
