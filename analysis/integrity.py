@@ -103,7 +103,8 @@ def check_tables(folder: Path, manifest: Manifest, records: Mapping[str, Record]
             differing = sorted(
                 {str(field) for field in found.schema} ^ {str(field) for field in due.schema}
             )
-            damaged(path, f"its columns are not those of this table: {', '.join(differing[:3])}")
+            what = ", ".join(differing[:3]) or "their metadata"
+            damaged(path, f"its columns are not those of this table: {what}")
         if not found.equals(due):
             damaged(path, _difference(found, due))
 

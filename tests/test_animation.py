@@ -15,6 +15,7 @@ from benchmarks.reproduce import trajectory_of
 from benchmarks.store import Store
 from benchmarks.suites import Cell
 from coartic import (
+    PAPER,
     CoarticError,
     Movement,
     corrective_trial,
@@ -23,7 +24,7 @@ from coartic import (
     load_task,
     trajectory,
 )
-from coartic.frames import movement_rows
+from coartic.record import decode, encode, solved
 
 from .test_cli import BROKEN, call
 from .test_harness import run_and_write
@@ -152,13 +153,13 @@ def test_a_record_gives_its_own_trajectory(folder):
     for method in ("dual-process/EC3", "dual-process/EC1", "nullspace-qp/none"):
         record = store.read(ids[method])
         found = trajectory_of(record)
-        assert -found.ticks == record["score"]["reward"]
-        assert found.execution.hands == record["score"]["hands"]
+        assert -found.ticks == record.solution.reward
+        assert found.execution.hands == record.solution.hands
     with pytest.raises(CoarticError, match="has no solution to show: solver-failed"):
         trajectory_of(store.read(ids["test/unexecutable"]))
 
 
-def test_a_path_is_followed_from_its_waypoints():
+def test_a_path_is_followed_from_its_waypoints(folder):
     """A detour: the corrective solution of goal 1, by way of another posture."""
     task = load_task("ascending")
     ends = corrective_trial(task, "RRR").configurations
@@ -167,15 +168,11 @@ def test_a_path_is_followed_from_its_waypoints():
         Movement(1, "right", "path", waypoints=np.array([detour, ends[0]])),
         *(Movement(k, "right", "planned", ends[k - 1]) for k in (2, 3)),
     ]
-    execution = execute(task, movements)
-    record = {
-        "run_id": "x",
-        "status": "ok",
-        "specification": {"task": task.model_dump(mode="json"), "model": {}},
-        "solution": movement_rows(task, execution.movements),
-    }
-    found = trajectory_of(record)
-    assert found.ticks == -execution.reward
+    place, ids = folder
+    record = Store(place).read(ids["nullspace-qp/none"])
+    record = record.model_copy(update={"solution": solved(task, movements, PAPER)})
+    found = trajectory_of(decode(encode(record), place))
+    assert found.ticks == -record.solution.reward == -execute(task, movements).reward
     assert np.abs(found.configurations - detour).max(axis=1).min() < 0.01
 
 

@@ -1,7 +1,6 @@
 """The bibliography: whole, well-formed, and what the methods say of themselves."""
 
 import inspect
-import json
 import re
 import unicodedata
 from pathlib import Path
@@ -21,9 +20,11 @@ from analysis.citations import (
     software,
     solver_keys_of,
 )
+from analysis.integrity import read_manifest
 from benchmarks.methods import BUILT_IN, registry
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
+from coartic.record import Commit
 
 from .test_cli import BROKEN, call
 from .test_harness import run_and_write
@@ -216,10 +217,11 @@ def test_command(tmp_path, monkeypatch, capsys):
         for name in ("corrective-alone/given", "test/good")
     ]
     run_and_write(tmp_path / "results", cells, runs=1)
-    path = tmp_path / "results" / "manifest.json"
-    manifest = json.loads(path.read_text(encoding="utf-8"))
-    manifest["environment"]["commit"] = {"id": "0123456789abcdef", "dirty": False}
-    path.write_text(json.dumps(manifest), encoding="utf-8")
+    manifest = read_manifest(tmp_path / "results")
+    commit = Commit(id="0123456789abcdef", dirty=False)
+    environment = manifest.environment.model_copy(update={"commit": commit})
+    manifest = manifest.model_copy(update={"environment": environment})
+    (tmp_path / "results" / "manifest.json").write_text(manifest.text(), encoding="utf-8")
     code, text, _ = call(monkeypatch, capsys, "cite", tmp_path / "results")
     assert code == 0
     assert ", commit 0123456789abcdef}," in text

@@ -3,12 +3,13 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from benchmarks.store import Store, encode
+from benchmarks.store import Store
 from coartic import __version__, cli
 from coartic.files import LISTING
 from coartic.record import run_seed
@@ -240,17 +241,26 @@ def test_show_and_reproduce(monkeypatch, capsys, tmp_path):
         0,
         f"{first} (dual-process/EC1 on ascending, run 0): identical.\n",
     )
-    # A record that says something else than the code gives, with a checksum that fits.
+    # A record that agrees with itself and says something else than the code gives.
     store = Store(tmp_path / "out")
     record = store.read(second)
-    record["score"]["reward"] += 1
-    record["rewards"][3] -= 1
-    store.write(second, encode(record))
+    worst = min(range(1, 50), key=record.rewards.__getitem__)
+    rewards = list(record.rewards)
+    rewards[worst] -= 1
+    spent = replace(record.meter, movement_ticks=record.meter.movement_ticks + 1)
+    store.write(record.model_copy(update={"rewards": tuple(rewards), "meter": spent}))
     code, text, _ = call(monkeypatch, capsys, "reproduce", second, "--in", tmp_path)
     assert code == 1
     assert "different." in text
-    assert "- score:" in text
-    assert "- rewards by trial differ, first at trial 3" in text
+    assert f"- movement_ticks: {spent.movement_ticks} against" in text
+    assert f"- rewards by trial differ, first at trial {worst}" in text
+    # One that contradicts itself, with a checksum that fits.
+    solution = record.solution.model_copy(update={"reward": record.solution.reward + 1})
+    store.write(record.model_copy(update={"solution": solution}))
+    for command in ("show", "reproduce"):
+        code, _, error = call(monkeypatch, capsys, command, second, "--in", tmp_path)
+        assert code == 2
+        assert f"run {second} contradicts itself" in error
     code, _, error = call(monkeypatch, capsys, "show", "", "--in", tmp_path)
     assert code == 2
     assert "is no run id" in error

@@ -207,6 +207,8 @@ def test_optima(study, clean):  # noqa: F811
 
 
 def test_warming_up(clean):
+    lost = changed(clean, "warm", dict.fromkeys(clean.results.runs.index, pd.NA))
+    assert "0 % of the runs" in said(lost)["Times"]
     assert (
         "0 % of the runs"
         in said(Study(replace(clean.results, runs=clean.results.runs.assign(warm=True))))["Times"]

@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 
-import pandas as pd
 import pytest
 
 import analysis.report.build
@@ -22,6 +21,7 @@ from .strategies import tiny_task
 from .test_cli import call
 from .test_harness import KNOWN, run_and_write
 from .test_traces import SVG, compiled, report_of, with_environment
+from .test_versions import Failing
 
 
 @pytest.fixture
@@ -127,18 +127,9 @@ def test_macros_that_run_together_are_told_apart(odd, monkeypatch):
 
 def test_failed_runs(tmp_path, undrawn):
     known = select_cells(load_suite("paper"), KNOWN, tasks=["ascending"])
-    folder = tmp_path / "results"
-    run_and_write(folder, known, runs=3, trials=30)
-    table = pd.read_parquet(folder / "runs.parquet")
-    moves = pd.read_parquet(folder / "solutions.parquet")
-    failed = table.assign(
-        status="crashed", reason="exit code 9", reward=None, hands=None, trials=None
-    )
     for rows in (1, 3):  # some, then all
-        mixed = pd.concat([failed.head(rows), table.tail(3 - rows)])
-        mixed.to_parquet(folder / "runs.parquet")
-        solved = mixed.run_id[mixed.status == "ok"]
-        moves[moves.run_id.isin(solved)].to_parquet(folder / "solutions.parquet")
+        folder = tmp_path / f"{rows} failed"
+        run_and_write(folder, known, runs=3, trials=30, executor=Failing(*range(rows)))
         of = Study(with_environment(folder))
         made = build(of)
         write(made, of, tmp_path / "report")
@@ -262,7 +253,7 @@ def test_a_report_is_made_again_where_nobody_changed_it(
 @pytest.mark.parametrize("name", ["runs", "solutions", "learning", "sequences", "manifest"])
 def test_damaged_folders(name, monkeypatch, capsys, tmp_path, odd, undrawn):
     folder = tmp_path / "results"
-    shutil.copytree(odd.folder, folder, ignore=shutil.ignore_patterns("records"))
+    shutil.copytree(odd.folder, folder)
     path = folder / (f"{name}.json" if name == "manifest" else f"{name}.parquet")
     path.write_bytes(path.read_bytes()[:40])
     assert path.stem in refused(monkeypatch, capsys, "report", folder)

@@ -15,15 +15,14 @@ import pytest
 import analysis.report.build
 from analysis import optimum as shipped
 from analysis.inference import statistics
+from analysis.integrity import read_manifest
 from analysis.report.build import build, write
 from analysis.report.optimum_source import optimum_sources
 from analysis.report.trace import FILE, trace, trace_text
 from analysis.results import load_results
 from analysis.study import Study
-from benchmarks.provenance import environment
 from benchmarks.suites import Cell
-from coartic import CoarticError, corrective_trial, execute, load_task
-from coartic.frames import movements_from
+from coartic import CoarticError, Movement, corrective_trial, execute, load_task
 
 from .test_harness import KNOWN, run_and_write
 
@@ -56,13 +55,12 @@ SIGNATURES = {
 
 
 def with_environment(folder):
-    """The harness' helper leaves out what the command line writes into the manifest."""
-    path = folder / "manifest.json"
-    manifest = json.loads(path.read_text(encoding="utf-8"))
-    manifest["environment"] = environment() | {
-        "command": ["coartic", "run", "paper", "--out", "/home/somebody/results/x"]
-    }
-    path.write_text(json.dumps(manifest), encoding="utf-8")
+    """The folder as if somebody had asked for it by the command line, at home."""
+    manifest = read_manifest(folder)
+    command = ("coartic", "run", "paper", "--out", "/home/somebody/results/x")
+    environment = manifest.environment.model_copy(update={"command": command})
+    manifest = manifest.model_copy(update={"environment": environment})
+    (folder / "manifest.json").write_text(manifest.text(), encoding="utf-8")
     return load_results(folder)
 
 
@@ -173,7 +171,7 @@ class Records:
             records.sort(key=lambda record: record["run"])
 
     def rewards(self, key):
-        return [record["score"]["reward"] for record in self.by_cell[key]]
+        return [record["solution"]["reward"] for record in self.by_cell[key]]
 
     def spent(self, key, *names):
         return [sum(record["meter"][name] for name in names) for record in self.by_cell[key]]
@@ -186,15 +184,16 @@ class Records:
         """Ticks of the first goal beyond those of the task's initial solution."""
         task = load_task(key[0])
         first = corrective_trial(task, task.initial_hands).ticks_by_goal()[0]
-        return [r["score"]["ticks_by_goal"][0] - first for r in self.by_cell[key]]
+        return [r["solution"]["ticks_by_goal"][0] - first for r in self.by_cell[key]]
 
     def posture(self, key):
         """Mean configuration in which the first goal is hit."""
-        import pandas as pd
-
         task, found = load_task(key[0]), []
         for record in self.by_cell[key]:
-            movements = movements_from(task, pd.DataFrame(record["solution"]), pd.DataFrame())
+            movements = [
+                Movement(row["goal"], row["hand"], row["kind"], np.array(row["target"]))
+                for row in record["solution"]["movements"]
+            ]
             found.append(execute(task, movements).configurations[0])
         return np.mean(found, axis=0)
 
@@ -239,7 +238,7 @@ def recomputed(study, records, name):
         mean, sd = PUBLISHED[task, key[1].rpartition("/")[2]]
         return {"PublishedReward": mean, "PublishedRewardSD": sd, "PublishedRewardN": 20}[rest], []
     if hands := re.fullmatch("Hands([LR]+)", rest):
-        counts = [record["score"]["hands"] for record in records.by_cell[key]]
+        counts = [record["solution"]["hands"] for record in records.by_cell[key]]
         return counts.count(hands[1]), [key]
     kind, companion = re.fullmatch(r"(\w+?)(SD|Low|High|N|Full|)", rest).groups()
     if kind in ("Reward", "Gap", "GapPercent", "GapStill", "GapStillPercent"):
@@ -275,7 +274,7 @@ def recomputed(study, records, name):
             own["Full"] = (own[""], own["Low"], own["High"])
         return own[companion], [key]
     if rest == "InitialReward":
-        return records.by_cell[key][0]["details"]["initial_reward"], [key]
+        return records.by_cell[key][0]["initial"]["reward"], [key]
     values = {
         "Trials": lambda: records.spent(key, "trials"),
         "Evaluations": lambda: records.spent(key, "forward_kinematics", "jacobians"),
@@ -340,7 +339,7 @@ def check_cell(home, records, table, row, column):
                        "reward as a formula": "R", "secondary objectives": "S"}  # fmt: skip
             assert shown == "".join(letters[k] for k in letters if k in own[0]["told"])
         else:
-            hands = [record["score"]["hands"] for record in own]
+            hands = [record["solution"]["hands"] for record in own]
             for name in set(hands):
                 assert name in shown
                 assert len(hands) == 1 or f"{name} {hands.count(name)}" in shown
@@ -354,7 +353,7 @@ def check_cell(home, records, table, row, column):
             "ours": lambda: plain.mean(rewards),
             "runs": lambda: len(rewards),
             "solved": lambda: len(rewards),
-            "initial": lambda: records.by_cell[key][0]["details"]["initial_reward"],
+            "initial": lambda: records.by_cell[key][0]["initial"]["reward"],
             "gap": lambda: OPTIMUM[task] - plain.mean(rewards),
             "gap_share": lambda: 100 * (OPTIMUM[task] - plain.mean(rewards)) / -OPTIMUM[task],
             "solve_s": lambda: plain.median(records.seconds(key)),

@@ -1,23 +1,31 @@
 """Two results folders against each other, on runs of our own and on planted differences."""
 
+import copy
 import json
+import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from analysis.inference.equivalence import MARGIN
+from analysis.integrity import read_manifest
+from analysis.results import load_results
 from analysis.versions import cells_frame, compare_versions, load_pair
 from benchmarks.methods import registry
+from benchmarks.sandbox import failure
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
+from coartic.tables import FORMAT
 
 from .test_cli import call
-from .test_harness import run_and_write
+from .test_harness import InProcess, run_and_write
 
 RUNS = 6
-RUN = ["task", "method", "variant", "seed"]
+OUTCOME = ["status", "reward", "hands"]
 KNOWN = registry()
 CELLS = [
     Cell(load_task("ascending"), KNOWN["dual-process/EC1"]),
@@ -29,38 +37,31 @@ LEARNED = "dual-process/EC1"
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("first")
-    run_and_write(folder, CELLS, runs=RUNS, trials=40)
-    return folder
+    return run_and_write(tmp_path_factory.mktemp("first"), CELLS, runs=RUNS, trials=40)
 
 
-def planted(first, folder, edit=lambda runs: runs, manifest=lambda content: None):
-    """A copy of ``first`` with other runs, movements that fit them, and another manifest."""
-    shutil.copytree(first, folder, ignore=shutil.ignore_patterns("records"))
-    path = folder / "runs.parquet"
-    runs = edit(pd.read_parquet(path, dtype_backend="numpy_nullable"))
-    runs.to_parquet(path)
-    old = pd.read_parquet(first / "runs.parquet", columns=[*RUN, "run_id", "reward"])
-    _fit(folder / "solutions.parquet", runs.merge(old, on=RUN, suffixes=("", "_old")))
-    content = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+def planted(first, edit=lambda runs: runs, manifest=lambda content: None):
+    """Results with other runs and another manifest, such as no folder could hold them."""
+    runs, content = edit(first.runs.copy()), copy.deepcopy(first.manifest)
     manifest(content)
-    (folder / "manifest.json").write_text(json.dumps(content), encoding="utf-8")
-    return folder
+    old = first.runs.loc[runs.index, OUTCOME].astype(str)
+    other = (runs[OUTCOME].astype(str) != old).any(axis=1)
+    runs.loc[other, "result"] += "-other"
+    return replace(first, runs=runs, manifest=content)
 
 
-def _fit(path, runs):
-    """Movements with the ids and hands of the runs; the first takes up what the reward gained."""
-    moves = pd.read_parquet(path)
-    run = moves.run_id.map(dict(zip(runs.run_id_old, runs.index, strict=True)))
-    run = run[run.isin(runs.index[runs.status == "ok"])].astype(int)
-    moves, run = moves.loc[run.index], runs.loc[run]
-    gained = (run.reward - run.reward_old).to_numpy(dtype=int)
-    letters = [hands[goal - 1] for hands, goal in zip(run.hands, moves.goal, strict=True)]
-    moves.assign(
-        run_id=list(run.run_id),
-        ticks=moves.ticks - gained * (moves.order == 0),
-        hand=["left" if letter == "L" else "right" for letter in letters],
-    ).to_parquet(path)
+class Failing(InProcess):
+    """An executor that loses the workers of some runs, by their number in the plan."""
+
+    def __init__(self, *numbers):
+        self.numbers = numbers
+
+    def perform(self, jobs):
+        for number, job in enumerate(jobs):
+            if number in self.numbers:
+                yield failure(job["run_id"], "crashed", "exit code 9", 1.0)
+            else:
+                yield from super().perform([job])
 
 
 def of(runs, method=LEARNED):
@@ -78,13 +79,12 @@ def shifted(by, method=LEARNED):
 
 
 def found(first, second, method=LEARNED):
-    frame = compare_versions(*load_pair(first, second)).cells
-    return frame.set_index("method").loc[method]
+    return compare_versions(first, second).cells.set_index("method").loc[method]
 
 
 def test_the_same_runs_made_twice_are_identical(first, tmp_path):
-    run_and_write(tmp_path / "again", CELLS, runs=RUNS, trials=40)
-    comparison = compare_versions(*load_pair(first, tmp_path / "again"))
+    again = run_and_write(tmp_path / "again", CELLS, runs=RUNS, trials=40)
+    comparison = compare_versions(*load_pair(first.folder, again.folder))
     cells = comparison.cells
     assert list(cells.method) == [LEARNED, "dual-process/EC3", "corrective-alone/given"]
     assert set(cells.verdict) == {"identical"}
@@ -95,17 +95,13 @@ def test_the_same_runs_made_twice_are_identical(first, tmp_path):
     assert not comparison.differing.rows
     assert comparison.summary == ["3 cells in both: 3 identical in every run."]
     assert "6 of 6" in comparison.to_markdown()
-    assert comparison.to_markdown() == compare_versions(*load_pair(
-        first, tmp_path / "again"
-    )).to_markdown()  # fmt: skip
+    assert comparison.to_markdown() == compare_versions(first, again).to_markdown()
 
 
-def test_planted_differences_come_back_in_pairs(first, tmp_path):
+def test_planted_differences_come_back_in_pairs(first):
     """The order of rows is none of the seeds' business."""
     by = [-20, -21, -22, -20, -23, -21]
-    second = planted(
-        first, tmp_path / "b", lambda runs: shifted(by)(runs).iloc[::-1].reset_index(drop=True)
-    )
+    second = planted(first, lambda runs: shifted(by)(runs).iloc[::-1])
     row = found(first, second)
     assert row.paired
     assert row.identical == 0
@@ -118,42 +114,41 @@ def test_planted_differences_come_back_in_pairs(first, tmp_path):
     assert found(first, second, "dual-process/EC3").verdict == "identical"
 
 
-def test_holm_over_all_cells_tested(first, tmp_path):
+def test_holm_over_all_cells_tested(first):
     def edit(runs):
         runs = shifted([-5, -1, 2, 3, -4, 1])(runs)
         return shifted([-9, -7, -8, -9, -7, -6], "dual-process/EC3")(runs)
 
-    cells = compare_versions(*load_pair(first, planted(first, tmp_path / "b", edit))).cells
+    cells = compare_versions(first, planted(first, edit)).cells
     low, high = sorted(cells.p.dropna())
     assert sorted(cells.p_adjusted.dropna()) == [2 * low, max(2 * low, high)]
 
 
-def test_a_difference_within_the_margin_is_equivalent(first, tmp_path):
-    row = found(first, planted(first, tmp_path / "b", shifted([-1, 1, 0, -1, 2, -2])))
+def test_a_difference_within_the_margin_is_equivalent(first):
+    row = found(first, planted(first, shifted([-1, 1, 0, -1, 2, -2])))
     assert row.verdict == "equivalent"
     assert row.identical == 1
     # One run of six: the studentised bootstrap has no end there.
-    row = found(first, planted(first, tmp_path / "c", shifted([0, 0, 0, 1, 0, 0])))
+    row = found(first, planted(first, shifted([0, 0, 0, 1, 0, 0])))
     assert row.verdict == "equivalent"
     assert row.identical == 5
-    row = found(first, planted(first, tmp_path / "d", shifted([0, 0, 0, 60, 0, 0])))
+    row = found(first, planted(first, shifted([0, 0, 0, 60, 0, 0])))
     assert row.verdict == "undecided"
 
 
-def test_other_hands_are_not_identical(first, tmp_path):
+def test_other_hands_are_not_identical(first):
     def edit(runs):
         runs.loc[runs.index[of(runs, "dual-process/EC3")][2], "hands"] = "LLLL"
         return runs
 
-    row = found(first, planted(first, tmp_path / "b", edit), "dual-process/EC3")
+    row = found(first, planted(first, edit), "dual-process/EC3")
     assert (row.identical, row.shared, row.difference) == (RUNS - 1, RUNS, 0)
     assert row.verdict == "equivalent"
 
 
 def test_without_shared_seeds_runs_are_independent(first, tmp_path):
-    second = tmp_path / "seed"
-    run_and_write(second, CELLS, runs=RUNS + 2, trials=40, seed=1)
-    comparison = compare_versions(*load_pair(first, second))
+    second = run_and_write(tmp_path, CELLS, runs=RUNS + 2, trials=40, seed=1)
+    comparison = compare_versions(first, second)
     row = comparison.cells.set_index("method").loc[LEARNED]
     assert not row.paired
     assert (row.n_a, row.n_b, row.shared) == (RUNS, RUNS + 2, 0)
@@ -165,8 +160,8 @@ def test_without_shared_seeds_runs_are_independent(first, tmp_path):
     assert alone.verdict == "no interval"  # one run each, by other seeds
 
 
-def test_one_run_that_differs_has_no_interval(first, tmp_path):
-    second = planted(first, tmp_path / "b", shifted([-3], "corrective-alone/given"))
+def test_one_run_that_differs_has_no_interval(first):
+    second = planted(first, shifted([-3], "corrective-alone/given"))
     row = found(first, second, "corrective-alone/given")
     assert row.difference == -3
     assert row.verdict == "no interval"
@@ -175,33 +170,30 @@ def test_one_run_that_differs_has_no_interval(first, tmp_path):
 
 
 def test_failures_are_counted_and_nothing_compared(first, tmp_path):
-    def edit(runs):
-        row = runs.index[of(runs)][1]
-        runs.loc[row, ["status", "reason"]] = ["timeout", "too long"]
-        runs.loc[row, ["reward", "hands"]] = pd.NA
-        return runs
-
-    failing = planted(first, tmp_path / "b", edit)
+    cells = CELLS[:1]
+    failing = run_and_write(tmp_path / "b", cells, RUNS, 40, executor=Failing(1))
     row = found(first, failing)
     assert (row.solved_a, row.solved_b, row.n_b, row.identical) == (RUNS, RUNS - 1, RUNS, RUNS - 1)
     assert row.verdict == "not compared"
     assert row[["mean_a", "mean_b", "difference", "low", "p", "solve_s_b"]].isna().all()
     assert "B solved 5 of 6" in row.remarks
     assert "A solved" not in row.remarks
-    both = found(failing, planted(failing, tmp_path / "c"))
-    assert both.identical == RUNS  # two missing rewards are the same result
+    # Two runs without a solution came out the same, whatever was said of the reason.
+    again = run_and_write(tmp_path / "c", cells, RUNS, 40, executor=Failing(1))
+    again.runs.reason = again.runs.reason + ", at night"
+    both = found(failing, again)
+    assert both.identical == RUNS
     assert both.verdict == "not compared"
 
 
-def test_tasks_of_one_name_and_other_content(first, tmp_path):
+def test_tasks_of_one_name_and_other_content(first):
     def move(content):
         content["specification"]["tasks"]["ascending"]["goals"][1] = [6.5, 2.0]
 
     def rename(content):
         content["specification"]["tasks"]["ascending"]["description"] = "another text"
 
-    second = planted(first, tmp_path / "moved", manifest=move)
-    comparison = compare_versions(*load_pair(first, second))
+    comparison = compare_versions(first, planted(first, manifest=move))
     rows = comparison.cells.set_index("method")
     assert list(rows.verdict) == ["not compared", "identical", "not compared"]
     assert rows.remarks[LEARNED] == "the tasks of this name differ: goals"
@@ -210,91 +202,104 @@ def test_tasks_of_one_name_and_other_content(first, tmp_path):
     assert line[0] == "task ascending"
     assert "6.5" not in line[1]
     assert "6.5" in line[2]
-    same = planted(first, tmp_path / "renamed", manifest=rename)
-    assert found(first, same).verdict == "identical"
-
-
-def recoded(first, folder, rows):
-    """Runs with other code, as another version would have made them."""
-
-    def edit(runs):
-        chosen = runs.index[of(runs)][rows]
-        runs.loc[chosen, "code"] = "c0ffeec0ffee"
-        runs.loc[chosen, "run_id"] = runs.loc[chosen, "run_id"].str[:17] + "c0ffeec0ffee"
-        return runs
-
-    def manifest(content):
-        specification = content["specification"]
-        specification["run_ids"] = list(pd.read_parquet(folder / "runs.parquet").run_id)
-        specification["methods"][LEARNED]["code"] = "c0ffeec0ffee"
-
-    return planted(first, folder, edit, manifest)
+    assert found(first, planted(first, manifest=rename)).verdict == "identical"
 
 
 def test_other_code_is_said_and_never_mixed(first, tmp_path):
-    other = recoded(first, tmp_path / "other", slice(None))
-    comparison = compare_versions(*load_pair(first, other))
+    """Runs of another version: their records and ids say so, or the folder is refused."""
+    learned = replace(CELLS[0], entry=replace(CELLS[0].entry, code="c0ffeec0ffee"))
+    cells = [learned, *CELLS[1:]]
+    other = run_and_write(tmp_path / "other", cells, RUNS, 40, executor=OtherVersion())
+    comparison = compare_versions(first, other)
     row = comparison.cells.set_index("method").loc[LEARNED]
     assert (row.verdict, row.remarks) == ("identical", "other code")
     assert [line[0] for line in comparison.differing.rows] == [f"code of {LEARNED}"]
-    mixed = recoded(first, tmp_path / "mixed", slice(2))
-    with pytest.raises(CoarticError, match=r"mixed/runs.*\(4 rows are of other code than"):
-        load_pair(first, mixed)
-    with pytest.raises(CoarticError, match="short.*lacks 1 of 13 planned runs"):
-        load_pair(planted(first, tmp_path / "short", lambda runs: runs[1:]), first)
+    copied(first, other.folder)  # its tables and manifest, with both versions' records
+    load_results(other.folder)
+    ours, theirs = (results.cells[0].runs.run_id.tolist() for results in (first, other))
+    for run_ids, words in (
+        ([theirs[0], *ours[1:]], f"run {theirs[0]} is not as planned: it has another code"),
+        (ours[1:], "has another number of runs"),
+        (ours[::-1], "is not as planned: it has another number"),
+    ):
+        replanned(other.folder, run_ids)
+        with pytest.raises(CoarticError, match=words):
+            load_pair(first.folder, other.folder)
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "words"),
-    [
-        ("reward", lambda runs: runs.reward + 50, "do not add up to their reward"),
-        ("hands", "LLL", "are not made with the hands of a solved run"),
-        ("status", "timeout", "are not made with the hands of a solved run"),
-        ("code", "c0ffeec0ffee", "6 rows are of other code than manifest.json declares"),
-        ("code", pd.NA, "6 rows are of other code than manifest.json declares"),
-    ],
-)
-def test_one_gate_for_every_command(first, tmp_path, monkeypatch, capsys, column, value, words):
+class OtherVersion(InProcess):
+    """An executor that performs runs with the code that is here, whatever is asked for."""
+
+    def perform(self, jobs):
+        own = {cell.method: cell.entry.code for cell in CELLS}
+        for job in jobs:
+            yield from super().perform([{**job, "code": own[job["specification"]["method"]]}])
+
+
+def copied(results, folder):
+    """A results folder, or what is missing of it, somewhere else."""
+    shutil.copytree(results.folder, folder, dirs_exist_ok=True)
+    return folder
+
+
+def replanned(folder, run_ids):
+    """Write a manifest whose first cell has other runs, with a seal that fits."""
+    manifest = read_manifest(folder)
+    first, *rest = manifest.specification.cells
+    cells = (first.model_copy(update={"run_ids": tuple(run_ids)}), *rest)
+    plan = manifest.specification.model_copy(update={"cells": cells})
+    manifest = manifest.model_copy(update={"specification": plan})
+    (folder / "manifest.json").write_text(manifest.text(), encoding="utf-8")
+
+
+def test_one_gate_for_every_command(first, tmp_path, monkeypatch, capsys):
     """A table edited by hand is refused by whatever reads the folder."""
-    edited = shutil.copytree(first, tmp_path / "edited", ignore=shutil.ignore_patterns("records"))
-    runs = pd.read_parquet(edited / "runs.parquet", dtype_backend="numpy_nullable")
-    runs.loc[of(runs), column] = value(runs) if callable(value) else value
-    runs.to_parquet(edited / "runs.parquet")
-    for command in (("compare", first), ("analyse",), ("report",), ("cite",)):
+    edited = copied(first, tmp_path / "edited")
+    table = pq.read_table(edited / "runs.parquet")
+    for column, value in (("reward", -1), ("hands", "LLL"), ("code", None), ("wall_s", 0.0)):
+        place = table.schema.get_field_index(column)
+        field = table.schema.field(place)
+        values = [value, *table[column].to_pylist()[1:]]
+        pq.write_table(table.set_column(place, field, [values]), edited / "runs.parquet")
+        words = f"runs.parquet is damaged (column '{column}' is not as its records have it"
+        with pytest.raises(CoarticError, match=re.escape(words)):
+            load_results(edited)
+    for command in (("compare", first.folder), ("analyse",), ("report",), ("cite",)):
         code, _, error = call(monkeypatch, capsys, *command, edited)
         assert code == 2
         assert words in error
+    pq.write_table(table.replace_schema_metadata({"pandas": "{}"}), edited / "runs.parquet")
+    with pytest.raises(CoarticError, match="not those of this table: their metadata"):
+        load_results(edited)
 
 
-def test_what_differs_in_the_environment(first, tmp_path):
+def test_what_differs_in_the_environment(first):
     def edit(model, numpy):
         return lambda content: content["environment"].update(
             model_code=model, packages={"numpy": numpy}, date=model
         )
 
-    one = planted(first, tmp_path / "one", manifest=edit("aaaa", "2.4.6"))
-    two = planted(first, tmp_path / "two", manifest=edit("bbbb", "2.4.7"))
-    assert compare_versions(*load_pair(one, two)).differing.rows == (
+    one = planted(first, manifest=edit("aaaa", "2.4.6"))
+    two = planted(first, manifest=edit("bbbb", "2.4.7"))
+    assert compare_versions(one, two).differing.rows == (
         ("code of the model", "aaaa", "bbbb"),
         ("library numpy", "2.4.6", "2.4.7"),
     )
 
 
 def test_stale_records_are_counted(first, tmp_path):
-    second = tmp_path / "b"
-    shutil.copytree(first, second)
+    second = copied(first, tmp_path / "b")
     record = next(second.glob("records/*.json"))
     shutil.copy(record, record.with_name(f"{record.stem[:17]}c0ffeec0ffee.json"))
-    page = compare_versions(*load_pair(first, second)).to_markdown()
+    page = compare_versions(*load_pair(first.folder, second)).to_markdown()
     assert "B: 1 records were made by other code and have no part here" in page
     assert "A: 1 records" not in page
 
 
 def test_parameters_cells_and_spends(first, tmp_path):
-    second = tmp_path / "b"
     cells = [CELLS[0], Cell(load_task("ascending"), KNOWN[LEARNED], (("noise_sd", 0.1),))]
-    run_and_write(second, cells, runs=RUNS, trials=80)
-    comparison = compare_versions(*load_pair(first, second))
+    second = run_and_write(tmp_path, cells, runs=RUNS, trials=80)
+    comparison = compare_versions(first, second)
     (row,) = comparison.cells.to_dict("records")
     assert row["remarks"] == "trials 40 → 80"
     assert (row["trials_a"], row["trials_b"]) == (40, 80)
@@ -310,11 +315,10 @@ def test_parameters_cells_and_spends(first, tmp_path):
     assert ("methods of one folder only", "dual-process/EC3, corrective-alone/given", "–") in (
         comparison.differing.rows
     )
-    nothing = compare_versions(
-        *load_pair(first, planted(second, tmp_path / "c", manifest=_without_first))
-    )
+    other = planted(second, manifest=_without_first)
+    nothing = compare_versions(first, other)
     assert nothing.summary[0] == "0 cells in both: nothing to compare."
-    assert cells_frame(*load_pair(first, tmp_path / "c")).empty
+    assert cells_frame(first, other).empty
 
 
 def _without_first(content):
@@ -322,6 +326,7 @@ def _without_first(content):
 
 
 def test_folders_that_cannot_be_compared(first, tmp_path):
+    first = first.folder
     link = tmp_path / "link"
     link.symlink_to(first)
     for same in (first, link, first / ".." / first.name):
@@ -336,24 +341,29 @@ def test_folders_that_cannot_be_compared(first, tmp_path):
     ):
         with pytest.raises(CoarticError, match=words):
             load_pair(first, missing)
-    old = planted(first, tmp_path / "old", manifest=lambda content: content.update(format=2))
-    with pytest.raises(CoarticError, match="have format 2, this version reads 3; run the same"):
+    old = shutil.copytree(first, tmp_path / "old")
+    (old / "manifest.json").write_text(json.dumps({"format": 2}), encoding="utf-8")
+    words = f"have format 2, this version reads {FORMAT}; run the same"
+    with pytest.raises(CoarticError, match=words):
         load_pair(first, old)
-    damaged = planted(first, tmp_path / "damaged")
+    damaged = shutil.copytree(first, tmp_path / "damaged")
     (damaged / "runs.parquet").write_bytes((first / "runs.parquet").read_bytes()[:200])
     with pytest.raises(CoarticError, match="runs.parquet is damaged"):
         load_pair(damaged, first)
 
 
 def test_command(first, tmp_path, monkeypatch, capsys):
-    second = planted(first, tmp_path / "b", shifted([-20, -21, -22, -20, -23, -21]))
+    second = run_and_write(tmp_path / "b", CELLS, runs=RUNS, trials=80)
+    due = compare_versions(first, second)
+    first, second = first.folder, second.folder
     page = tmp_path / "page.md"
     code, text, _ = call(monkeypatch, capsys, "compare", first, second, "--out", page)
     assert code == 0
-    assert "3 cells in both: 2 identical in every run, 1 different." in text
-    assert page.read_text(encoding="utf-8").startswith("# Two sets of results")
+    assert due.summary[0] in text
+    assert page.read_text(encoding="utf-8") == due.to_markdown()
     table = pd.read_csv(tmp_path / "page.csv")
-    assert list(table.verdict) == ["different", "identical", "identical"]
+    assert list(table.verdict) == list(due.cells.verdict)
+    assert table.verdict[2] == "identical" != table.verdict[0]
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     (tmp_path / "page.csv").write_text("of somebody else's")
     page.unlink()

@@ -208,8 +208,8 @@ def _optima(study: Study) -> Iterator[str]:
 
 def _timing(study: Study) -> Iterator[str]:
     runs, environment = study.results.runs, study.results.manifest["environment"]
-    cold = runs[~runs.warm.astype(bool)]
-    share = len(cold) / len(runs)
+    cold = ~runs.warm.astype("boolean")  # unknown where it went with the process
+    share = int(cold.sum()) / len(runs)
     yield (
         f"*Times.* Taken on {environment['processor'] or 'an unnamed processor'} with "
         f"{environment['cores']} cores, one thread a run, runs side by side as far as asked "
