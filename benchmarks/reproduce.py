@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from benchmarks.store import RecordError, Store
 from coartic import CoarticError, MotionModel, Trajectory, parse_task, trajectory
 from coartic.frames import movements_from
 from coartic.method import Meter
+from coartic.text import shell_line
 
 
 def find_record(prefix: str, folder: Path) -> tuple[Store, dict[str, Any]]:
@@ -85,11 +85,10 @@ def perform_once(spec: RunSpec) -> dict[str, Any]:
 
 def command_for(record: dict[str, Any], folder: Path) -> str:
     """The command that performs the run of a record again."""
-    command = f"coartic reproduce {record['run_id']} --in {shlex.quote(str(folder))}"
-    origin = record["origin"]
-    if origin.endswith(".py"):
-        command += f" --method-file {shlex.quote(origin)}"
-    return command
+    words: list[str | Path] = ["coartic", "reproduce", record["run_id"], "--in", folder]
+    if record["origin"].endswith(".py"):
+        words += ["--method-file", Path(record["origin"])]
+    return shell_line(*words)
 
 
 def differences(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
