@@ -27,7 +27,8 @@ _PAIR = r"(?P<open>\[)(?P<inner>[^\[\]]*)\](?![\[(:]|$)"  # no link, no referenc
 _LITERAL = re.compile(
     r"^\[(?=[ xX]\] )"  # a task, in a list
     rf"|{_PAIR}"
-    r"|[\\`*~$|#\[\]]"
+    r"|[\\`~$|#\[\]]"
+    r"|(?<![^\W_])(?<!\))\*|\*(?![\s)])|(?<=\))\*(?!\s)"  # but behind a word, as in 20*
     r"|<(?! )"  # HTML, addresses
     r"|^>"
     r"|&(?=#|\w+;|$)"  # a character by its name
@@ -99,6 +100,8 @@ def _span(span: Span) -> str:
     if span.style == "code":
         return f"`{one_line(span.text)}`"
     text = markdown_text(span.text)
+    if "*" in span.text:  # emphasis would end there
+        return text
     if span.style == "link" and not span.address.startswith("#"):
         return f"[{text}]({span.address})"
     return {"emphasis": f"*{text}*", "strong": f"**{text}**"}.get(span.style, text)

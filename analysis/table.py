@@ -9,6 +9,7 @@ from typing import Any
 
 from analysis.inference.statistics import Inference
 from analysis.markup import markdown_text
+from coartic.text import one_line
 
 NONE = "–"
 
@@ -30,7 +31,7 @@ class Table:
             return f"|{'|'.join(cells)}|"
 
         def texts(cells: Iterable[str]) -> list[str]:
-            return [markdown_text(f" {cell} ") for cell in cells]
+            return [markdown_text(f" {one_line(cell)} ") for cell in cells]
 
         rows = list(map(texts, self.rows))
         for row, link in zip(rows, self.links, strict=False):

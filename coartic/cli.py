@@ -20,7 +20,7 @@ from rich.table import Table as RichTable
 
 from coartic import CoarticError, __version__, builtin_tasks, load_task
 from coartic.compiled import PACKAGE
-from coartic.text import json_text, one_line, printed
+from coartic.text import json_text, one_line
 
 if TYPE_CHECKING:
     from benchmarks.harness import Progress
@@ -42,27 +42,30 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
-    warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}", sys.stderr)
+    warnings.showwarning = lambda message, *_, **__: _complain("warning", str(message))
     try:
         _check_packages()
         app(prog_name="coartic")
     except CoarticError as error:
-        for line in str(error).splitlines():
-            _say(f"error: {line}", sys.stderr)
+        _complain("error", str(error))
         sys.exit(2)
     except BrokenPipeError:
         raise
     except OSError as error:
-        _say(f"error: {error.strerror or error}", sys.stderr)
+        _complain("error", str(error.strerror or error))
         sys.exit(1)
 
 
-def _say(text: str, stream: TextIO | None = None) -> None:
-    """Print text of several lines; all that this module prints passes here or :func:`_console`.
+def _complain(kind: str, text: str) -> None:
+    _say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
 
-    What does not print, such as an escape sequence in a name, is shown as its escape.
+
+def _say(*lines: str, stream: TextIO | None = None) -> None:
+    """Print lines; whatever names are in them, each is one, and prints.
+
+    Text comes to a terminal here, in :func:`_print` and in :class:`_Display`.
     """
-    print("\n".join(map(printed, text.split("\n"))), file=stream)
+    print("\n".join(map(one_line, lines)), file=stream)
 
 
 def _check_packages() -> None:
@@ -206,7 +209,7 @@ def run(
             _say(
                 f"interrupted; {display.done} runs done now are kept in {out}, "
                 "and the same command goes on from there",
-                sys.stderr,
+                stream=sys.stderr,
             )
             sys.exit(130)
     wall = time.perf_counter() - clock
@@ -234,11 +237,12 @@ def run(
     if hidden:
         console.print("(The terminal is too narrow for all columns; comparison.md has them.)\n")
     for note in comparison.notes:
-        console.print(printed(f"- {words(note)}"))
+        console.print(one_line(f"- {words(note)}"))
     _say(
-        f"\n{progress.total} runs: {progress.present} were there, {progress.done} done in "
+        "",
+        f"{progress.total} runs: {progress.present} were there, {progress.done} done in "
         f"{wall:.1f} s; {progress.failed} failed. "
-        f"Results in {out}, this comparison in {out / 'comparison.md'}."
+        f"Results in {out}, this comparison in {out / 'comparison.md'}.",
     )
     if any(store.read(spec.run_id)["status"] == "crashed" for spec in specs):
         sys.exit(1)
@@ -386,8 +390,8 @@ def show(
     rewards = shown.pop("rewards")
     shown["rewards"] = f"{len(rewards)} trials, in learning.parquet and in the record"
     shown["record"] = str(store.path(record["run_id"]))
-    _say(json_text(shown, indent=2))
-    _say(f"\nReproduce it with: {command_for(record, store.folder)}")
+    _say(*json_text(shown, indent=2).split("\n"))
+    _say("", f"Reproduce it with: {command_for(record, store.folder)}")
 
 
 @app.command()
@@ -437,7 +441,7 @@ def check(
     for law in laws:
         _say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
     broken = sum(not law.passed for law in laws)
-    _say(f"\n{subject}: {len(laws) - broken} of {len(laws)} laws hold.")
+    _say("", f"{subject}: {len(laws) - broken} of {len(laws)} laws hold.")
     if broken:
         sys.exit(1)
 
@@ -515,7 +519,7 @@ def trace(
     from analysis.report.trace import trace as find
 
     where = [part for part in (row, column) if part is not None]
-    _say(trace_text(find(find_report(folder), name, where)))
+    _say(*trace_text(find(find_report(folder), name, where)).split("\n"))
 
 
 @app.command()
@@ -547,7 +551,7 @@ def compare(
     console = _console()
     for table in (found.differing, found.table):
         _print(console, table.title, table.columns, table.rows, wrap=table is found.differing)
-    _say("\n".join(found.summary))
+    _say(*found.summary)
     if written:
         _say(f"In {' and '.join(map(str, written))}.")
 
@@ -584,7 +588,8 @@ def animate(
             _, record = find_record(name, folder)
             found = trajectory_of(record)
             method = record["specification"]["method"]
-            panels.append(Panel(f"{found.task.name}: {method}, run {record['run']}", found))
+            title = one_line(f"{found.task.name}: {method}, run {record['run']}")
+            panels.append(Panel(title, found))
     if initial:
         task = panels[0].trajectory.task
         movements = corrective_trial(task, initial_hands(task)).movements
@@ -623,7 +628,8 @@ def cite(
             MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN_ORIGIN)
             for name, item in manifest["specification"]["methods"].items()
         ]
-    _say(bibliography(methods, analysis=analysis, environment=environment).rstrip("\n"))
+    text = bibliography(methods, analysis=analysis, environment=environment)
+    _say(*text.rstrip("\n").split("\n"))
 
 
 _AS_IT_IS: Any = {"markup": False, "emoji": False, "highlight": False}
@@ -689,7 +695,7 @@ class _Display:
                 return
             self._bar.start()
             self._task = self._bar.add_task(
-                printed(self._suite), total=progress.total - progress.present, failed=0
+                one_line(self._suite), total=progress.total - progress.present, failed=0
             )
         words = "starting workers (the first time compiles)"
         if spec is not None:
@@ -698,7 +704,7 @@ class _Display:
             self._task,
             completed=progress.done,
             failed=progress.failed,
-            description=printed(words),
+            description=one_line(words),
         )
 
     def _plain(self, progress: Progress) -> None:
@@ -720,7 +726,7 @@ class _Display:
         )
 
     def _line(self, text: str) -> None:
-        self._console.print(printed(text), soft_wrap=True)
+        self._console.print(one_line(text), soft_wrap=True)
 
 
 def _print(
@@ -737,7 +743,7 @@ def _print(
     terminal's width is left out from the right.
     """
     shown = len(columns)
-    columns, rows = tuple(map(printed, columns)), [tuple(map(one_line, row)) for row in rows]
+    columns, rows = tuple(map(one_line, columns)), [tuple(map(one_line, row)) for row in rows]
     if not wrap:
         widths = [max(map(len, column)) + 4 for column in zip(columns, *rows, strict=True)]
         while shown > 2 and sum(widths[:shown]) > console.width:

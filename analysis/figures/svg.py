@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from coartic.text import printed
-
 _FINE, _COARSE, _MANY = 100, 10, 120
 """Coordinates are whole multiples of 1/100 pt, of curves with many numbers 1/10 pt."""
 _PATH = re.compile(r"[A-Za-z]|-?(?:\d+\.?\d*|\.\d+)(?:e-?\d+)?")
@@ -22,7 +20,7 @@ def compact(text: str) -> str:
     Nothing moves by more than half a step of coordinates. Text that is text gets its family
     from the root.
     """
-    text = "\n".join(map(printed, re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL).split("\n")))
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = _FONT.sub(_sized, text)
     text = re.sub(r' d="([^"]*)"', lambda m: f' d="{relative(m[1])}"', text, flags=re.DOTALL)
     text = re.sub(r"; font-family: [^;\"]*", "", text)

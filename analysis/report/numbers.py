@@ -376,10 +376,8 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
         task, label, signature = map(str, key)
         row = rows.iloc[0]
         where = str(row["where"])
-        other = re.search(r"against ([^,]+)", where)
-        cells = [(task, label)]
-        if other is not None:
-            cells.append((other[1], label))
+        other = (where.partition("against ")[2], label)
+        cells = [(task, label), *([other] if other in study.cells else [])]
         what, unit = _SIGNATURES[signature]
         n = int(row["n"])
         place = f" ({where})" if where else ""
