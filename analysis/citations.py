@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+from analysis.slugs import slugs
 from coartic import CoarticError, __version__
+from coartic.text import one_line
 
 PAPER = "shah2013"
 METHODS: dict[str, tuple[str, ...]] = {
@@ -68,7 +70,9 @@ _SPECIAL = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
-    **{sign: f"\\{sign}" for sign in "{}%&#_$"},
+    "{": r"\textbraceleft{}",  # braces that BibTeX counts, with a backslash or without
+    "}": r"\textbraceright{}",
+    **{sign: f"\\{sign}" for sign in "%&#_$"},
 }
 
 
@@ -151,7 +155,7 @@ def software(environment: Mapping[str, Any] | None = None) -> Reference:
             "acquisition",
             "year": "2026",
             "howpublished": "Computer software",
-            "note": note,
+            "note": _escaped(note),
         },
     )
 
@@ -190,7 +194,7 @@ def bibliography(
     for method in methods:
         keys = keys_of(method.id) if method.built_in else None
         if keys is None:
-            others.append(_other(method))
+            others.append(method)
             continue
         for key in (*keys, *solver_keys_of(method.id)):
             reasons.setdefault(key, []).append(method.id)
@@ -199,28 +203,33 @@ def bibliography(
             reasons.setdefault(key, []).append("the analysis")
     known["coartic"] = software(environment)
     entries = [
-        f"% {', '.join(reason)}\n{known[key].to_bibtex()}" for key, reason in reasons.items()
+        f"{_comment(', '.join(reason))}\n{known[key].to_bibtex()}"
+        for key, reason in reasons.items()
     ]
-    return "\n\n".join(entries + others) + "\n"
+    slug = slugs(method.id for method in others)
+    return "\n\n".join([*entries, *(_other(item, slug[item.id]) for item in others)]) + "\n"
 
 
-def _other(method: MethodSource) -> str:
-    if not method.citation.strip():
-        return f"% {method.id}: it declares no citation; ask its authors what to cite"
+def _other(method: MethodSource, key: str) -> str:
     citation = " ".join(method.citation.split())
-    key = re.sub(r"[^a-z0-9]+", "-", method.id.lower()).strip("-")
+    if not citation:
+        return _comment(f"{method.id}: it declares no citation; ask its authors what to cite")
     fields = {
         "title": _escaped(" ".join(method.title.split()) or method.id),
         "note": _escaped(citation),
     }
     entry = Reference(f"method-{key}", "misc", fields)
+    comment = _comment(f"{method.id}, a method of others, cites: {citation}")
+    return f"{comment}\n{entry.to_bibtex()}"
+
+
+def _comment(text: str) -> str:
     # BibTeX knows no comments: between entries it skips everything but an @.
-    comment = f"{method.id}, a method of others, cites: {citation}".replace("@", "(at)")
-    return f"% {comment}\n{entry.to_bibtex()}"
+    return f"% {one_line(text)}".replace("@", "(at)")
 
 
 def _escaped(text: str) -> str:
-    return "".join(_SPECIAL.get(sign, sign) for sign in text)
+    return "".join(_SPECIAL.get(sign, sign) for sign in one_line(text))
 
 
 def _balanced(value: str) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,9 @@ from numpy.typing import NDArray
 from analysis.inference.equivalence import MARGIN, difference
 from analysis.inference.spread import sd
 from analysis.inference.statistics import CONFIDENCE
+from analysis.markup import code, escaped
 from analysis.methods import methods_notes, methods_tables
+from analysis.page import Heading, Part, page
 from analysis.published import (
     RUNS,
     TRIALS,
@@ -37,21 +38,14 @@ class Comparison:
     title: str
     tables: tuple[Table, ...]
     notes: tuple[str, ...]
+    """In inline markup."""
 
     def to_markdown(self) -> str:
         """The comparison as a Markdown page."""
-        parts = [f"# {self.title}"]
+        parts: list[Part] = [Heading(1, self.title)]
         for table in self.tables:
-            parts.append(f"## {table.title}")
-            parts.append(table.to_markdown())
-        parts.append("## Notes")
-        parts.append("\n".join(f"- {note}" for note in self.notes))
-        return "\n\n".join(parts) + "\n"
-
-
-def plain(note: str) -> str:
-    """A note without Markdown, for a terminal."""
-    return re.sub(r"(?<!\\)[*`]", "", note).replace("\\*", "*")
+            parts += [Heading(2, table.title), table]
+        return page([*parts, Heading(2, "Notes"), self.notes])
 
 
 def compare(results: Results) -> Comparison:
@@ -183,22 +177,22 @@ def _notes(results: Results) -> list[str]:
         notes.append("\\* derived from other printed numbers, not printed itself.")
     for name, task in results.tasks.items():
         if task.reconstructed:
-            what = " and ".join(task.reconstructed)
+            what = escaped(" and ".join(task.reconstructed))
             notes.append(
-                f"† Reconstructed: {what} of **{name}** are not printed; they are inferred from "
-                "what is (docs/model.md), and rewards on it depend on them."
+                f"† Reconstructed: {what} of **{escaped(name)}** are not printed; they are "
+                "inferred from what is (docs/model.md), and rewards on it depend on them."
             )
     for cell in results.cells:
         trials, lost = cell.runs.trials.sum(), cell.runs.failed_trials.sum()
         if trials and lost:
             notes.append(
-                f"{cell.task} x {cell.label}: {lost} of {trials} trials failed (they did not hit "
-                "every goal); they taught nothing."
+                f"{escaped(cell.task)} x {escaped(cell.label)}: {lost} of {trials} trials failed "
+                "(they did not hit every goal); they taught nothing."
             )
     failed = results.runs[results.runs.status != "ok"]
     for key, runs in failed.groupby(["task", "method", "status", "reason"]).run.count().items():
         name, method, status, text = key if isinstance(key, tuple) else (key,)
-        notes.append(f"{runs} runs of {name} x {method} are {status}: {text}")
+        notes.append(f"{runs} runs of {escaped(f'{name} x {method} are {status}: {text}')}")
     commits = results.runs["commit"].nunique(dropna=False)
     if commits > 1:
         notes.append(
@@ -220,12 +214,13 @@ def _notes(results: Results) -> list[str]:
     version = f"coartic {environment['coartic']}"
     if commit:
         version += f", commit {commit['id'][:12]}{' with changes' if commit['dirty'] else ''}"
-    notes.append(
-        f"Suite `{specification['suite']}`, {specification['runs']} runs of "
-        f"{specification['trials']} trials, seed {specification['seed']}; {version}, model code "
+    made = (
+        f", {specification['runs']} runs of {specification['trials']} trials, "
+        f"seed {specification['seed']}; {version}, model code "
         f"{environment['model_code']}; Python {environment['python']}, "
         f"{environment['platform']}; {environment['date']}."
     )
+    notes.append(f"Suite {code(specification['suite'])}{escaped(made)}")
     return notes
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.inference.spread import sd
+from analysis.markup import escaped
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import Optimum, locks_base, optima
 from analysis.results import CellRuns, Results
@@ -92,7 +93,7 @@ def methods_tables(results: Results) -> list[Table]:
 
 
 def methods_notes(results: Results) -> list[str]:
-    """What the tables' columns mean, and what does not fit."""
+    """What the tables' columns mean, and what does not fit; in inline markup."""
     frame = methods_frame(results)
     letters = ", ".join(f"{letter} {item.value}" for item, letter in TOLD.items())
     notes = [
@@ -111,13 +112,13 @@ def methods_notes(results: Results) -> list[str]:
     ]
     for row in frame[frame.beaten > 0].to_dict("records"):
         notes.append(
-            f"**{row['beaten']} runs of {row['task']} x {row['method']} are better than the "
+            f"**{row['beaten']} runs of {escaped(_pair(row))} are better than the "
             "optimum: it is not one. Report this.**"
         )
     for row in frame[frame.corrections > 0].to_dict("records"):
         if "T" not in row["told"]:
             notes.append(
-                f"{row['task']} x {row['method']}: its solutions needed {row['corrections']} "
+                f"{escaped(_pair(row))}: its solutions needed {row['corrections']} "
                 "corrective movements in all."
             )
     return notes
@@ -166,6 +167,10 @@ def _row(cell: CellRuns, references: dict[tuple[str, str], Optimum]) -> dict[str
         "build_s": _median(cell.runs.build_s),
         "solve_s": _median(solve_times(good)),
     }
+
+
+def _pair(row: Mapping[Any, Any]) -> str:
+    return f"{row['task']} x {row['method']}"
 
 
 def _median(values: pd.Series) -> float:

@@ -20,6 +20,7 @@ import pandas as pd
 
 from analysis.results import Results, load_results
 from coartic import CoarticError, Task
+from coartic.text import one_line
 
 METHODS = "optimum/"  # methods that search for it
 DATA = Path(__file__).with_name("optimum.json")
@@ -182,7 +183,7 @@ def main() -> None:
     try:
         new = collect(load_results(Path(sys.argv[1])))
     except CoarticError as error:
-        sys.exit(str(error))
+        sys.exit(one_line(str(error)))
 
     def key(entry: dict[str, Any]) -> tuple[str, str, str]:
         return entry["task"], entry["base"], entry["other_arm"]

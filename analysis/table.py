@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from analysis.inference.statistics import Inference
+from analysis.markup import markdown_text
+from coartic.text import one_line
 
 NONE = "–"
 
@@ -19,16 +21,23 @@ class Table:
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    links: tuple[str, ...] = ()
+    """Addresses that the first cells of the rows lead to, in Markdown; none by default."""
 
     def to_markdown(self) -> str:
-        """The table alone, without its title."""
+        """The table alone, without its title. Its cells are plain text."""
 
-        def line(cells: Sequence[str]) -> str:
-            return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        def line(cells: Iterable[str]) -> str:
+            return f"|{'|'.join(cells)}|"
 
-        return "\n".join(
-            [line(self.columns), line(["---"] * len(self.columns)), *map(line, self.rows)]
-        )
+        def texts(cells: Iterable[str]) -> list[str]:
+            return [markdown_text(f" {one_line(cell)} ") for cell in cells]
+
+        rows = list(map(texts, self.rows))
+        for row, link in zip(rows, self.links, strict=False):
+            row[0] = f" [{row[0].strip()}]({link}) "
+        rule = line([" --- "] * len(self.columns))
+        return "\n".join([line(texts(self.columns)), rule, *map(line, rows)])
 
 
 def short(value: float) -> str:

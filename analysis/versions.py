@@ -25,7 +25,9 @@ from analysis.inference.statistics import (
     paired_by_seed,
     paired_difference,
 )
+from analysis.markup import code, escaped
 from analysis.methods import solve_times
+from analysis.page import Heading, Part, page
 from analysis.results import CellRuns, Results, load_results
 from analysis.study import SEED
 from analysis.table import NONE, Table
@@ -58,6 +60,7 @@ class VersionComparison:
     only: tuple[dict[str, list[str]], dict[str, list[str]]]
     """Cells that one folder alone has: tasks by method with variant."""
     notes: list[str]
+    """In inline markup."""
 
     @property
     def summary(self) -> list[str]:
@@ -97,22 +100,22 @@ class VersionComparison:
     def to_markdown(self) -> str:
         """The whole page."""
         first, second = self.folders
-        parts = [
-            "# Two sets of results",
-            f"A: `{first}`. B: `{second}`.",
-            "\n".join(f"- {line}" for line in self.summary),
-            f"## {self.differing.title}",
-            self.differing.to_markdown() if self.differing.rows else "Nothing.",
+        parts: list[Part] = [
+            Heading(1, "Two sets of results"),
+            f"A: {code(str(first))}. B: {code(str(second))}.",
+            self.summary,
+            Heading(2, self.differing.title),
+            self.differing if self.differing.rows else "Nothing.",
             f"The same: {', '.join(self.same) or 'nothing'}.",
-            f"## {self.table.title}",
-            self.table.to_markdown(),
-            "\n".join(f"- {note}" for note in self.notes),
+            Heading(2, self.table.title),
+            self.table,
+            self.notes,
         ]
         for side, tasks in zip("AB", self.only, strict=True):
             if tasks:
-                parts.append(f"## Cells only in {side}")
-                parts.append("\n".join(f"- {name}: {', '.join(on)}" for name, on in tasks.items()))
-        return "\n\n".join(parts) + "\n"
+                parts.append(Heading(2, f"Cells only in {side}"))
+                parts.append([escaped(f"{name}: {', '.join(on)}") for name, on in tasks.items()])
+        return page(parts)
 
 
 def load_pair(first: Path, second: Path) -> tuple[Results, Results]:

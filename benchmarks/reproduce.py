@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import Store
 from coartic import CoarticError, Trajectory, trajectory
 from coartic.record import Record, RecordError
+from coartic.text import shell_line
 
 
 def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
@@ -71,10 +71,10 @@ def perform_once(spec: RunSpec) -> Record:
 
 def command_for(record: Record, folder: Path) -> str:
     """The command that performs the run of a record again."""
-    words = ["coartic", "reproduce", record.run_id, "--in", str(folder)]
+    words: list[str | Path] = ["coartic", "reproduce", record.run_id, "--in", folder]
     if record.origin.endswith(".py"):
-        words += ["--method-file", record.origin]
-    return shlex.join(words)
+        words += ["--method-file", Path(record.origin)]
+    return shell_line(*words)
 
 
 def differences(a: Record, b: Record) -> list[str]:

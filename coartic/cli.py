@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import importlib.util
 import io
-import json
 import sys
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from rich import box
@@ -21,6 +20,7 @@ from rich.table import Table as RichTable
 
 from coartic import CoarticError, __version__, builtin_tasks, load_task
 from coartic.compiled import PACKAGE
+from coartic.text import json_text, one_line
 
 if TYPE_CHECKING:
     from benchmarks.harness import Progress
@@ -42,19 +42,30 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
-    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
+    warnings.showwarning = lambda message, *_, **__: _complain("warning", str(message))
     try:
         _check_packages()
         app(prog_name="coartic")
     except CoarticError as error:
-        for line in str(error).splitlines():
-            print(f"error: {line}", file=sys.stderr)
+        _complain("error", str(error))
         sys.exit(2)
     except BrokenPipeError:
         raise
     except OSError as error:
-        print(f"error: {error.strerror or error}", file=sys.stderr)
+        _complain("error", str(error.strerror or error))
         sys.exit(1)
+
+
+def _complain(kind: str, text: str) -> None:
+    _say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
+
+
+def _say(*lines: str, stream: TextIO | None = None) -> None:
+    """Print lines; whatever names are in them, each is one, and prints.
+
+    Text comes to a terminal here, in :func:`_print` and in :class:`_Display`.
+    """
+    print("\n".join(map(one_line, lines)), file=stream)
 
 
 def _check_packages() -> None:
@@ -151,7 +162,8 @@ def run(
 
     Interrupted by whatever, the same command goes on where it stopped.
     """
-    from analysis.comparison import compare, plain
+    from analysis.comparison import compare
+    from analysis.markup import words
     from analysis.methods import methods_frame
     from analysis.results import load_results
     from benchmarks.cluster import Dask
@@ -196,10 +208,10 @@ def run(
             )
         except KeyboardInterrupt:
             display.close()
-            print(
+            _say(
                 f"interrupted; {display.done} runs done now are kept in {out}, "
                 "and the same command goes on from there",
-                file=sys.stderr,
+                stream=sys.stderr,
             )
             sys.exit(130)
         wall = time.perf_counter() - clock
@@ -225,11 +237,12 @@ def run(
     if hidden:
         console.print("(The terminal is too narrow for all columns; comparison.md has them.)\n")
     for note in comparison.notes:
-        console.print(f"- {plain(note)}", markup=False, highlight=False)
-    print(
-        f"\n{progress.total} runs: {progress.present} were there, {progress.done} done in "
+        console.print(one_line(f"- {words(note)}"))
+    _say(
+        "",
+        f"{progress.total} runs: {progress.present} were there, {progress.done} done in "
         f"{wall:.1f} s; {progress.failed} failed. "
-        f"Results in {out}, this comparison in {out / 'comparison.md'}."
+        f"Results in {out}, this comparison in {out / 'comparison.md'}.",
     )
     if any(record.status == "crashed" for record in records.values()):
         sys.exit(1)
@@ -353,7 +366,7 @@ def analyse(
             for entry in judged
         ],
     )
-    print(f"In {folder}: {', '.join(pages)}.")
+    _say(f"In {folder}: {', '.join(pages)}.")
 
 
 @app.command()
@@ -368,8 +381,8 @@ def show(
     shown = record.model_dump(mode="json")
     shown["rewards"] = f"{len(record.rewards)} trials, in learning.parquet and in the record"
     shown["record"] = str(store.path(record.run_id))
-    print(json.dumps(shown, indent=2, ensure_ascii=False))
-    print(f"\nReproduce it with: {command_for(record, store.folder)}")
+    _say(*json_text(shown, indent=2).split("\n"))
+    _say("", f"Reproduce it with: {command_for(record, store.folder)}")
 
 
 @app.command()
@@ -390,13 +403,13 @@ def reproduce(
     found = differences(record, again)
     label = f"{record.run_id} ({spec.method} on {spec.task.name}, run {spec.run})"
     if record.code != again.code:
-        print(f"The record was made by code {record.code}; here is {again.code}.")
+        _say(f"The record was made by code {record.code}; here is {again.code}.")
     if not found:
-        print(f"{label}: identical.")
+        _say(f"{label}: identical.")
         return
-    print(f"{label}: different.")
+    _say(f"{label}: different.")
     for difference in found:
-        print(f"- {difference}")
+        _say(f"- {difference}")
     sys.exit(1)
 
 
@@ -417,9 +430,9 @@ def check(
     else:
         raise unknown("method", subject, known)
     for law in laws:
-        print(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
+        _say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
     broken = sum(not law.passed for law in laws)
-    print(f"\n{subject}: {len(laws) - broken} of {len(laws)} laws hold.")
+    _say("", f"{subject}: {len(laws) - broken} of {len(laws)} laws hold.")
     if broken:
         sys.exit(1)
 
@@ -449,7 +462,7 @@ def draw(
         load_task(path) for path in task_file or []
     ]
     write_outputs({out: picture(tasks_plot(chosen), out.suffix.lower())}, replace=replace)
-    print(f"{', '.join(task.name for task in chosen)} drawn in {out}.")
+    _say(f"{', '.join(task.name for task in chosen)} drawn in {out}.")
 
 
 @app.command()
@@ -488,7 +501,7 @@ def report(
         [f".{name}" for name in _names(formats, "--formats")],
     )
     write(made, study, out)
-    print(
+    _say(
         f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
         f"it: report.md, {len(made.document.tables())} tables (tables/, CSV and LaTeX), "
         f"{len(made.plots)} figures (figures/, as {formats}), numbers.tex."
@@ -509,7 +522,7 @@ def trace(
     from analysis.report.trace import trace as find
 
     where = [part for part in (row, column) if part is not None]
-    print(trace_text(find(find_report(folder), name, where)))
+    _say(*trace_text(find(find_report(folder), name, where)).split("\n"))
 
 
 @app.command()
@@ -539,9 +552,9 @@ def compare(
     console = _console()
     for table in (found.differing, found.table):
         _print(console, table.title, table.columns, table.rows, wrap=table is found.differing)
-    print("\n".join(found.summary))
+    _say(*found.summary)
     if written:
-        print(f"In {' and '.join(map(str, written))}.")
+        _say(f"In {' and '.join(map(str, written))}.")
 
 
 @app.command()
@@ -576,13 +589,14 @@ def animate(
         if name is not None:
             _, record = find_record(name, folder)
             found = trajectory_of(record)
-            panels.append(Panel(f"{found.task.name}: {record.method}, run {record.run}", found))
+            title = one_line(f"{found.task.name}: {record.method}, run {record.run}")
+            panels.append(Panel(title, found))
     if initial:
         task = panels[0].trajectory.task
         movements = corrective_trial(task, initial_hands(task)).movements
         panels.insert(0, Panel(f"{task.name}: initial solution", trajectory(task, movements)))
     timed = film(panels, out, speed=speed, width=width, replace=replace)
-    print(
+    _say(
         f"{' beside '.join(panel.title for panel in panels)} in {out}: "
         f"{len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second."
     )
@@ -615,12 +629,17 @@ def cite(
             MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN_ORIGIN)
             for name, item in manifest["specification"]["methods"].items()
         ]
-    print(bibliography(methods, analysis=analysis, environment=environment), end="")
+    text = bibliography(methods, analysis=analysis, environment=environment)
+    _say(*text.rstrip("\n").split("\n"))
+
+
+_AS_IT_IS: Any = {"markup": False, "emoji": False, "highlight": False}
+"""Names in square brackets or between colons are no markup of rich."""
 
 
 def _console() -> Console:
-    console = Console()
-    return console if console.is_terminal else Console(width=PLAIN_WIDTH)
+    console = Console(**_AS_IT_IS)
+    return console if console.is_terminal else Console(width=PLAIN_WIDTH, **_AS_IT_IS)
 
 
 class _Display:
@@ -631,9 +650,9 @@ class _Display:
     def __init__(self, suite: str) -> None:
         self.done = 0
         self._suite = suite
-        self._console = Console(stderr=True)
+        self._console = Console(stderr=True, **_AS_IT_IS)
         self._bar = RichProgress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TextColumn("{task.fields[failed]} failed"),
@@ -677,13 +696,16 @@ class _Display:
                 return
             self._bar.start()
             self._task = self._bar.add_task(
-                self._suite, total=progress.total - progress.present, failed=0
+                one_line(self._suite), total=progress.total - progress.present, failed=0
             )
         words = "starting workers (the first time compiles)"
         if spec is not None:
             words = f"{spec.task.name} {spec.method}"
         self._bar.update(
-            self._task, completed=progress.done, failed=progress.failed, description=words
+            self._task,
+            completed=progress.done,
+            failed=progress.failed,
+            description=one_line(words),
         )
 
     def _plain(self, progress: Progress) -> None:
@@ -706,7 +728,7 @@ class _Display:
 
     def line(self, text: str) -> None:
         """Show a line above the progress."""
-        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+        self._console.print(one_line(text), soft_wrap=True)
 
 
 def _print(
@@ -723,15 +745,18 @@ def _print(
     terminal's width is left out from the right.
     """
     shown = len(columns)
+    columns, rows = tuple(map(one_line, columns)), [tuple(map(one_line, row)) for row in rows]
     if not wrap:
         widths = [max(map(len, column)) + 4 for column in zip(columns, *rows, strict=True)]
         while shown > 2 and sum(widths[:shown]) > console.width:
             shown -= 1
-    table = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD, highlight=False)
+    table = RichTable(
+        title=one_line(title), title_justify="left", box=box.SIMPLE_HEAD, highlight=False
+    )
     for index, column in enumerate(columns[:shown]):
         fixed = index == 0 or not wrap
         table.add_column(column, overflow="fold", no_wrap=fixed)
     for row in rows:
         table.add_row(*row[:shown])
-    console.print(table, markup=False)
+    console.print(table)
     return len(columns) - shown

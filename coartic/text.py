@@ -2,12 +2,19 @@
 
 Names, titles and reasons come from files and methods of others, and go to terminals, pages,
 LaTeX and commands to paste. What a person writes in a file is refused where it is not plain
-(:data:`Line`); what a program says is kept, made plain (:func:`plain`).
+(:data:`Line`); what a program says is kept, made plain (:func:`plain`). What is shown goes
+through :func:`one_line` wherever it comes from: each language escapes its own marks besides.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+import os
+import re
+import shlex
+import unicodedata
+from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
@@ -16,24 +23,79 @@ LONGEST_LINE = 500
 """Characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
 """Characters of a reason that is kept."""
+_DOUBTFUL = re.compile("[^ -~]")  # the rest prints
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
-    """Text as one printable line of at most ``most`` characters.
+    """Text as one printable line (:func:`one_line`) of at most ``most`` characters."""
+    shown = one_line(text.strip())
+    return shown if len(shown) <= most else shown[: most - 1] + "…"
+
+
+def one_line(text: str) -> str:
+    """Text as one printable line, whole; one that is so already stays as it is.
 
     Lines are joined by `` | ``; what else does not print (control characters, escape sequences,
     marks that turn the direction of writing) is shown as its escape, such as ``\\x1b``.
     """
-    line = " | ".join(part.strip() for part in text.splitlines() if part.strip())
-    shown = "".join(
-        c if c.isprintable() else c.encode("unicode_escape").decode() for c in line[: most + 1]
+    if _printable_line(text):
+        return text
+    return " | ".join(printed(part.strip()) for part in text.splitlines() if part.strip())
+
+
+def printed(text: str) -> str:
+    """Text with an escape for every character that does not print, line breaks among them."""
+
+    def shown(match: re.Match[str]) -> str:
+        return match[0] if _prints(match[0]) else match[0].encode("unicode_escape").decode()
+
+    return _DOUBTFUL.sub(shown, text)
+
+
+def json_text(content: Any, *, indent: int | None = None, allow_nan: bool = True) -> str:
+    """JSON in which every character prints; compact without ``indent``."""
+    separators = None if indent else (",", ":")
+    text = json.dumps(
+        content, indent=indent, separators=separators, ensure_ascii=False, allow_nan=allow_nan
     )
-    return shown if len(shown) <= most else shown[: most - 1] + "…"
+
+    def shown(match: re.Match[str]) -> str:
+        # Line breaks are only between values, where indent makes them.
+        return match[0] if _prints(match[0]) or match[0] == "\n" else json.dumps(match[0])[1:-1]
+
+    return _DOUBTFUL.sub(shown, text)
+
+
+def shell_line(*arguments: str | Path) -> str:
+    """A command to paste: its arguments quoted for a shell, on one line that prints.
+
+    No path is taken for an option.
+    """
+    return " ".join(map(_quoted, arguments))
+
+
+def _quoted(argument: str | Path) -> str:
+    if isinstance(argument, Path):
+        argument = f"./{argument}" if str(argument).startswith("-") else str(argument)
+    if _printable_line(argument):
+        return shlex.quote(argument)
+    # bash, zsh and ksh read $'...', of which every other byte may be written by its number.
+    safe = frozenset(b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 @%+=:,./_-")
+    octets = (chr(b) if b in safe else f"\\{b:03o}" for b in os.fsencode(argument))
+    return f"$'{''.join(octets)}'"
+
+
+def _printable_line(text: str) -> bool:
+    return text.isprintable() or all(map(_prints, text))
+
+
+def _prints(c: str) -> bool:
+    return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
 def _printable(text: str) -> str:
     for c in text:
-        if not c.isprintable():
+        if not _prints(c):
             escape = c.encode("unicode_escape").decode()
             raise PydanticCustomError(
                 "not_plain",

@@ -200,7 +200,10 @@ def test_methods_of_others_cite_themselves():
     silent = MethodSource("lab/silent", "Silent", "", False)
     text = bibliography([own, silent])
     assert "hansen2016" not in text  # an id like ours makes nobody one of ours
-    assert r"  note = {A. B. C\_d (2020), me@here, 5 \% of \{x\}.}," in text
+    assert (
+        r"  note = {A. B. C\_d (2020), me@here, 5 \% of "
+        r"\textbraceleft{}x\textbraceright{}.}," in text
+    )
     assert r"  title = {Bold \& fast}," in text
     assert "@misc{method-cma-es-bold,\n" in text
     comments = [line for line in text.splitlines() if line.startswith("%")]

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparison import Comparison, Table, compare, plain
+from analysis.comparison import Comparison, Table, compare
+from analysis.markup import words
 from analysis.published import (
     Summary,
     pooled,
@@ -103,7 +104,7 @@ def test_cells_and_sequences(tmp_path):
 
 
 def test_notes_for_a_terminal():
-    assert plain("\\* of **x** and `y` in *z*") == "* of x and y in z"
+    assert words("\\* of **x** and `y` in *z*") == "* of x and y in z"
 
 
 def test_hands_the_paper_does_not_print(tmp_path):

@@ -15,6 +15,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from analysis.markup import Span, inline
 from analysis.report.document import (
     Bullets,
     Column,
@@ -34,7 +35,7 @@ from analysis.report.legends import with_legends
 from analysis.report.markdown import markdown
 from analysis.report.summary import without_variants
 from analysis.report.tables_csv import runs_csv, table_csv
-from analysis.report.text import Span, inline, number_text, parts, typographic
+from analysis.report.text import number_text, parts, typographic
 from analysis.report.write import write_report
 from coartic import CoarticError
 from coartic.files import LISTING
@@ -113,6 +114,9 @@ def test_documents_that_do_not_fit_are_refused():
         ("plain", [Span("text", "plain")]),
         ("a *b c* d", [Span("text", "a "), Span("emphasis", "b c"), Span("text", " d")]),
         ("`x*y*z`", [Span("code", "x*y*z")]),
+        ("**a b**c *d*", [Span("strong", "a b"), Span("text", "c "), Span("emphasis", "d")]),
+        (r"**a\*\[b** *\`*", [Span("strong", "a*[b"), Span("text", " "), Span("emphasis", "`")]),
+        ("[w](javascript:x) [w](../x)", [Span("text", "[w](javascript:x) [w](../x)")]),
         ("[w](#a)[1]", [Span("link", "w", "#a"), Span("text", "[1]")]),
         (r"\*a\* \[b](c)", [Span("text", "*a* [b](c)")]),
         ("2 * 3 * 4", [Span("text", "2 * 3 * 4")]),
@@ -338,7 +342,7 @@ def test_markdown():
     bars = [len(re.findall(r"(?<!\\)\|", row)) for row in rows]
     assert bars == [len(parts(TABLE)) + 1] * 5
     assert rows[1].count("---:") == 6  # reward, SD, interval, share, runs, p
-    assert "−483.2 | 5.0 | \\[−490.1, −477.0\\] | 3.9" in rows[2]
+    assert "−483.2 | 5.0 | [−490.1, −477.0] | 3.9" in rows[2]
     assert "](figures/line-1.svg)" in text
     assert [line for line in text.splitlines() if line.startswith("#")][1:] == [
         "## Summary",

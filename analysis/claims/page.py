@@ -11,6 +11,8 @@ import pandas as pd
 
 from analysis.claims import register
 from analysis.claims.register import Judged
+from analysis.markup import code, escaped
+from analysis.page import Heading, Part, page
 from analysis.results import Results
 from analysis.table import NONE, Table
 
@@ -62,11 +64,11 @@ def claims_page(results: Results, judged: Sequence[Judged]) -> str:
     specification = results.manifest["specification"]
     tests = sum(not math.isnan(entry.p) for entry in judged)
     contraries = sum(not math.isnan(entry.contrary_p) for entry in judged)
-    parts = [
-        "# Claims",
+    parts: list[Part] = [
+        Heading(1, "Claims"),
         f"What Shah, Barto & Fagg (2013) say of their model, tested on suite "
-        f"`{specification['suite']}`: {specification['runs']} runs of {specification['trials']} "
-        f"trials, seed {specification['seed']}.",
+        f"{code(specification['suite'])}: {specification['runs']} runs of "
+        f"{specification['trials']} trials, seed {specification['seed']}.",
         _summary(judged),
         f"{_rules()} {FITTED} Run ids of every claim are in `claims.csv`.",
         Table(
@@ -74,20 +76,21 @@ def claims_page(results: Results, judged: Sequence[Judged]) -> str:
             ("claim", "verdict", "adjusted p", "of the contrary"),
             tuple(
                 (
-                    f"[{entry.claim.id}](#{entry.claim.id})",
+                    entry.claim.id,
                     _verdict(entry),
                     _p(entry.adjusted_p),
                     _p(entry.adjusted_contrary_p),
                 )
                 for entry in judged
             ),
-        ).to_markdown(),
+            tuple(f"#{entry.claim.id}" for entry in judged),
+        ),
         f"Adjusted by Holm over the {tests} claims that could be tested here, for the contrary "
         f"over {contraries}.",
     ]
     for section, entries in itertools.groupby(judged, key=lambda entry: entry.claim.section):
-        parts += [f"## {section}", *map(_entry, entries)]
-    return "\n\n".join(parts) + "\n"
+        parts += [Heading(2, section), *(part for entry in entries for part in _entry(entry))]
+    return page(parts)
 
 
 def _summary(judged: Sequence[Judged]) -> str:
@@ -103,7 +106,7 @@ def _summary(judged: Sequence[Judged]) -> str:
             for verdict in ("supported", "not supported", "cannot tell")
         )
         lines.append(f"**{name}**: {len(entries)} claims, {counted}.")
-    return "  \n".join(lines)
+    return "\n".join(lines)
 
 
 def _rules() -> str:
@@ -111,24 +114,23 @@ def _rules() -> str:
     return (register.__doc__ or "").split("\n\n", 1)[1].strip().replace("\n", " ")
 
 
-def _entry(entry: Judged) -> str:
+def _entry(entry: Judged) -> list[Part]:
     claim = entry.claim
     where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
     quote = f": “{claim.quote}”" if claim.quote else ""
-    lines = [
-        f"### {claim.id}",
-        f"{claim.statement} **{_verdict(entry).capitalize()}.**",
-        f"- Seen: {entry.evidence}.",
-        f"- Test: {claim.test}.",
-    ]
+    items = [f"Seen: {escaped(entry.evidence)}.", f"Test: {claim.test}."]
     if claim.place and entry.methods:
         p = f"p = {_p(entry.p)}, adjusted {_p(entry.adjusted_p)}"
         contrary = f"of the contrary {_p(entry.contrary_p)}, adjusted "
         contrary += _p(entry.adjusted_contrary_p)
-        lines.append(f"- {p}; {contrary}; {'; '.join(entry.methods)}.")
-    lines.append(f"- Place: {where}{quote}. Rests on: {_basis(entry)}.")
-    text = "\n\n".join([*lines[:2], "\n".join(lines[2:])])
-    return text if entry.table is None else f"{text}\n\n{entry.table.to_markdown()}"
+        items.append(f"{p}; {contrary}; {escaped('; '.join(entry.methods))}.")
+    items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.")
+    parts: list[Part] = [
+        Heading(3, claim.id),
+        f"{escaped(claim.statement)} **{_verdict(entry).capitalize()}.**",
+        items,
+    ]
+    return parts if entry.table is None else [*parts, entry.table]
 
 
 def _basis(entry: Judged) -> str:

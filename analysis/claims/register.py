@@ -49,6 +49,7 @@ class Claim:
     statement: str
     section: Section
     test: str
+    """In inline markup."""
     judge: Callable[[Data], Finding]
     place: str = ""
     """Section of the paper that makes it; empty for comparisons of our own."""

@@ -12,12 +12,14 @@ from pathlib import Path
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from analysis.figures.style import GREY, INK, PAPER, RC
 from analysis.figures.svg import compact
 from coartic import CoarticError
 from coartic.files import write_atomically
+from coartic.text import one_line, printed
 
 FORMATS = (".png", ".svg", ".pdf")
 FILES = (*FORMATS, ".csv")
@@ -123,7 +125,7 @@ def svg_text(plot: Plot) -> str:
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
     head += ' stroke-linejoin="round" stroke-linecap="butt"'
     head += f' font-family="{_FAMILY}" fill="currentColor"'
-    head = f'{head} role="img" aria-label="{html.escape(plot.alt)}"'
+    head = f'{head} role="img" aria-label="{html.escape(one_line(plot.alt))}"'
     return f"{head}>{body.replace('xlink:href', 'href')}".strip() + "\n"
 
 
@@ -140,7 +142,10 @@ def _smaller(stream: io.BytesIO, ending: str) -> bytes:
 
 
 def _settle(figure: Figure) -> None:
-    """Lay the figure out once, for all formats."""
+    """Lay the figure out once, for all formats, with words that print."""
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        text.set_text("\n".join(map(printed, text.get_text().split("\n"))))
     if figure.get_layout_engine() is not None:
         for _ in range(2):  # the first time does not know how tall titles are
             figure.draw_without_rendering()

@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from coartic import Task
+from coartic.text import one_line
 
 INCH = 25.4  # mm
 ONE = 85 / INCH
@@ -162,7 +163,7 @@ _VARIANTS = {
 
 def short(label: str) -> str:
     """The name of a method with its variant as figures show it."""
-    method, _, variant = label.partition(" ")
+    method, _, variant = one_line(label).partition(" ")
     name = _SHORT.get(method)
     if name is None:
         name = method

@@ -11,8 +11,10 @@ import pandas as pd
 from analysis.frontier.frames import LABELS, OTHER_ARMS, TIME_TOLERANCE
 from analysis.frontier.progress import SPENDS
 from analysis.inference.statistics import CONFIDENCE
+from analysis.markup import escaped
 from analysis.optimum import METHODS as OPTIMUM
 from analysis.optimum import Optimum, optima
+from analysis.page import Heading, Part, page
 from analysis.results import Results
 from analysis.table import NONE, Table, short
 
@@ -30,21 +32,23 @@ def frontier_page(
     From the frames of :mod:`analysis.frontier`: targets and areas of both optima.
     """
     references = optima(results)
-    parts = ["# Reward and what it costs", *_NOTES]
+    parts: list[Part] = [Heading(1, "Reward and what it costs"), *_NOTES]
     for name, task in results.tasks.items():
-        parts.append(f"## {name}{' †' if task.reconstructed else ''}")
+        parts.append(Heading(2, f"{name}{' †' if task.reconstructed else ''}"))
         arms = OTHER_ARMS if len(task.hands) > 1 else OTHER_ARMS[:1]
         known = [_optimum(references.get((name, arm)), arm) for arm in arms]
         parts.append(f"Optimum: {'; '.join(known)}.")
         for spend in SHOWN:
             for table, never in targets_tables(_own(targets, name, arms), spend):
                 parts += _shown([table])
-                parts += [f"No run within the widest: {', '.join(never)}."] if never else []
+                parts += (
+                    [f"No run within the widest: {escaped(', '.join(never))}."] if never else []
+                )
         parts += _shown(areas_tables(_own(areas, name, arms)))
         parts += _shown(pareto_tables(pareto[pareto.task == name]))
     if any(task.reconstructed for task in results.tasks.values()):
         parts.append("† Reconstructed task (docs/model.md).")
-    return "\n\n".join(parts) + "\n"
+    return page(parts)
 
 
 _NOTES = (
@@ -143,13 +147,8 @@ def _own(frame: pd.DataFrame, task: str, arms: Sequence[str]) -> pd.DataFrame:
     return frame[(frame.task == task) & frame.other_arm.isin(arms)]
 
 
-def _shown(tables: list[Table]) -> list[str]:
-    return [
-        part
-        for table in tables
-        if table.rows
-        for part in (f"### {table.title}", table.to_markdown())
-    ]
+def _shown(tables: list[Table]) -> list[Part]:
+    return [part for table in tables if table.rows for part in (Heading(3, table.title), table)]
 
 
 def _optimum(known: Optimum | None, arm: str) -> str:

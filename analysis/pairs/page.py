@@ -10,6 +10,8 @@ import pandas as pd
 
 from analysis.frontier.frames import SHARES
 from analysis.inference.statistics import LEVEL, RESAMPLES, Inference
+from analysis.markup import code, escaped
+from analysis.page import Heading, Part, page
 from analysis.pairs.overall import NEAR, everywhere
 from analysis.study import Study
 from analysis.table import NONE, Table, interval, short
@@ -23,19 +25,19 @@ def comparisons_page(
     """Markdown of :func:`analysis.pairs.pairwise.pairwise_frame` and
     :func:`analysis.pairs.overall.overall_frame`; ``scores`` is what the latter was made of."""
     specification = study.results.manifest["specification"]
-    parts = [
-        "# Methods against each other",
-        f"On suite `{specification['suite']}`, seed {specification['seed']}. Numbers and more of "
-        "them: `comparisons.csv`, `across_tasks.csv`, `profiles.csv` (docs/statistics.md).",
+    parts: list[Part] = [
+        Heading(1, "Methods against each other"),
+        f"On suite {code(specification['suite'])}, seed {specification['seed']}. Numbers and more "
+        "of them: `comparisons.csv`, `across_tasks.csv`, `profiles.csv` (docs/statistics.md).",
     ]
     if len(pairs):
-        parts.append("\n".join(f"- {note}" for note in _notes(pairs)))
+        parts.append(list(_notes(pairs)))
     else:
         parts.append("The folder has no runs of the learner under a condition of the paper.")
     for name, rows in pairs.groupby("task", sort=False):
         mark = " †" if study.results.tasks[str(name)].reconstructed else ""
-        parts.append(f"## {name}{mark}")
-        parts.append("\n".join(f"- {line}" for line in _summary(rows)))
+        parts.append(Heading(2, f"{name}{mark}"))
+        parts.append(list(_summary(rows)))
         order = rows.assign(by=rows.kind.map(_KINDS)).sort_values(
             ["by", "first", "mean_second"], ascending=[True, False, False], kind="stable"
         )
@@ -45,10 +47,8 @@ def comparisons_page(
             _spending_table(order),
             _sizes_table(order, best.reward if best else None),
         ):
-            parts += [f"### {table.title}", table.to_markdown()]
-    parts.append("## Across tasks")
-    parts += _across(overall, scores)
-    return "\n\n".join(parts) + "\n"
+            parts += [Heading(3, table.title), table]
+    return page([*parts, Heading(2, "Across tasks"), *_across(overall, scores)])
 
 
 def _notes(pairs: pd.DataFrame) -> Iterator[str]:
@@ -148,7 +148,7 @@ def _summary(rows: pd.DataFrame) -> Iterator[str]:
         if untested:
             parts.append(f"not tested (too few runs) against {', '.join(untested)}")
         what = {"conditions": "other conditions", "variant": "its variants", "method": "methods"}
-        yield f"{first} and {what[str(kind)]}: {'; '.join(parts)}."
+        yield escaped(f"{first} and {what[str(kind)]}: {'; '.join(parts)}.")
 
 
 def _inference_table(rows: pd.DataFrame) -> Table:
@@ -243,18 +243,18 @@ def _sizes_table(rows: pd.DataFrame, optimum: int | None) -> Table:
     )
 
 
-def _across(overall: pd.DataFrame, scores: pd.DataFrame) -> Iterator[str]:
+def _across(overall: pd.DataFrame, scores: pd.DataFrame) -> Iterator[Part]:
     tasks = list(dict.fromkeys(scores.task))
     if len(tasks) < 2:
-        known = ", ".join(tasks) or "none"
+        known = escaped(", ".join(tasks)) or "none"
         yield f"Needs at least two tasks with known optimum and initial solution; here: {known}."
         return
     if not len(overall):
-        yield f"No method ran on all of {', '.join(tasks)}, the optimum's searches aside."
+        yield f"No method ran on all of {escaped(', '.join(tasks))}, the optimum's searches aside."
         return
     yield (
-        f"On {', '.join(tasks)}, each counting the same. Score: 0 the initial solution, 1 the "
-        "optimum with all joints free; interquartile mean. Gap: mean share of the optimum. "
+        f"On {escaped(', '.join(tasks))}, each counting the same. Score: 0 the initial solution, "
+        "1 the optimum with all joints free; interquartile mean. Gap: mean share of the optimum. "
         "Within: share of runs whose gap is at most so much. 95 % intervals: runs resampled "
         "within tasks (other runs, not other tasks); none for methods that are run once, and none "
         "where the runs of each task all reach a gap or none does. *dual-process (EC1, EC4)*: EC1 "
@@ -274,11 +274,11 @@ def _across(overall: pd.DataFrame, scores: pd.DataFrame) -> Iterator[str]:
             )
             for row in overall.to_dict("records")
         ),
-    ).to_markdown()
+    )
     left = [name for name in dict.fromkeys(scores.method) if name not in everywhere(scores)]
     left = [name for name in left if not name.startswith("optimum/")]
     if left:
-        yield f"Not run on all of these tasks: {', '.join(left)}."
+        yield f"Not run on all of these tasks: {escaped(', '.join(left))}."
 
 
 def _least_p(row: Mapping[Any, Any]) -> float:

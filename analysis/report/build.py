@@ -16,6 +16,7 @@ from analysis.figures import Figures, Plot, all_figures
 from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.frontier.frames import area_frame, for_both_arms, targets_frame
 from analysis.inference.across_tasks import scores_frame
+from analysis.markup import escaped, words
 from analysis.pairs.overall import combined, overall_frame
 from analysis.pairs.pairwise import pairwise_frame
 from analysis.report import tables
@@ -36,7 +37,6 @@ from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
 from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
-from analysis.report.text import escaped
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results import Results
@@ -141,7 +141,7 @@ def write(report: Report, study: Study, folder: Path) -> None:
     Raises CoarticError where it cannot be written, or something is in the way.
     """
     check_report_folder(folder, study.results.folder)
-    about = [f"Headline values of {_title(study.results)}.", _lead(study.results)]
+    about = [f"Headline values of {_title(study.results)}.", words(_lead(study.results))]
     about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
@@ -162,7 +162,7 @@ def _lead(results: Results) -> str:
     if commit:
         where += f", commit {commit['id'][:12]}{' with changes' if commit['dirty'] else ''}"
     trials = specification["trials"]
-    return (
+    return escaped(
         f"{len(results.runs)} runs, up to {specification['runs']} a cell"
         + (f", of {trials} trials where a method learns" if trials else "")
         + f"; seed {specification['seed']}. Made with {where} on {environment['date'][:10]}."
@@ -185,7 +185,7 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
     unlike = unlike_printed(study)
     counted = verdicts(judged, CLAIMS)
     if unlike:
-        note = f"Not as printed: {'; '.join(unlike)} ([table](#published-and-ours))."
+        note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         counted = Bullets((*counted.items, note))
     blocks.append(counted)
     overall = tables.overall_table(study, overall_frame(scores), scores)
@@ -257,7 +257,7 @@ def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Sectio
         lines = [
             f"{escaped(claim.statement)} *{entry.verdict}{mark}*.",
             f"Seen: {escaped(entry.evidence)}.",
-            f"Test: {escaped(claim.test)}. Place: {where}{quote}.{see}",
+            f"Test: {claim.test}. Place: {where}{quote}.{see}",
         ]
         content: list[Block] = [Prose(tuple(lines))]
         if entry.table is not None:

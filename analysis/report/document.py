@@ -5,9 +5,7 @@ A document holds content and raw values, no presentation: :mod:`analysis.report.
 number of a table names the cells (task, label) it was computed from, and the document
 knows the run ids of every cell, so each number leads to its runs.
 
-Strings of prose, items, captions and notes have minimal inline markup, read by
-:func:`analysis.report.text.inline`: ``*emphasis*``, ```code```, ``[words](address)``, and a
-backslash before ``*``, a backtick, ``[`` or ``\\`` for the character itself. Titles,
+Strings of prose, items, captions and notes have inline markup (:mod:`analysis.markup`). Titles,
 headers and values are plain text.
 """
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import html as entities
 import re
 from collections.abc import Mapping
-from html import escape
 from importlib.resources import files
 
+from analysis.markup import inline
 from analysis.report.document import (
     Block,
     Bullets,
@@ -19,8 +20,9 @@ from analysis.report.document import (
     Row,
     Section,
 )
-from analysis.report.text import Part, inline, parts, true_minus
+from analysis.report.text import Part, parts, true_minus
 from analysis.table import NONE
+from coartic.text import one_line
 
 _MAGNIFIED = 1.5
 _WIDE, _READABLE = 320.0, 1.4  # pt; CSS pixels per pt that text of 7 pt needs
@@ -88,6 +90,11 @@ def html(document: Document) -> str:
 """
 
 
+def escape(text: str) -> str:
+    """Plain text as one line of HTML, in attributes as well."""
+    return entities.escape(one_line(text))
+
+
 def _resource(name: str) -> str:
     return (files("analysis.report") / name).read_text(encoding="utf-8")
 
@@ -145,7 +152,7 @@ def _spans(text: str) -> str:
     def mark(style: str, words: str, address: str) -> str:
         if style == "link":
             return f'<a href="{escape(address)}">{escape(words)}</a>'
-        tag = {"emphasis": "em", "code": "code"}.get(style)
+        tag = {"emphasis": "em", "strong": "strong", "code": "code"}.get(style)
         words = words if style == "code" else true_minus(words)
         return f"<{tag}>{escape(words)}</{tag}>" if tag else escape(words)
 

@@ -13,9 +13,11 @@ import unicodedata
 from collections.abc import Sequence
 
 from analysis.figures.style import short
+from analysis.markup import inline
 from analysis.report.document import DataTable, Document, Value
-from analysis.report.text import MINUS, NO_SPREAD, Part, inline, parts
+from analysis.report.text import MINUS, NO_SPREAD, Part, parts
 from analysis.table import NONE
+from coartic.text import one_line
 
 _ESCAPES = {
     "\\": r"\textbackslash{}",
@@ -215,10 +217,12 @@ def _words(part: Part, value: Value) -> str:
 
 
 def latex_text(text: str) -> str:
-    """Plain text in LaTeX; characters that T1 lacks are written by their code."""
+    """Plain text in LaTeX, on one line; characters that T1 lacks are written by their code."""
     # Two hyphens in a row would become a dash; no line begins with a per cent sign.
-    characters = "".join(map(_character, text))
-    return re.sub("-(?=-)", "-{}", re.sub(r"(?<=\d) (?=\\%)", "~", characters))
+    characters = "".join(map(_character, one_line(text)))
+    return re.sub(
+        "-(?=-)|<(?=<)|>(?=>)|,(?=,)", r"\g<0>{}", re.sub(r"(?<=\d) (?=\\%)", "~", characters)
+    )
 
 
 def _character(character: str) -> str:
@@ -243,6 +247,8 @@ def _spans(text: str) -> str:
         words = latex_text(span.text)
         if span.style == "emphasis":
             words = f"\\emph{{{words}}}"
+        elif span.style == "strong":
+            words = f"\\textbf{{{words}}}"
         elif span.style == "code":
             words = f"\\texttt{{{words}}}"
         elif span.address.startswith(("http://", "https://")):

@@ -9,10 +9,11 @@ import numpy as np
 from analysis.inference.sample_size import POWER, smallest_difference
 from analysis.inference.spread import sd
 from analysis.inference.statistics import FEWEST
+from analysis.markup import code, escaped
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
 from analysis.report.summary import unlike_printed
-from analysis.report.text import escaped, typographic
+from analysis.report.text import typographic
 from analysis.study import Study
 
 
@@ -34,7 +35,7 @@ def limitations(study: Study) -> tuple[str, ...]:
 def _unlike(study: Study) -> Iterator[str]:
     found = unlike_printed(study)
     if found:
-        yield f"*Not reproduced.* {'; '.join(found)}."
+        yield f"*Not reproduced.* {escaped('; '.join(found))}."
 
 
 def _learned(study: Study) -> Iterator[str]:
@@ -44,8 +45,8 @@ def _learned(study: Study) -> Iterator[str]:
         replays = cell.good.replay_reward.dropna()
         if label.startswith(LEARNER) and not cell.variant and len(replays) == len(cell.good) > 0:
             parts.append(
-                f"{task} {label.removeprefix(LEARNER)} {_number(float(cell.good.reward.mean()))} "
-                f"({_number(float(replays.mean()))})"
+                f"{escaped(f'{task} {label.removeprefix(LEARNER)}')} "
+                f"{_number(float(cell.good.reward.mean()))} ({_number(float(replays.mean()))})"
             )
     if parts:
         yield (
@@ -66,13 +67,14 @@ def _reconstructed(study: Study) -> Iterator[str]:
                 f"{key} ({entry.source.rstrip('.')})" for key, entry in inferred.items()
             )
             yield (
-                f"*Reconstructed.* {name}: not printed in the paper but inferred from what is: "
-                f"{escaped(what)}. Rewards on it, and claims that rest on it (marked †), depend "
-                "on that."
+                f"*Reconstructed.* {escaped(name)}: not printed in the paper but inferred from "
+                f"what is: {escaped(what)}. Rewards on it, and claims that rest on it (marked †), "
+                "depend on that."
             )
         chosen = sorted(key for key, entry in task.provenance.items() if entry.status == "chosen")
         if chosen:
-            yield f"*Not the paper's.* {name}: {', '.join(chosen)} chosen by the task's author."
+            facts = escaped(f"{name}: {', '.join(chosen)}")
+            yield f"*Not the paper's.* {facts} chosen by the task's author."
 
 
 def _failures(study: Study) -> Iterator[str]:
@@ -84,12 +86,12 @@ def _failures(study: Study) -> Iterator[str]:
         task, status = map(str, key)
         labels = (own.method + " " + own.variant).str.strip()
         cells = ", ".join(
-            f"`{_code(str(label))}` ({count} of {len(study.cells[task, str(label)].runs)})"
+            f"{code(str(label))} ({count} of {len(study.cells[task, str(label)].runs)})"
             for label, count in labels.value_counts(sort=False).items()
         )
         others = ", and other reasons" if own.reason.nunique() > 1 else ""
         yield (
-            f"*Failures.* {task}: {len(own)} runs are {status} "
+            f"*Failures.* {escaped(task)}: {len(own)} runs are {escaped(status)} "
             f"({escaped(str(own.reason.iloc[0]))}{others}): {cells}. Means are over runs that "
             "have a solution."
         )
@@ -99,7 +101,8 @@ def _failures(study: Study) -> Iterator[str]:
         if lost and lost >= 0.01 * made:
             digits = 1 if 0.995 <= lost / made < 1 else 0
             parts.append(
-                f"{task}, `{_code(label)}` {lost} of {made} ({_percent(lost / made, digits)})"
+                f"{escaped(task)}, {code(label)} {lost} of {made} "
+                f"({_percent(lost / made, digits)})"
             )
     if parts:
         yield (
@@ -116,7 +119,7 @@ def _versions(study: Study) -> Iterator[str]:
         # Loading refuses folders of which that does not hold.
         yield (
             f"*Mixed versions.* Runs were made at {len(commits)} commits "
-            f"({', '.join(f'`{commit[:12]}`' for commit in commits)}); the code behind each "
+            f"({', '.join(code(commit[:12]) for commit in commits)}); the code behind each "
             "method's results is the same in all of them."
         )
     if len(known) < len(runs):
@@ -127,7 +130,7 @@ def _versions(study: Study) -> Iterator[str]:
     if changed:
         yield (
             "*Uncommitted changes.* The checkout was changed when runs were made at "
-            + ", ".join(f"`{commit[:12]}`" for commit in changed)
+            + ", ".join(code(commit[:12]) for commit in changed)
             + "; each run names the hash of the code behind it."
         )
     packages = runs.packages.nunique()
@@ -154,7 +157,7 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
             continue
         ticks = smallest_difference(spread, spread, len(rewards))
         found.append(
-            f"{task} {label.removeprefix(LEARNER)} {ticks:.1f} ticks "
+            f"{escaped(task)} {label.removeprefix(LEARNER)} {ticks:.1f} ticks "
             f"({_percent(ticks / -best.reward, 1)}, n = {len(rewards)})"
         )
     if found:
@@ -192,8 +195,8 @@ def _optima(study: Study) -> Iterator[str]:
     without = [task for task in study.results.tasks if (task, "free") not in study.optima]
     if without:
         yield (
-            f"*No optimum.* None is known of {', '.join(without)}: no gaps, targets or scores "
-            "there."
+            f"*No optimum.* None is known of {escaped(', '.join(without))}: no gaps, targets or "
+            "scores there."
         )
     for task in study.results.tasks:
         known = {arm: study.optima.get((task, arm)) for arm in ("free", "still")}
@@ -201,8 +204,8 @@ def _optima(study: Study) -> Iterator[str]:
             if best is not None and not best.proven:
                 bound = "" if best.bound is None else f"; none above {best.bound} is proven"
                 yield (
-                    f"*Optimum not proven.* {task}, other arm {arm}: {best.reward} is the best of "
-                    f"the searches{bound}."
+                    f"*Optimum not proven.* {escaped(task)}, other arm {arm}: {best.reward} is "
+                    f"the best of the searches{bound}."
                 )
 
 
@@ -211,7 +214,7 @@ def _timing(study: Study) -> Iterator[str]:
     cold = ~runs.warm.astype("boolean")  # unknown where it went with the process
     share = int(cold.sum()) / len(runs)
     yield (
-        f"*Times.* Taken on {environment['processor'] or 'an unnamed processor'} with "
+        f"*Times.* Taken on {escaped(environment['processor'] or 'an unnamed processor')} with "
         f"{environment['cores']} cores, one thread a run, runs side by side as far as asked "
         f"for; {_percent(share)} of the runs were the first of their method in their process "
         "and hold its warming up. "
@@ -238,7 +241,3 @@ def _number(value: float) -> str:
 
 def _percent(share: float, digits: int = 0) -> str:
     return f"{100 * share:.{digits}f} %"
-
-
-def _code(text: str) -> str:
-    return text.replace("`", "'")

@@ -28,6 +28,7 @@ from analysis.published import published_cell, published_initial
 from analysis.report.optimum_source import SHIPPED, OptimumSource, optimum_sources
 from analysis.results import CellRuns
 from analysis.study import SEED, Study
+from coartic.text import one_line
 
 PREFIX = "coartic"
 Cell = tuple[str, str]
@@ -67,6 +68,10 @@ class Number:
     """What the meaning is said of, such as a method on a task."""
     origin: str = ""
     """What a value without cells is, such as published in the paper."""
+
+    def __post_init__(self) -> None:
+        if not (self.macro.isascii() and self.macro.isalpha()):
+            raise ValueError(f"macro {self.macro!r}: letters alone")
 
     def companions(self) -> Iterator[tuple[str, str]]:
         """What follows the macro's name, first nothing, with the text that it stands for."""
@@ -157,7 +162,7 @@ def headline_numbers(study: Study) -> list[Number]:
 def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
     """The macros as a LaTeX file. Numbers go through ``\\coarticnum``, which may be redefined."""
     lines = [
-        *(f"% {line}" for line in about),
+        *map(_comment, about),
         "% Intervals are at 95 %; `coartic trace MACRO` says how they were made, of which runs.",
         "% Redefine \\coarticnum to print numbers your way, with siunitx for example:",
         "%   \\newcommand{\\coarticnum}[1]{\\num{#1}}   before \\input",
@@ -169,12 +174,16 @@ def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
         how = f"; {number.how}" if number.how and math.isnan(number.low) else ""
         if number.of != of:
             of = number.of
-            lines.append(f"% {of}:")
-        lines.append(f"% {number.meaning}{unit}{how}")
+            lines.append(_comment(f"{of}:"))
+        lines.append(_comment(f"{number.meaning}{unit}{how}"))
         for suffix, text in number.companions():
             content = number.full(_tex, "$n$") if suffix == "Full" else _tex(text)
             lines.append(f"\\newcommand{{\\{number.macro}{suffix}}}{{{content}}}")
     return "\n".join(lines) + "\n"
+
+
+def _comment(text: str) -> str:
+    return f"% {one_line(text)}"
 
 
 def _tex(number: str) -> str:
@@ -349,7 +358,7 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
             continue
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
             yield Number(
-                f"{PREFIX}{names.tasks[task]}{names.labels[label]}Hands{hands}",
+                f"{PREFIX}{names.tasks[task]}{names.labels[label]}Hands{words(str(hands))}",
                 f"runs that learned {hands}", float(count), 0, "runs",
                 how=f"of {len(cell.good)} with a solution", cells=(key,),
                 of=f"{label} on {task}",
@@ -367,10 +376,8 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
         task, label, signature = map(str, key)
         row = rows.iloc[0]
         where = str(row["where"])
-        other = re.search(r"against ([^,]+)", where)
-        cells = [(task, label)]
-        if other is not None:
-            cells.append((other[1], label))
+        other = (where.partition("against ")[2], label)
+        cells = [(task, label), *([other] if other in study.cells else [])]
         what, unit = _SIGNATURES[signature]
         n = int(row["n"])
         place = f" ({where})" if where else ""

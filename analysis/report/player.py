@@ -7,7 +7,6 @@ where it was at every control tick; hits are kept by tick, exactly.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -21,6 +20,7 @@ from analysis.study import Study
 from coartic import Robot, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS, Array
+from coartic.text import json_text
 
 TOLERANCE = 0.005
 """Length unit by which a joint may be off at any tick."""
@@ -38,12 +38,7 @@ def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
         _task(study.results.tasks[name], study, [cell for cell in chosen if cell[0] == name])
         for name in dict.fromkeys(name for name, _ in chosen)
     ]
-    return json.dumps(
-        {"tasks": [task for task in tasks if task["movements"]]},
-        separators=(",", ":"),
-        ensure_ascii=False,
-        allow_nan=False,
-    )
+    return json_text({"tasks": [task for task in tasks if task["movements"]]}, allow_nan=False)
 
 
 def nearest_to_median(cell: Cell) -> int:

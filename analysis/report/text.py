@@ -1,4 +1,4 @@
-"""What all renderers share: inline markup read, and raw values put into words."""
+"""What all renderers share: raw values put into words."""
 
 from __future__ import annotations
 
@@ -13,51 +13,6 @@ from analysis.table import NONE
 NO_SPREAD = "no spread"
 MINUS, NARROW_SPACE, TIMES = "−", "\N{NARROW NO-BREAK SPACE}", "×"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_MARKUP = re.compile(
-    r"\\(?P<escaped>[*`\[\\])"
-    r"|`(?P<code>[^`]+)`"
-    r"|\*(?P<emphasis>[^\s*](?:[^*]*[^\s*])?)\*"
-    r"|\[(?P<words>[^\]]+)\]\((?P<address>[^)\s]+)\)"
-)
-
-
-@dataclass(frozen=True)
-class Span:
-    """A stretch of text in one style; only links have an address."""
-
-    style: Literal["text", "emphasis", "code", "link"]
-    text: str
-    address: str = ""
-
-
-def inline(text: str) -> list[Span]:
-    """Inline markup as the spans it consists of; what is no markup is text."""
-    spans: list[Span] = []
-    plain, at = "", 0
-    for match in _MARKUP.finditer(text):
-        plain += text[at : match.start()]
-        at = match.end()
-        if match["escaped"]:
-            plain += match["escaped"]
-            continue
-        if plain:
-            spans.append(Span("text", plain))
-            plain = ""
-        if match["code"]:
-            spans.append(Span("code", match["code"]))
-        elif match["emphasis"]:
-            spans.append(Span("emphasis", match["emphasis"]))
-        else:
-            spans.append(Span("link", match["words"], match["address"]))
-    plain += text[at:]
-    return [*spans, Span("text", plain)] if plain else spans
-
-
-def escaped(text: str) -> str:
-    """Plain text as inline markup that shows it as it is."""
-    for mark in "\\*`[":
-        text = text.replace(mark, "\\" + mark)
-    return text
 
 
 @dataclass(frozen=True)

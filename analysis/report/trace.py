@@ -6,20 +6,21 @@ import difflib
 import hashlib
 import json
 import re
-import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.markup import words
 from analysis.methods import methods_notes
 from analysis.report.document import DataTable, Document, Row
 from analysis.report.numbers import Number
 from analysis.report.optimum_source import SHIPPED, optimum_sources
-from analysis.report.text import inline, parts
+from analysis.report.text import parts
 from analysis.results import Results
 from analysis.table import NONE
 from coartic import CoarticError, builtin_tasks
+from coartic.text import json_text, one_line, shell_line
 
 FILE = "trace.json"
 FORMAT = 3
@@ -135,7 +136,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
             for table in document.tables()
         },
     }
-    return json.dumps(content, ensure_ascii=False, separators=(",", ":"))
+    return json_text(content)
 
 
 def specification_hash(results: Results) -> str:
@@ -176,7 +177,7 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
         content = json.loads((home / FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise CoarticError(f"{home / FILE} cannot be read: {error}") from None
-    again = f"make the report again with `coartic report {home.parent}`"
+    again = f"make the report again with `{shell_line('coartic', 'report', home.parent)}`"
     form = content.get("format") if isinstance(content, dict) else None
     if form != FORMAT:
         raise CoarticError(
@@ -222,11 +223,11 @@ def trace_text(found: Trace) -> str:
         shown = commit["id"] + (" with changes" if commit["dirty"] else "")
     lines = [
         f"{found.name} = {found.text}",
-        found.meaning,
+        f"{found.meaning}",
         *([f"how: {found.how}"] if found.how else []),
         f"results: {found.folder or 'not beside this report; its FOLDER has the specification'}",
         f"specification: {found.specification}",
-        f"asked for by: {shlex.join(found.environment['command'])}",
+        f"asked for by: {shell_line(*map(str, found.environment['command']))}",
         f"code: coartic {found.environment['coartic']}, commit {shown}, model code "
         f"{found.environment['model_code']}",
         f"environment: Python {found.environment['python']}, {found.environment['platform']}, "
@@ -245,10 +246,10 @@ def trace_text(found: Trace) -> str:
                 if source.command and source.makes > len(source.run_ids)
                 else []
             ),
-            f"one: coartic reproduce RUN --in {shlex.quote(str(found.folder or 'FOLDER'))}",
+            "one: " + shell_line("coartic", "reproduce", "RUN", "--in", found.folder or "FOLDER"),
             *(f"  {run}" for run in source.run_ids),
         ]
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def _table_cell(
@@ -306,7 +307,8 @@ def _origin(table: dict[str, Any], name: str, row: str, column: str) -> str:
         return f"computed from the corrective process alone on {row} (sequences.parquet)"
     claim = name.removeprefix("evidence-")
     if claim != name:
-        return f"text; the runs of the claim: coartic trace claims {claim} verdict"
+        own = shell_line("coartic", "trace", "claims", claim, "verdict")
+        return f"text; the runs of the claim: {own}"
     return "text" if column in table["text"] else "computed without runs"
 
 
@@ -321,9 +323,15 @@ def _source(content: dict[str, Any], cell: dict[str, Any]) -> Source:
     if cell["task"] in builtin_tasks() and not files:
         options = {"tasks": cell["task"], "methods": cell["method"]}
         options |= {name: suite[name] for name in ("runs", "trials", "seed")}
-        command = f"coartic run {suite['name']} " + "".join(
-            f"--{name} {value} " for name, value in options.items() if value is not None
-        ) + "--out NEW"  # fmt: skip
+        asked = [
+            word for name, value in options.items() if value is not None
+            for word in (f"--{name}", str(value))
+        ]  # fmt: skip
+        name = suite["name"]
+        line = [name, *asked, "--out", "NEW"]
+        if name.startswith("-"):  # after --, since it would be taken for an option
+            line = [*line[1:], "--", name]
+        command = shell_line("coartic", "run", *line)
     return Source(
         cell["task"], cell["label"], tuple(cell["runs"]), tuple(cell["commits"]), command,
         sum(
@@ -363,12 +371,7 @@ def _heads(table: DataTable) -> list[str]:
 def _notes(results: Results, table: DataTable) -> list[str]:
     """A table's notes as plain text; those of methods share what stands above them all."""
     above = methods_notes(results) if table.id.startswith("methods-") else []
-    return list(dict.fromkeys(_plain(note) for note in (*above, *table.notes)))
-
-
-def _plain(text: str) -> str:
-    """Inline markup as plain text."""
-    return "".join(span.text for span in inline(text))
+    return list(dict.fromkeys(words(note) for note in (*above, *table.notes)))
 
 
 def _texts(table: DataTable, row: Row) -> list[str]:

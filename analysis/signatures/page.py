@@ -11,6 +11,8 @@ from typing import Any
 import pandas as pd
 
 from analysis.inference.statistics import holm
+from analysis.markup import escaped
+from analysis.page import Heading, Part, page
 from analysis.signatures.frame import NO_RUN
 from analysis.study import Study
 from analysis.table import NONE, Table
@@ -83,8 +85,10 @@ class _Notes:
         return f"{NONE} ({_LETTERS[self.reasons.index(reason) % len(_LETTERS)]})"
 
     def lines(self) -> list[str]:
-        """The reasons, by letter."""
-        return ["; ".join(f"({_LETTERS[i % 26]}) {why}" for i, why in enumerate(self.reasons))]
+        """The reasons, by letter; in inline markup, nothing where there are none."""
+        reasons = enumerate(map(escaped, self.reasons))
+        text = "; ".join(f"({_LETTERS[i % 26]}) {why}" for i, why in reasons)
+        return [text] if text else []
 
 
 def signatures_page(study: Study) -> str:
@@ -93,10 +97,10 @@ def signatures_page(study: Study) -> str:
     labels: dict[str, list[str]] = {name: [] for name in study.results.tasks}
     for name, label in study.methods:  # best reward first within a task
         labels[name].append(label)
-    parts = ["# Signatures of coarticulation", *_NOTES]
+    parts: list[Part] = [Heading(1, "Signatures of coarticulation"), *_NOTES]
     for name, task in study.results.tasks.items():
         own = frame[frame.task == name]
-        parts.append(f"## {name}{' †' if task.reconstructed else ''}")
+        parts.append(Heading(2, f"{name}{' †' if task.reconstructed else ''}"))
         tables = [("How it moves", "", main_columns(task))]
         if len(task.goals) > 1:
             tables.append(("Further goals", "", _further(task)))
@@ -116,7 +120,7 @@ def signatures_page(study: Study) -> str:
     parts += _slopes(frame, labels)
     if any(task.reconstructed for task in study.results.tasks.values()):
         parts.append("† Reconstructed task (docs/model.md).")
-    return "\n\n".join(parts) + "\n"
+    return page(parts)
 
 
 @dataclass(frozen=True)
@@ -222,7 +226,7 @@ def place(row: Row) -> str:
 
 def _by_method(
     title: str, text: str, frame: pd.DataFrame, labels: Sequence[str], columns: Sequence[Column]
-) -> list[str]:
+) -> list[Part]:
     """A table of methods by columns, with notes; nothing where no method has a value."""
     wanted = {column.signature for column in columns}
     rows = frame[frame.signature.isin(wanted)].to_dict("records")
@@ -253,13 +257,15 @@ def _by_method(
     if not lines:
         return []
     heads = ("method", "runs", *(column.head for column in columns))
-    parts = [f"### {title}", text, Table(title, heads, tuple(lines)).to_markdown()]
-    parts += notes.lines()
-    parts += [f"Without values ({why}): {', '.join(names)}." for why, names in empty.items()]
-    return [part for part in parts if part]
+    parts: list[Part] = [Heading(3, title), *([text] if text else [])]
+    parts += [Table(title, heads, tuple(lines)), *notes.lines()]
+    parts += [
+        escaped(f"Without values ({why}): {', '.join(names)}.") for why, names in empty.items()
+    ]
+    return parts
 
 
-def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
+def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[Part]:
     names = {
         "context distance": "distance",
         "context dependence": "dependence, pooled SD",
@@ -269,7 +275,7 @@ def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
     }
     frame = frame[frame.signature.isin(list(names)) & frame["where"].str.contains("against")]
     spot = frame["where"].str.replace(_AT_MOST, "", regex=True)
-    parts = []
+    parts: list[Part] = []
     for (task, where), group in frame.groupby([frame.task, spot], sort=False):
         rows = group.to_dict("records")
         notes, lines = _Notes(), []
@@ -285,18 +291,18 @@ def _contexts(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
         if lines:
             title = f"{task}, {where}"
             table = Table(title, ("method", "runs", *names.values()), tuple(lines))
-            parts += [f"### {title}", table.to_markdown(), *notes.lines()]
-    return ["## Between contexts", CONTEXTS, *filter(None, parts)] if parts else []
+            parts += [Heading(3, title), table, *notes.lines()]
+    return [Heading(2, "Between contexts"), CONTEXTS, *parts] if parts else []
 
 
-def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
+def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[Part]:
     norms = frame[frame.signature == "locus slope norm"]
     frame = frame[(frame.signature == "locus slope") & frame.value.notna()]
     if not len(frame):
         return []
     split = frame["where"].str.rpartition(", ")
     frame = frame.assign(at=split[0], joint=split[2])
-    parts = ["## Locus slopes", _LOCUS]
+    parts: list[Part] = [Heading(2, "Locus slopes"), _LOCUS]
     for (task, at), group in frame.groupby(["task", "at"], sort=False):
         joints = [
             str(joint)
@@ -326,7 +332,7 @@ def _slopes(frame: pd.DataFrame, labels: dict[str, list[str]]) -> list[str]:
         if lines:
             title = f"{at} (first of the tasks: {task})"
             table = Table(title, ("method", "runs", "norm", *joints), tuple(lines))
-            parts += [f"### {title}", table.to_markdown()]
+            parts += [Heading(3, title), table]
     return parts
 
 

@@ -7,6 +7,7 @@ import math
 import pandas as pd
 
 from analysis.frontier.frames import LABELS
+from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
 from analysis.study import Study
@@ -45,7 +46,7 @@ def targets_table(study: Study, targets: pd.DataFrame, task: str) -> DataTable |
         heads.append(Column(name, "median trials", "number", digits=0, printed=printed))
     return table(
         f"targets-{table_ids(study)[task]}",
-        f"Trials to come near the optimum of {task}, other arm free.",
+        f"Trials to come near the optimum of {escaped(task)}, other arm free.",
         tuple(heads),
         [row for _, row in sorted(rows, key=lambda pair: pair[0])],
         (
@@ -81,7 +82,7 @@ def areas_table(study: Study, areas: pd.DataFrame, task: str) -> DataTable | Non
     rows.sort(key=lambda row: _number(row.values[1]))  # noqa: PD011 (no frame)
     return table(
         f"areas-{table_ids(study)[task]}",
-        f"Area under the anytime curve on {task}, other arm free.",
+        f"Area under the anytime curve on {escaped(task)}, other arm free.",
         (
             Column("method", "method"),
             *(
@@ -121,7 +122,7 @@ def pareto_table(study: Study, pareto: pd.DataFrame, task: str) -> DataTable | N
         heads.append(Column(f"{spend}_front", "on front", "share", digits=0, printed=i < 3))
     return table(
         f"pareto-{table_ids(study)[task]}",
-        f"Pareto sets of reward and spend on {task}.",
+        f"Pareto sets of reward and spend on {escaped(task)}.",
         tuple(heads),
         rows,
         (

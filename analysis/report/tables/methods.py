@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
+from analysis.markup import escaped
 from analysis.methods import methods_notes
 from analysis.pairs.overall import NEAR
 from analysis.report.document import Column, DataTable, Row
@@ -46,7 +47,7 @@ def methods_table(study: Study, task: str) -> DataTable | None:
     best = study.optima.get((task, "free"))
     return table(
         f"methods-{table_ids(study)[task]}",
-        f"All methods on {marked(study, task)}"
+        f"All methods on {escaped(marked(study, task))}"
         + (
             ""
             if best is None

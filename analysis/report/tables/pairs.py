@@ -6,6 +6,7 @@ from typing import Literal
 
 import pandas as pd
 
+from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import table, table_ids, value_of
 from analysis.study import Study
@@ -14,7 +15,7 @@ from analysis.study import Study
 def pairwise_table(study: Study, pairs: pd.DataFrame, task: str) -> DataTable | None:
     """The learner against the others on one task: differences, tests, effect sizes."""
     return _pairs(
-        study, pairs, task, "compared", f"The learner against the others on {task}.",
+        study, pairs, task, "compared", f"The learner against the others on {escaped(task)}.",
         (
             (Column("difference", "difference", "number", "ticks", 1),
              ("difference", "low", "high")),
@@ -42,7 +43,7 @@ def cost_table(study: Study, pairs: pd.DataFrame, task: str) -> DataTable | None
     number: Literal["number"] = "number"
     return _pairs(
         study, pairs, task, "costs",
-        f"Reward per unit of experience, computation and information on {task}.",
+        f"Reward per unit of experience, computation and information on {escaped(task)}.",
         (
             (Column("difference", "difference", number, "ticks", 1), "difference"),
             (Column("trials", "trials", number, "×"), "trials"),

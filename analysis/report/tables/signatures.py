@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
 from analysis.signatures.page import CONTEXTS, OTHER, main_columns, other_arm_columns, place
@@ -121,7 +122,7 @@ def _signatures(
         )
     return table(
         f"{name}-{table_ids(study)[task]}",
-        f"{title} on {task}.",
+        f"{title} on {escaped(task)}.",
         (Column("method", "method"), *heads),
         rows,
         (note,) if note else (),
