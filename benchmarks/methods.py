@@ -29,6 +29,7 @@ import baselines.trajectory_optimisation
 from coartic import CoarticError, Task
 from coartic.compiled import PACKAGE, model_source
 from coartic.dual_process import DUAL_PROCESS
+from coartic.inputs import read_text
 from coartic.method import Method
 
 ENTRY_POINTS = "coartic.methods"
@@ -116,12 +117,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
 
 def read_plugin(path: Path) -> Plugin:
     """The text of a method file."""
-    try:
-        return Plugin(path.name, path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MethodFileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise MethodFileError(f"{path}: is not a text file in UTF-8") from None
+    return Plugin(path.name, read_text(path, error=MethodFileError))
 
 
 def plugin_methods(plugin: Plugin) -> list[type[Method]]:

@@ -21,6 +21,8 @@ from rich.table import Table as RichTable
 
 from coartic import CoarticError, __version__, builtin_tasks, load_task
 from coartic.compiled import PACKAGE
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.text import plain
 
 if TYPE_CHECKING:
     from benchmarks.harness import Progress
@@ -48,7 +50,7 @@ def main() -> None:
         app(prog_name="coartic")
     except CoarticError as error:
         for line in str(error).splitlines():
-            print(f"error: {line}", file=sys.stderr)
+            print(f"error: {plain(line)}", file=sys.stderr)
         sys.exit(2)
     except BrokenPipeError:
         raise
@@ -114,9 +116,9 @@ Records = Annotated[Path, typer.Option("--in", help="Folder to look for the run 
 def run(
     suite: Annotated[str, typer.Argument(help="Suite to run (`coartic list`), or a TOML file.")],
     folder: Annotated[str, typer.Option("--out", help="Folder for the results.")],
-    runs: Annotated[int | None, typer.Option(min=1, max=100_000, help="Runs per cell.")] = None,
+    runs: Annotated[int | None, typer.Option(min=1, max=MOST_RUNS, help="Runs per cell.")] = None,
     trials: Annotated[
-        int | None, typer.Option(min=1, max=10_000_000, help="Trials per run.")
+        int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")
     ] = None,
     jobs: Annotated[
         int, typer.Option(min=-1, max=1024, help="Processes; -1 for one per core.")
@@ -128,12 +130,13 @@ def run(
         typer.Option(readable=False, help="A task of your own (TOML); may be repeated."),
     ] = None,
     method_file: MethodFiles = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the whole suite.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of the whole suite.")] = 0,
     time_limit: Annotated[
         float | None, typer.Option(help="Seconds per run; the suite's limit by default.")
     ] = None,
     trial_budget: Annotated[
-        int | None, typer.Option(min=1, help="Most physical trials a run may make.")
+        int | None,
+        typer.Option(min=1, max=MOST_TRIALS, help="Most physical trials a run may make."),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Dask scheduler, tcp://host:port, instead of this machine.")
@@ -163,8 +166,11 @@ def run(
 
     if jobs == 0:
         raise CoarticError("--jobs 0: give a number of processes, or -1 for one per core")
-    if time_limit is not None and not 0 < time_limit < float("inf"):
-        raise CoarticError(f"--time-limit {time_limit}: give a number of seconds above 0")
+    if time_limit is not None and not 0 < time_limit <= MOST_SECONDS:
+        raise CoarticError(
+            f"--time-limit {time_limit:g}: give a number of seconds above 0, "
+            f"at most {MOST_SECONDS:_}"
+        )
     if not folder.strip():
         raise CoarticError("--out is empty; name a folder for the results")
     out = Path(folder)
