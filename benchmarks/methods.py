@@ -239,7 +239,7 @@ def _own_source(name: str) -> str:
 def file_source(source: str) -> str:
     """Source of a method file with the local modules it imports: all but installed ones."""
     local: dict[str, Path] = {}
-    waiting = _imported(source)
+    waiting = [*_imported(source)]
     while waiting:
         root = waiting.pop().partition(".")[0]
         if root in local or root in sys.stdlib_module_names or root in _PACKAGES:
@@ -255,14 +255,15 @@ def file_source(source: str) -> str:
     return source + _joined(files)
 
 
-def _imported(source: str) -> list[str]:
+@cache
+def _imported(source: str) -> tuple[str, ...]:
     names: list[str] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return names
+    return tuple(names)
 
 
 def _joined(files: list[Path]) -> str:
