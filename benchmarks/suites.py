@@ -257,7 +257,7 @@ def select_cells(
     _check_size(suite, known, own)
     cells = [cell for block in suite.cells for cell in _block_cells(suite, block, known, own)]
     added, refused = _added_cells(cells, known, methods, own)
-    cells = _distinct([*cells, *added])
+    cells = distinct([*cells, *added])
 
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
     for name in tasks:
@@ -329,8 +329,11 @@ def _added_cells(
     return added, refused
 
 
-def _distinct(cells: Iterable[Cell]) -> list[Cell]:
-    """Every cell once. Results are told apart by names, so one name is one thing only."""
+def distinct(cells: Iterable[Cell]) -> list[Cell]:
+    """Every cell once. Results are told apart by names, so one name is one thing only.
+
+    Raises CoarticError where different tasks or cells have the same name.
+    """
     tasks: dict[str, Task] = {}
     found: dict[tuple[str, str], Cell] = {}
     for cell in cells:

@@ -6,6 +6,7 @@ import csv
 import importlib.util
 import io
 import json
+import os
 import sys
 import time
 import warnings
@@ -45,7 +46,9 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
+    os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
     try:
+        _check_arguments()
         _check_packages()
         app(prog_name="coartic")
     except CoarticError as error:
@@ -57,6 +60,13 @@ def main() -> None:
     except OSError as error:
         print(f"error: {error.strerror or error}", file=sys.stderr)
         sys.exit(1)
+
+
+def _check_arguments() -> None:
+    """They are kept in records, as text."""
+    for argument in sys.argv[1:]:
+        if any("\ud800" <= c <= "\udfff" for c in argument):
+            raise CoarticError(f"argument {argument!r} is not text in this system's encoding")
 
 
 def _check_packages() -> None:

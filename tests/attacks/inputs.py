@@ -266,8 +266,10 @@ TASKS |= {
     "ends in the middle": (GOOD[:-10], "is not valid TOML"),
     "surrogate": ('title = "\\ud800"' + GOOD, "is not valid TOML"),
     "one link too long to reach back": (
-        'locked_base = ["x", "y"]' + GOOD + "[robot]\nright_links = [19.0, 1.0, 1.0, 1.0]\n",
-        "goals[0] (5, 1) is out of reach with the base locked in x and y for the right hand",
+        'locked_base = ["x", "y"]'
+        + _task("[[5.0, 1.0], [5.0, 2.0]]", "[[3.0, 1.0], [3.0, 1.5]]")
+        + "[robot]\nright_links = [19.0, 1.0, 1.0, 1.0]\n",
+        "goals[0] (3, 1) is out of reach with the base locked in x and y for the right hand",
     ),
 }
 
@@ -386,6 +388,7 @@ SUITES: dict[str, tuple[str, str]] = {
     ),
     "parameter out of range": (_block("parameters = { epsilon = 1.5 }"), "epsilon: input should"),
     "parameter is negative": (_block("parameters = { noise_sd = -1 }"), "noise_sd: input should"),
+    "parameter is far too large": (_block("parameters = { noise_sd = 1e9 }"), "noise_sd: input"),
     "parameter is no number": (_block("parameters = { noise_sd = nan }"), "a finite number"),
     "parameter without end": (_block("parameters = { noise_sd = inf }"), "a finite number"),
     "parameter is a text": (_block('parameters = { noise_sd = "0.1" }'), "noise_sd: input should"),
@@ -579,7 +582,7 @@ def run(suite: str, *arguments: str) -> tuple[str, ...]:
 
 
 PAPER = run("paper", "--tasks", "ascending", "--runs", "1", "--trials", "1")
-LONG = "x" * 100_000
+LONG = "x" * 5_000
 COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
     "unknown command": (("fly",), "No such command 'fly'"),
     "command in capitals": (("RUN",), "No such command 'RUN'"),
@@ -601,13 +604,13 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
     "suite with a bell": (run("\x07"), "unknown suite '\\x07'"),
     "suite in two lines": (run("a\nb"), "unknown suite 'a\\nb'"),
     "suite in markup": (run("[bold]x[/bold]"), "unknown suite '[bold]x[/bold]'"),
-    "suite that is no text": (run("\udcff"), "unknown suite '\\udcff'"),
+    "suite that is no text": (run("\udcff"), "argument '\\udcff' is not text"),
     "suite turned round": (run("\u202erepap"), "unknown suite '\\u202erepap'"),
     "long suite": (run(LONG), "unknown suite"),
     "file with an escape": (run("\x1b[2J.toml"), "\\x1b[2J.toml: cannot be read"),
     "file in two lines": (run("a\nb.toml"), "a | b.toml: cannot be read"),
     "file with a long name": (run(LONG[:300] + ".toml"), "File name too long"),
-    "file that is no text": (run("\udcff.toml"), "\\udcff.toml: cannot be read"),
+    "file that is no text": (run("\udcff.toml"), "argument '\\udcff.toml' is not text"),
     "two suites": (run("paper", "quick"), "unexpected extra argument(s) (quick)"),
     "--out is empty": (("run", "paper", "--out", ""), "--out is empty"),
     "--out is blank": (("run", "paper", "--out", " "), "--out is empty"),
@@ -615,6 +618,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
     "--out is a device": ((*PAPER, "--out", "/dev/null"), "cannot write to /dev/null"),
     "--out is a long name": ((*PAPER, "--out", "x" * 300), "File name too long"),
     "--out in /proc": ((*PAPER, "--out", "/proc/x"), "cannot write to /proc/x"),
+    "--out is no text": ((*PAPER, "--out", "\udcff"), "argument '\\udcff' is not text"),
     "--out without a value": (("run", "paper", "--out"), "requires an argument"),
     "--runs 0": (run("paper", "--runs", "0"), "Invalid value for '--runs'"),
     "--runs -1": (run("paper", "--runs", "-1"), "Invalid value for '--runs'"),
@@ -768,8 +772,18 @@ def _make_cases() -> list[Case]:
     case("files", "results are a file", ("analyse", "out"), "not a results", files=occupied)
     case("files", "results without a manifest", ("report", "out"), "not a results folder",
          prepare=lambda: os.mkdir("out"))  # fmt: skip
-    case("files", "module of our name", ("list",), "is taken from", shell="",
+    for columns in ("x", "0", "-5", "1" + "0" * 30):
+        width = {"COLUMNS": columns}
+        case("surroundings", f"COLUMNS={columns}", ("list",), "Tasks", env=width, code=0)
+    window = {"MPLBACKEND": "nonsense"}
+    nope = COMMANDS["draw an unknown task"]
+    case("surroundings", "MPLBACKEND", *nope, env=window, shell="")
+    case("surroundings", "module of our name", ("list",), "is taken from", shell="",
          files={"analysis.py": "x = 1\n"})  # fmt: skip
+    full = "No space left on device"
+    case("surroundings", "output is full", ("cite",), full, shell="> /dev/full", code=1)
+    case("surroundings", "output is closed", ("cite",), "", shell=">&-", code=0)
+    case("surroundings", "errors are closed", ("--version",), "coartic ", shell="2>&-", code=0)
     return found
 
 
@@ -931,9 +945,9 @@ def _problems(case: Case, code: int, answer: str, seconds: float) -> Iterator[st
         yield f"exit code {code}, not {case.code}"
     if "Traceback" in answer:
         yield f"a traceback: {answer.strip().splitlines()[-1][:80]}"
-    lines = answer.splitlines()
+    lines = [line.strip() for line in answer.splitlines()]
     if case.code and not any(
-        line.startswith(("error: ", "Usage: ", " Usage: ")) for line in lines
+        line.startswith(("error: ", "Usage: ", "╭─ Error ")) for line in lines
     ):
         yield "no sentence"
     if case.words not in " ".join(answer.replace("│", " ").split()):
