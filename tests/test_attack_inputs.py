@@ -31,7 +31,8 @@ def test_a_bad_answer_is_noticed(tmp_path):
     for name, words in zip(
         chosen,
         ("exit code 0, not 2; no sentence; an answer without \"No such command 'fly'\"; "
-         "here, here/left changed", "a traceback: ValueError: x", "no answer within", "no sentence",
+         "here, here/left changed",
+         "a traceback: ValueError: x", "no answer within", "no sentence",
          "control characters: '\\x1b'"),
         strict=False,
     ):  # fmt: skip

@@ -33,6 +33,7 @@ SECONDS = 5.0
 """CPU time within which an input is answered."""
 _HANGS_S = 15  # after which it is not waited for
 _MEMORY = 3 * 2**30  # bytes beyond what is loaded
+_OTHER_WORDS = "an answer without"
 _LONGEST = 20_000  # characters of an answer
 ROOT = Path(__file__).parents[2]
 
@@ -180,7 +181,7 @@ TASKS: dict[str, tuple[str, str]] = {
 }
 
 
-FIELDS = "\n".join(f"k{i} = 1" for i in range(60_000))
+FIELDS = "\n".join(f"k{i} = 1" for i in range(20_000))
 TASKS |= {
     "title in two lines": ('title = "a\\nb"' + GOOD, "title should be one line of printable text"),
     "title with an escape": ('title = "\\u001b[31mred"' + GOOD, "without \\x1b"),
@@ -226,38 +227,38 @@ TASKS |= {
         _task("[[5.0, 1.0], [5.0, 2.0]]", f"{{ x = [0x{'f' * 9000}] }}"),
         "goals is a number of more than 4300 digits (dict); it must be a list",
     ),
-    "a hundred thousand goals": (
-        _task("[[5.0, 1.0], [5.0, 2.0]]", "[" + "[5.0,1.0]," * 90_000 + "]"),
+    "goals by the thousand": (
+        _task("[[5.0, 1.0], [5.0, 2.0]]", "[" + "[5.0,1.0]," * 20_000 + "]"),
         "entries; it takes 100",
     ),
-    "a hundred thousand bad goals": (
-        _task("[[5.0, 1.0], [5.0, 2.0]]", "[" + '"a",' * 100_000 + "]"),
+    "bad goals by the thousand": (
+        _task("[[5.0, 1.0], [5.0, 2.0]]", "[" + '"a",' * 20_000 + "]"),
         "more problems",
     ),
-    "a hundred thousand hands": ("hands = [" + '"left",' * 100_000 + "]" + GOOD, "hands has"),
-    "a hundred thousand bad hands": ("hands = [" + "1," * 100_000 + "]" + GOOD, "hands[0] is 1"),
-    "a hundred thousand joints": (
-        _task("right = [0.0,", "right = [" + "0.0," * 100_000),
+    "hands by the thousand": ("hands = [" + '"left",' * 20_000 + "]" + GOOD, "hands has"),
+    "bad hands by the thousand": ("hands = [" + "1," * 20_000 + "]" + GOOD, "hands[0] is 1"),
+    "joints by the thousand": (
+        _task("right = [0.0,", "right = [" + "0.0," * 20_000),
         "entries; it takes 100",
     ),
-    "a hundred thousand links": (
-        GOOD + "[robot]\nleft_links = [" + "1.0," * 100_000 + "]\n",
+    "links by the thousand": (
+        GOOD + "[robot]\nleft_links = [" + "1.0," * 20_000 + "]\n",
         "robot.left_links has",
     ),
     "three locked coordinates": ('locked_base = ["x", "y", "x"]' + GOOD, "it takes 2"),
-    "a hundred thousand letters": (_task('"RR"', f'"{"R" * 100_000}"'), "names 100000 hands"),
+    "letters by the thousand": (_task('"RR"', f'"{"R" * 20_000}"'), "names 20000 hands"),
     "letters with an escape": (_task('"RR"', '"R\\u001b"'), "initial_hands is 'R\\x1b'"),
     "list for letters": (_task('"RR"', '["R", "R"]'), "(list); it must be a text"),
-    "unknown keys by the thousand": (FIELDS + GOOD, "has 59980 more problems"),
+    "unknown keys by the thousand": (FIELDS + GOOD, "has 19980 more problems"),
     "unknown key with an escape": ('"\\u001b[2J" = 1' + GOOD, "\\x1b[2J is an unknown key"),
     "unknown key in two lines": ('"a\\nerror: b" = 1' + GOOD, "a | error: b is an unknown key"),
     "unknown key, long": (f"{'k' * 900_000} = 1" + GOOD, "(900000 characters) is an unknown key"),
     "unknown key, empty": ('"" = 1' + GOOD, "is an unknown key"),
     "key twice": ('name = "other"' + GOOD, "is not valid TOML: Cannot overwrite a value"),
     "table twice": (GOOD + "[start]\nbase = [0.0, 0.0]\n", "is not valid TOML"),
-    "key of many parts": ("a" + ".a" * 90_000 + " = 1" + GOOD, "more than 32 dotted parts"),
-    "quoted key of many parts": ('"a"' + "." + "'a'." * 90_000 + "a = 1" + GOOD, "dotted parts"),
-    "table of many parts": (GOOD + "[" + "a." * 90_000 + "a]\n", "dotted parts"),
+    "key of many parts": ("a" + ".a" * 20_000 + " = 1" + GOOD, "more than 32 dotted parts"),
+    "quoted key of many parts": ('"a"' + "." + "'a'." * 20_000 + "a = 1" + GOOD, "dotted parts"),
+    "table of many parts": (GOOD + "[" + "a." * 20_000 + "a]\n", "dotted parts"),
     "start is a list of tables": (GOOD.replace("[start]", "[[start]]"), "it must be a table"),
     "empty": ("", "name is missing"),
     "a comment alone": ("# nothing\n", "goals is missing"),
@@ -334,7 +335,7 @@ SUITES: dict[str, tuple[str, str]] = {
         "description: should be one line",
     ),
     "description too long": (
-        _head('description = "x"', f'description = "{"x" * 100_000}"'),
+        _head('description = "x"', f'description = "{"x" * 20_000}"'),
         "description: string should have at most 500 characters",
     ),
     "name with spaces": ('name = "a b"\n' + HEAD + CELLS, "name is 'a b'; use letters"),
@@ -348,15 +349,15 @@ SUITES: dict[str, tuple[str, str]] = {
     "no cells": (HEAD, "cells: field required"),
     "empty cells": (HEAD + "cells = []\n", "cells: tuple should have at least 1 item"),
     "cells without content": (HEAD + "[[cells]]\n", "cells.0.tasks: field required"),
-    "cells by the thousand": (HEAD + "[[cells]]\n" * 50_000, "more problems"),
+    "cells by the thousand": (HEAD + "[[cells]]\n" * 20_000, "more problems"),
     "cells is a table": (_cells("[[cells]]", "[cells]"), "cells: input should be a valid tuple"),
     "cells is a number": (HEAD + "cells = 3\n", "cells: input should be a valid tuple"),
     "unknown key": ("rums = 3\n" + HEAD + CELLS, "rums: extra inputs are not permitted"),
     "unknown key of cells": (_block("run = 3"), "cells.0.run: extra inputs are not permitted"),
     "unknown key with an escape": ('"\\u001b" = 3\n' + HEAD + CELLS, "\\x1b: extra inputs"),
-    "unknown keys by the thousand": (FIELDS + "\n" + HEAD + CELLS, "has 59980 more problems"),
+    "unknown keys by the thousand": (FIELDS + "\n" + HEAD + CELLS, "has 19980 more problems"),
     "key twice": (HEAD + HEAD + CELLS, "is not valid TOML: Cannot overwrite a value"),
-    "key of many parts": ("a" + ".a" * 90_000 + " = 1\n" + HEAD, "more than 32 dotted parts"),
+    "key of many parts": ("a" + ".a" * 20_000 + " = 1\n" + HEAD, "more than 32 dotted parts"),
     "nested deep": ("a = " + "[" * 5000, "is not valid TOML"),
     "empty": ("", "title: field required"),
     "not TOML": ("title = ", "is not valid TOML"),
@@ -372,7 +373,10 @@ SUITES: dict[str, tuple[str, str]] = {
     "task file that no file can be": (_cells('["ascending"]', '["\\u0000.toml"]'), "\\x00.toml"),
     "task with an escape": (_cells('["ascending"]', '["\\u001b[2J"]'), "unknown task"),
     "task is the suite": (_cells('["ascending"]', '["bad.toml"]'), "bad.toml: "),
-    "a million tasks": (_cells('["ascending"]', "[" + '"a",' * 200_000 + "]"), "cells.0.tasks"),
+    "tasks by the thousand": (
+        _cells('["ascending"]', "[" + '"a",' * 20_000 + "]"),
+        "cells.0.tasks",
+    ),
     "no methods": (
         _cells('["dual-process/EC1"]', "[]"),
         "cells.0.methods: tuple should have at l",
@@ -441,8 +445,8 @@ SUITES: dict[str, tuple[str, str]] = {
         _block("[cells.grid]\n" + "\n".join(f"p{i} = [0,1,2,3,4,5,6,7,8,9]" for i in range(50))),
         "cells (tasks x moves x methods x grid); at most 10_000",
     ),
-    "grid of a million values": (
-        _block("grid = { noise_sd = [" + ", ".join(map(str, range(100_000))) + "] }"),
+    "grid of values by the thousand": (
+        _block("grid = { noise_sd = [" + ", ".join(map(str, range(20_000))) + "] }"),
         "cells.0.grid.noise_sd: tuple should have at most 10000 items",
     ),
     "grid of a thousand dimensions": (
@@ -496,8 +500,8 @@ SUITES: dict[str, tuple[str, str]] = {
         _move("2", "[[0, 0.0], [0, -0.0]]"),
         "moved to the same place twice",
     ),
-    "move to a million places": (
-        _move("2", "[" + ",".join(f"[0,{i}]" for i in range(90_000)) + "]"),
+    "move to places by the thousand": (
+        _move("2", "[" + ",".join(f"[0,{i}]" for i in range(20_000)) + "]"),
         "cells.0.move.by: tuple should have at most 10000 items",
     ),
     "move with an unknown key": (
@@ -706,7 +710,10 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
     "draw nowhere": (("draw",), "Missing option '--out'"),
     "draw into a bitmap": (("draw", "--out", "x.bmp"), "the name must end in .png"),
     "draw into the empty": (("draw", "--out", ""), "the name must end in .png"),
-    "draw below a device": (("draw", "--out", "/dev/null/x.png"), "cannot write /dev/null/x.png"),
+    "draw below a device": (
+        ("draw", "--out", "/dev/null/x.png", "--tasks", "ascending"),
+        "cannot write /dev/null/x.png",
+    ),
     "draw an unknown task": (("draw", "--out", "x.png", "--tasks", "nope"), "unknown task 'nope'"),
     "draw no task": (("draw", "--out", "x.png", "--tasks", ""), "has an empty name"),
 }
@@ -767,7 +774,8 @@ def _make_cases() -> list[Case]:
     case("files", "--out is a file", PAPER, "cannot write to out", files=occupied)
     case("files", "--out is a link to itself", PAPER, "cannot write to out",
          prepare=_link("out", "out"))  # fmt: skip
-    case("files", "picture is a folder", ("draw", "--out", "x.png"), "cannot write x.png",
+    case("files", "picture is a folder", ("draw", "--out", "x.png", "--tasks", "ascending"),
+         "cannot write x.png",
          prepare=lambda: os.mkdir("x.png"))  # fmt: skip
     case("files", "results are a file", ("analyse", "out"), "not a results", files=occupied)
     case("files", "results without a manifest", ("report", "out"), "not a results folder",
@@ -791,8 +799,11 @@ CASES = _make_cases()
 assert len({case.id for case in CASES}) == len(CASES)
 
 
-def attack(root: Path, cases: Sequence[str] = ()) -> list[Outcome]:
-    """Try every case (or those named) on the checkout at ``root``, in a process of its own."""
+def attack(root: Path, cases: Sequence[str] = (), *, words: bool = True) -> list[Outcome]:
+    """Try every case (or those named) on the checkout at ``root``, in a process of its own.
+
+    ``words=False`` lets any sentence pass: other versions say it otherwise.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         kept = {key: os.environ[key] for key in ("PATH", "LANG", "TMPDIR") if key in os.environ}
@@ -803,7 +814,11 @@ def attack(root: Path, cases: Sequence[str] = ()) -> list[Outcome]:
         if done.returncode:
             raise RuntimeError(f"the attack on {root} itself failed: {done.stderr[-2000:]}")
         outcomes = json.loads((folder / "outcomes.json").read_text(encoding="utf-8"))
-    return [Outcome(**{**outcome, "problems": tuple(outcome["problems"])}) for outcome in outcomes]
+    for outcome in outcomes:
+        outcome["problems"] = tuple(
+            text for text in outcome["problems"] if words or not text.startswith(_OTHER_WORDS)
+        )
+    return [Outcome(**outcome) for outcome in outcomes]
 
 
 # What follows runs in the surroundings of the checkout that is attacked.
@@ -951,7 +966,7 @@ def _problems(case: Case, code: int, answer: str, seconds: float) -> Iterator[st
     ):
         yield "no sentence"
     if case.words not in " ".join(answer.replace("│", " ").split()):
-        yield f"an answer without {case.words!r}"
+        yield f"{_OTHER_WORDS} {case.words!r}"
     if odd := {c for c in answer if not c.isprintable() and c != "\n"}:
         yield f"control characters: {', '.join(map(ascii, sorted(odd)))}"
     if len(answer) > _LONGEST:
@@ -963,7 +978,7 @@ def _problems(case: Case, code: int, answer: str, seconds: float) -> Iterator[st
 def main() -> None:
     """Attack a checkout, this one by default, and print what was not answered as it should be."""
     root = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT
-    outcomes = attack(root)
+    outcomes = attack(root, words=root == ROOT)
     bad = [outcome for outcome in outcomes if outcome.problems]
     for outcome in bad:
         print(f"{outcome.id}: {'; '.join(outcome.problems)}")
