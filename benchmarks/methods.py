@@ -39,6 +39,7 @@ from benchmarks.declaration import (
 from benchmarks.sandbox import Failure, Sandbox
 from coartic import CoarticError, Task
 from coartic.dual_process import DUAL_PROCESS
+from coartic.inputs import read_text
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Method
 from coartic.record import SEARCH
@@ -157,12 +158,7 @@ def _built_in() -> dict[str, Entry]:
 
 def read_method_file(path: Path) -> Foreign:
     """The text of a method file. Raises MethodFileError where there is none."""
-    try:
-        return Foreign(kind="file", where=path.name, source=path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MethodFileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise MethodFileError(f"{path}: is not a text file in UTF-8") from None
+    return Foreign(kind="file", where=path.name, source=read_text(path, error=MethodFileError))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:

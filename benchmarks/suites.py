@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from benchmarks.declaration import decapitalised
 from benchmarks.methods import Entry, Registry, unknown
@@ -24,13 +32,61 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.inputs import (
+    MOST_CELLS,
+    MOST_PLANNED,
+    MOST_RUNS,
+    MOST_SECONDS,
+    MOST_TRIALS,
+    brief,
+    brief_value,
+    problems,
+    read_toml,
+)
 from coartic.learner import METHOD_PREFIX
 from coartic.record import run_seed
+from coartic.robot import Finite
 from coartic.tables import DeclaredMethod, Manifest, Plan, PlanLimits, PlannedCell, variant_of
+from coartic.task import LONGEST_NAME, NAME_PATTERN
+from coartic.text import Line, plain
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 ALL = "*"
+LONGEST_WORD = 100
+"""Characters of a parameter's value."""
+LARGEST_INTEGER = 2**53
+"""Of a parameter: up to here every program reads the same number."""
+MOST_PARAMETERS = 50
+"""Of a block of cells."""
 Scalar = bool | int | float | str
+
+
+def _scalar(value: Any) -> Scalar:
+    """A value that prints in one way, on one line, and reads as what was written."""
+    match value:
+        case bool():
+            right = True
+        case int():
+            right = abs(value) <= LARGEST_INTEGER
+        case float():
+            right = math.isfinite(value)
+        case str():
+            right = plain(value, LONGEST_WORD) == value
+        case _:
+            right = False
+    if not right:
+        raise PydanticCustomError(
+            "scalar",
+            "should be true, false, a finite number (integers up to 2^53), "
+            "or one line of up to {most} printable characters",
+            {"most": LONGEST_WORD},
+        )
+    found: Scalar = value
+    return found
+
+
+_Value = Annotated[Scalar, PlainValidator(_scalar)]
+_Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
 class _Move(BaseModel):
@@ -40,7 +96,7 @@ class _Move(BaseModel):
 
     goal: Annotated[int, Field(ge=1, strict=True)]
     """Which goal, from 1."""
-    by: Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
+    by: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1, max_length=MOST_CELLS)]
     """Displacements in x and y, length unit; one task each."""
 
 
@@ -49,11 +105,37 @@ class _Block(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    tasks: Annotated[tuple[str, ...], Field(min_length=1)]
-    methods: Annotated[tuple[str, ...], Field(min_length=1)]
+    tasks: _Names
+    methods: _Names
     move: _Move | None = None
-    parameters: dict[str, Scalar] = {}
-    grid: dict[str, Annotated[tuple[Scalar, ...], Field(min_length=1)]] = {}
+    parameters: Annotated[dict[str, _Value], Field(max_length=MOST_PARAMETERS)] = {}
+    grid: Annotated[
+        dict[str, Annotated[tuple[_Value, ...], Field(min_length=1, max_length=MOST_CELLS)]],
+        Field(max_length=MOST_PARAMETERS),
+    ] = {}
+
+    @model_validator(mode="after")
+    def _says_everything_once(self) -> _Block:
+        for name, values in self.grid.items():
+            text = None
+            if name in self.parameters:
+                text = "stands among the parameters and in the grid"
+            elif len(set(values)) < len(values):
+                text = "has the same value twice in the grid"
+            if text is not None:
+                context = {"name": brief_value(name), "text": text}
+                raise PydanticCustomError("twice", "{name} {text}", context)
+        return self
+
+    def methods_among(self, known: Iterable[str]) -> Iterable[str]:
+        """Ids of the methods that the block asks for."""
+        return known if ALL in self.methods else self.methods
+
+    def tasks_among(self, own: Iterable[str]) -> list[str]:
+        """Names (or files) of the tasks; a block for all tasks is for the user's as well."""
+        every = [*builtin_tasks(), *own]
+        names = [every if name == ALL else [name] for name in self.tasks]
+        return list(dict.fromkeys(itertools.chain(*names)))
 
 
 class Suite(BaseModel):
@@ -61,15 +143,15 @@ class Suite(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str
-    title: str
-    description: str
-    runs: Annotated[int, Field(gt=0, strict=True)]
+    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
+    title: Line
+    description: Line
+    runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)]
     """Runs per cell of a stochastic method; the others are run once."""
-    trials: Annotated[int, Field(gt=0, strict=True)] | None = None
+    trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
     """Trials per run, for methods that have this parameter."""
-    time_limit_s: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = 600.0
-    cells: Annotated[tuple[_Block, ...], Field(min_length=1)]
+    time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
+    cells: Annotated[tuple[_Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
 @dataclass(frozen=True)
@@ -81,14 +163,29 @@ class Cell:
     parameters: tuple[tuple[str, Scalar], ...] = ()
 
     @property
-    def variant(self) -> str:
-        """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-        return variant_of(dict(self.parameters), self.entry.declared.defaults)
-
-    @property
     def method(self) -> str:
         """Id of the method."""
         return self.entry.name
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether the seed matters to the method."""
+        return self.entry.declared.stochastic
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """The method's parameters with their defaults."""
+        return self.entry.declared.defaults
+
+    @property
+    def all_parameters(self) -> dict[str, Any]:
+        """All parameters, defaults included, as the method reads them; CoarticError for bad."""
+        return self.entry.complete(dict(self.parameters))
+
+    @property
+    def variant(self) -> str:
+        """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
+        return variant_of(dict(self.parameters), self.defaults)
 
     @property
     def label(self) -> str:
@@ -115,19 +212,19 @@ def load_suite(name: str) -> Suite:
 
 
 def _read(path: Path) -> Suite:
+    content = read_toml(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
         return Suite(**{"name": path.stem, **content})
-    except OSError as error:
-        raise CoarticError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CoarticError(f"{path}: is not valid TOML: {error}") from None
     except ValidationError as error:
-        lines = [
-            f"{path}: {'.'.join(map(str, detail['loc']))}: {decapitalised(detail['msg'])}"
-            for detail in error.errors()
-        ]
-        raise CoarticError("\n".join(lines)) from None
+        details = error.errors(include_url=False)
+        raise CoarticError(problems(str(path), details, _explain)) from None
+
+
+def _explain(detail: ErrorDetails) -> str:
+    key = ".".join(brief(str(part)) for part in detail["loc"])
+    if detail["type"] == "string_pattern_mismatch":
+        return f"{key} is {brief_value(detail['input'])}; use letters, digits, '.', '_' and '-'"
+    return f"{key}: {decapitalised(detail['msg'])} (found {brief_value(detail['input'])})"
 
 
 def select_cells(
@@ -144,7 +241,8 @@ def select_cells(
     tasks that it applies to. A task from a file runs under every applicable method of
     ``methods``, or of all methods of the suite where none are named. Raises CoarticError
     for unknown names, for a task file whose name is taken, for parameters that a method
-    does not take, and where nothing is left to run.
+    does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
+    by one name, and where nothing is left to run.
     """
     methods = [
         f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name for name in methods
@@ -152,60 +250,105 @@ def select_cells(
     for name in methods:
         if name not in known:
             raise unknown("method", name, known)
-    files: dict[str, Path] = {}
-    own: dict[str, Task] = {}
-    for path in task_files:
-        task = load_task(Path(path))
-        taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
-        if taken == Path(path):
-            raise CoarticError(f"{path}: the same task file is given twice")
-        if taken is not None:
-            raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
-        files[task.name], own[task.name] = Path(path), task
-    cells: list[Cell] = []
-    for block in suite.cells:
-        cells += _block_cells(suite, block, known, own)
-    suite_methods = list(dict.fromkeys(cell.method for cell in cells))
-    shipped = [cell.task for cell in cells if cell.task.name not in own]
-    refused: list[str] = []
-
-    def add(task: Task, names: Iterable[str]) -> None:
-        for name in names:
-            reason = known[name].why_not(task)
-            if reason is None:
-                cells.append(Cell(task, known[name]))
-            else:
-                refused.append(reason)
-
-    for task in {task.name: task for task in shipped}.values():
-        add(task, [name for name in methods if name not in suite_methods])
-    for task in own.values():
-        add(task, methods or suite_methods)
+    own = _own_tasks(task_files)
+    _check_size(suite, known, own)
+    cells = [cell for block in suite.cells for cell in _block_cells(suite, block, known, own)]
+    added, refused = _added_cells(cells, known, methods, own)
+    cells = distinct([*cells, *added])
 
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
     for name in tasks:
         if name not in known_tasks:
             raise unknown("task", name, known_tasks)
-    distinct: dict[tuple[str, str], Cell] = {}
-    for cell in cells:
-        distinct.setdefault((cell.task.name, cell.label), cell)
     chosen = [
         cell
-        for cell in distinct.values()
+        for cell in cells
         if (not tasks or cell.task.name in tasks) and (not methods or cell.method in methods)
     ]
     # A user's own task that nothing applies to is an error, not a silent gap.
-    idle = [
-        name
-        for name in own
-        if (not tasks or name in tasks) and all(cell.task.name != name for cell in chosen)
-    ]
+    busy = {cell.task.name for cell in chosen}
+    idle = [name for name in own if name not in busy and (not tasks or name in tasks)]
     if idle or not chosen:
         pairs = ", ".join(f"{cell.task.name} x {cell.label}" for cell in cells)
         why = "; ".join(refused) if refused else f"suite {suite.name!r} has {pairs}"
         what = f"task {idle[0]!r}" if idle else "what was asked for"
         raise CoarticError(f"no method to run on {what}: {why}.")
     return chosen
+
+
+def _own_tasks(paths: Iterable[Path]) -> dict[str, Task]:
+    """The user's tasks by name, which no other task may have."""
+    files: dict[str, Path] = {}
+    own: dict[str, Task] = {}
+    for path in map(Path, paths):
+        task = load_task(path)
+        taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
+        if taken == path:
+            raise CoarticError(f"{path}: the same task file is given twice")
+        if taken is not None:
+            raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
+        files[task.name], own[task.name] = path, task
+    return own
+
+
+def _check_size(suite: Suite, known: Registry, own: Mapping[str, Task]) -> None:
+    """Refuse a suite of too many cells before they are made."""
+    count = sum(
+        len(block.tasks_among(own))
+        * (1 if block.move is None else len(block.move.by))
+        * len(list(block.methods_among(known)))
+        * math.prod(map(len, block.grid.values()))
+        for block in suite.cells
+    )
+    if count > MOST_CELLS:
+        raise CoarticError(
+            f"suite {suite.name!r} asks for {count:_} cells (tasks x moves x methods x grid); "
+            f"at most {MOST_CELLS:_} can be run at once"
+        )
+
+
+def _added_cells(
+    cells: Sequence[Cell], known: Registry, methods: Sequence[str], own: Mapping[str, Task]
+) -> tuple[list[Cell], list[str]]:
+    """What named methods and the user's tasks add to a suite's cells, and why not more."""
+    of_suite = list(dict.fromkeys(cell.method for cell in cells))
+    others = [name for name in methods if name not in of_suite]
+    shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
+    wanted = [(task, name) for task in shipped.values() for name in others]
+    wanted += [(task, name) for task in own.values() for name in methods or of_suite]
+    added, refused = [], []
+    for task, name in wanted:
+        reason = known[name].why_not(task)
+        if reason is None:
+            added.append(Cell(task, known[name]))
+        else:
+            refused.append(reason)
+    return added, refused
+
+
+def distinct(cells: Iterable[Cell]) -> list[Cell]:
+    """Every cell once. Results are told apart by names, so one name is one thing only.
+
+    Raises CoarticError where different tasks or cells have the same name.
+    """
+    tasks: dict[str, Task] = {}
+    found: dict[tuple[str, str], Cell] = {}
+    for cell in cells:
+        task = tasks.setdefault(cell.task.name, cell.task)
+        if task is not cell.task and task != cell.task:
+            raise CoarticError(
+                f"two different tasks are called {task.name!r}; give one of them another name"
+            )
+        first = found.setdefault((task.name, cell.label), cell)
+        # As text, since -0.0 equals 0.0.
+        if repr(first.parameters) != repr(cell.parameters) and (
+            repr(first.all_parameters) != repr(cell.all_parameters)
+        ):
+            raise CoarticError(
+                f"two different cells are called {cell.label!r} on task {task.name!r}: "
+                f"{brief_value(dict(first.parameters))} and {brief_value(dict(cell.parameters))}"
+            )
+    return list(found.values())
 
 
 def run_specs(
@@ -216,14 +359,31 @@ def run_specs(
     trials: int | None = None,
     limits: Limits = UNLIMITED,
 ) -> list[tuple[Cell, RunSpec]]:
-    """Every run of every cell, in order. ``trials`` goes to methods that have it."""
+    """Every run of every cell, in order. ``trials`` goes to methods that have it.
+
+    Raises CoarticError for wrong parameters, for more than :data:`MOST_PLANNED` runs or
+    :data:`MOST_TRIALS` trials, and where two cells ask for the same runs.
+    """
+    count = sum(runs if cell.stochastic else 1 for cell in cells)
+    if count > MOST_PLANNED:
+        raise CoarticError(
+            f"{count:_} runs are planned ({len(cells)} cells, {runs:_} runs of each that is "
+            f"stochastic); at most {MOST_PLANNED:_} can be run at once"
+        )
     planned = []
+    names: dict[str, Cell] = {}
     for cell in cells:
         parameters = dict(cell.parameters)
-        if trials is not None and "trials" in cell.entry.declared.defaults:
+        if trials is not None and "trials" in cell.defaults:
             parameters.setdefault("trials", trials)
         cell.entry.complete(parameters)  # refuse wrong parameters before any run
-        for run in range(runs if cell.entry.declared.stochastic else 1):
+        asked = {**cell.defaults, **parameters}.get("trials")
+        if isinstance(asked, int) and asked > MOST_TRIALS:
+            raise CoarticError(
+                f"{cell.task.name} x {cell.label}: {asked:_} trials a run; "
+                f"at most {MOST_TRIALS:_} are kept"
+            )
+        for run in range(runs if cell.stochastic else 1):
             spec = RunSpec(
                 task=cell.task,
                 entry=cell.entry,
@@ -232,6 +392,11 @@ def run_specs(
                 seed=run_seed(seed, cell.task.name, run),
                 limits=limits,
             )
+            if run == 0 and (first := names.setdefault(spec.run_id, cell)) is not cell:
+                raise CoarticError(
+                    f"{first.label!r} and {cell.label!r} on task {cell.task.name!r} are the "
+                    "same runs; leave one of them out"
+                )
             planned.append((cell, spec))
     return planned
 
@@ -239,13 +404,12 @@ def run_specs(
 def _block_cells(
     suite: Suite, block: _Block, known: Registry, own: Mapping[str, Task]
 ) -> list[Cell]:
-    """The cells of a block; blocks for all tasks are for the user's as well."""
-    tasks = [*builtin_tasks(), *own] if ALL in block.tasks else block.tasks
+    """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     for name in block.methods:
         if name not in known and name != ALL:
             raise unknown(f"method of suite {suite.name!r}", name, known)
     cells = []
-    for name in tasks:
+    for name in block.tasks_among(own):
         if block.move is not None and ALL in block.tasks and name in own:
             continue
         for task in _family(suite, own.get(name) or load_task(name), block.move):
@@ -257,7 +421,7 @@ def _cells_of(suite: Suite, block: _Block, known: Registry, task: Task) -> list[
     """The cells of a block on one task."""
     every = ALL in block.methods
     cells = []
-    for name in known if every else block.methods:
+    for name in block.methods_among(known):
         reason = known[name].why_not(task, block.parameters)
         if reason is not None:
             if every or ALL in block.tasks:
@@ -280,19 +444,31 @@ def _family(suite: Suite, task: Task, move: _Move | None) -> list[Task]:
         raise CoarticError(
             f"suite {suite.name!r}: task {task.name!r} has no goal {move.goal} to move"
         )
-    variants = []
-    for dx, dy in move.by:
+    variants: dict[Any, Task] = {}
+    for by in move.by:
+        dx, dy = map(_exact, by)
         goals = [list(goal) for goal in task.goals]
-        goals[move.goal - 1][0] += dx
-        goals[move.goal - 1][1] += dy
+        goals[move.goal - 1][0] += by[0]
+        goals[move.goal - 1][1] += by[1]
         content = {
             **task.model_dump(mode="json"),
-            "name": f"{task.name}.goal{move.goal}_{dx:g}_{dy:g}",
-            "description": f"{task.name} with goal {move.goal} moved by ({dx:g}, {dy:g})",
+            "name": f"{task.name}.goal{move.goal}_{dx}_{dy}",
+            "description": f"{task.name} with goal {move.goal} moved by ({dx}, {dy})",
             "goals": goals,
         }
-        variants.append(parse_task(content, f"suite {suite.name!r}"))
-    return variants
+        variant = parse_task(content, f"suite {suite.name!r}")
+        if variants.setdefault(variant.goals, variant) is not variant:
+            raise CoarticError(
+                f"suite {suite.name!r}: goal {move.goal} of task {task.name!r} is moved to the "
+                f"same place twice, by ({dx}, {dy}) again"
+            )
+    return list(variants.values())
+
+
+def _exact(value: float) -> str:
+    """A number in few digits, or in all of them where few would name another number."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def manifest_of(

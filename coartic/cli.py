@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import io
+import os
 import sys
 import time
 import warnings
@@ -20,6 +21,7 @@ from rich.table import Table as RichTable
 
 from coartic import CoarticError, __version__, builtin_tasks, load_task
 from coartic.compiled import PACKAGE
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.text import json_text, one_line
 
 if TYPE_CHECKING:
@@ -43,7 +45,9 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: _complain("warning", str(message))
+    os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
     try:
+        _check_arguments()
         _check_packages()
         app(prog_name="coartic")
     except CoarticError as error:
@@ -54,6 +58,13 @@ def main() -> None:
     except OSError as error:
         _complain("error", str(error.strerror or error))
         sys.exit(1)
+
+
+def _check_arguments() -> None:
+    """They are kept in records, as text."""
+    for argument in sys.argv[1:]:
+        if any("\ud800" <= c <= "\udfff" for c in argument):
+            raise CoarticError(f"argument {argument!r} is not text in this system's encoding")
 
 
 def _complain(kind: str, text: str) -> None:
@@ -126,9 +137,9 @@ Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that
 def run(
     suite: Annotated[str, typer.Argument(help="Suite to run (`coartic list`), or a TOML file.")],
     folder: Annotated[str, typer.Option("--out", help="Folder for the results.")],
-    runs: Annotated[int | None, typer.Option(min=1, max=100_000, help="Runs per cell.")] = None,
+    runs: Annotated[int | None, typer.Option(min=1, max=MOST_RUNS, help="Runs per cell.")] = None,
     trials: Annotated[
-        int | None, typer.Option(min=1, max=10_000_000, help="Trials per run.")
+        int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")
     ] = None,
     jobs: Annotated[
         int, typer.Option(min=-1, max=1024, help="Processes; -1 for one per core.")
@@ -140,12 +151,13 @@ def run(
         typer.Option(readable=False, help="A task of your own (TOML); may be repeated."),
     ] = None,
     method_file: MethodFiles = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the whole suite.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of the whole suite.")] = 0,
     time_limit: Annotated[
         float | None, typer.Option(help="Seconds per run; the suite's limit by default.")
     ] = None,
     trial_budget: Annotated[
-        int | None, typer.Option(min=1, help="Most physical trials a run may make.")
+        int | None,
+        typer.Option(min=1, max=MOST_TRIALS, help="Most physical trials a run may make."),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -178,8 +190,11 @@ def run(
 
     if jobs == 0:
         raise CoarticError("--jobs 0: give a number of processes, or -1 for one per core")
-    if time_limit is not None and not 0 < time_limit < float("inf"):
-        raise CoarticError(f"--time-limit {time_limit}: give a number of seconds above 0")
+    if time_limit is not None and not 0 < time_limit <= MOST_SECONDS:
+        raise CoarticError(
+            f"--time-limit {time_limit:g}: give a number of seconds above 0, "
+            f"at most {MOST_SECONDS:_}"
+        )
     if not folder.strip():
         raise CoarticError("--out is empty; name a folder for the results")
     out = Path(folder)

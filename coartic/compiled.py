@@ -34,6 +34,7 @@ _PRESENTATION = {
     "cli.py",
     "files.py",
     "frames.py",
+    "inputs.py",
     "record.py",
     "reference.py",
     "tables.py",

@@ -25,8 +25,10 @@ from pydantic.dataclasses import dataclass
 Hand = Literal["left", "right"]
 Array = NDArray[np.float64]
 LARGEST = 1e4  # of any figure: far beyond use, and exact in all that follows
+MOST_LINKS = 100  # of an arm
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
 Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST)]
+_Links = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_LINKS)]
 
 HANDS: tuple[Hand, Hand] = ("left", "right")  # A, in the order that breaks ties
 BASE_DOF = 2
@@ -79,8 +81,8 @@ class Robot:
     gives the published initial rewards of the one-armed tasks (docs/model.md).
     """
 
-    left_links: Annotated[tuple[Length, ...], Field(min_length=1)] = (1.0, 1.0, 1.0, 1.0)
-    right_links: Annotated[tuple[Length, ...], Field(min_length=1)] = (1.0, 1.0, 1.0, 1.0)
+    left_links: _Links = (1.0, 1.0, 1.0, 1.0)
+    right_links: _Links = (1.0, 1.0, 1.0, 1.0)
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
     base_size: tuple[Length, Length] = (1.0, 0.2)

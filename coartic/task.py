@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -26,8 +25,10 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import TaskError
+from coartic.inputs import brief, brief_value, problems, read_toml
 from coartic.model import PAPER
-from coartic.robot import HANDS, LARGEST, Array, Finite, Hand, Length, Robot
+from coartic.robot import HANDS, LARGEST, MOST_LINKS, Array, Finite, Hand, Length, Robot
+from coartic.text import Line
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
@@ -35,6 +36,9 @@ LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "tasks"
 
 MOST_GOALS = 100
+LONGEST_NAME = 64
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+"""Of names of tasks and suites, which become names of files and parts of commands."""
 WITHOUT_REACH = "without reach"
 
 Point = tuple[Finite, Finite]
@@ -59,30 +63,30 @@ class Provenance(_Frozen):
 
     status: Literal["printed", "inferred", "chosen"]
     """Printed in the paper, inferred from it, or chosen by the task's author."""
-    source: str
+    source: Line
 
 
 class Start(_Frozen):
     """Starting configuration q_0: base in length units, joint angles in rad."""
 
     base: Point = (0.0, 0.0)
-    left: tuple[Finite, ...]
-    right: tuple[Finite, ...]
+    left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
 
 
 class Task(_Frozen):
     """A sequence of spatial goals to be hit, each with one of the robot's hands."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=64)]
-    title: str = ""
-    description: str = ""
-    hands: Annotated[tuple[Hand, ...], Field(min_length=1)] = HANDS
+    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
+    title: Line = ""
+    description: Line = ""
+    hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
     """Hands the robot has."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
     """Goal centres x_g in the order in which they are to be hit, length unit."""
     radius: Length = 0.1
     """θ^g: radius of every goal, length unit."""
-    locked_base: tuple[Literal["x", "y"], ...] = ()
+    locked_base: Annotated[tuple[Literal["x", "y"], ...], Field(max_length=2)] = ()
     """Base coordinates that cannot move."""
     initial_hands: str
     """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one with
@@ -163,11 +167,11 @@ class Task(_Frozen):
         key, text = "initial_hands", self.initial_hands
         if not text or set(text) - set(LETTERS):
             return key, (
-                f"is {text!r}; it must be a sequence of L and R such as 'RRRR', "
+                f"is {brief_value(text)}; it must be a sequence of L and R such as 'RRRR', "
                 f"or one of {', '.join(INITIAL_POLICIES)}"
             )
         if len(text) != len(self.goals):
-            return key, f"{text!r} names {len(text)} hands for {len(self.goals)} goals"
+            return key, f"{brief_value(text)} names {len(text)} hands for {len(self.goals)} goals"
         absent = sorted({LETTERS[letter] for letter in text} - set(self.hands))
         if absent:
             return key, f"{text!r} uses the {absent[0]} hand, which is not among hands"
@@ -244,15 +248,7 @@ def _shipped() -> tuple[Task, ...]:
 
 
 def _read(path: Path) -> Task:
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Notepad's mark, too
-    except OSError as error:
-        raise TaskError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise TaskError(f"{path}: is not a text file in UTF-8") from None
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
-        raise TaskError(f"{path}: is not valid TOML: {_brief(str(error))}") from None
-    return parse_task(content, str(path))
+    return parse_task(read_toml(path, error=TaskError), str(path))
 
 
 def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> Task:
@@ -264,8 +260,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        lines = dict.fromkeys(f"{source}: {_explain(detail)}" for detail in _causes(error))
-        raise TaskError("\n".join(lines)) from None
+        raise TaskError(problems(source, _causes(error), _explain)) from None
 
 
 def _causes(error: ValidationError) -> list[ErrorDetails]:
@@ -289,14 +284,11 @@ def _hint(key: str) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
-def _brief(text: str) -> str:
-    return text if len(text) <= 80 else f"{text[:60]}... ({len(text)} characters)"
-
-
 def _key(location: tuple[int | str, ...]) -> str:
     text = ""
     for part in location:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+        name = brief(str(part))
+        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
     return text or "the file"
 
 
@@ -306,7 +298,7 @@ def _explain(detail: ErrorDetails) -> str:
     if detail["type"] == "task":
         return f"{context['key']} {context['text']}"
     key, value = _key(detail["loc"]), detail["input"]
-    shown = _brief(repr(value))
+    shown = brief_value(value)
     match detail["type"]:
         case "missing":
             return f"{key} is missing"
@@ -317,11 +309,11 @@ def _explain(detail: ErrorDetails) -> str:
                 return f"{key} is an unknown key; {last!r} belongs above the line [{table}]"
             return f"{key} is an unknown key{_hint(last)}"
         case "finite_number":
-            return f"{key} is {value}; it must be a finite number"
+            return f"{key} is {shown}; it must be a finite number"
         case "float_type":
             return f"{key} is {shown} ({type(value).__name__}); it must be a number"
         case "greater_than":
-            return f"{key} is {value}; it must be greater than 0"
+            return f"{key} is {shown}; it must be greater than 0"
         case "greater_than_equal" | "less_than_equal":
             return f"{key} is {shown}; its size must be at most {LARGEST:g}"
         case "literal_error":
@@ -330,6 +322,10 @@ def _explain(detail: ErrorDetails) -> str:
             return f"{key} is {shown} ({type(value).__name__}); it must be a text"
         case "string_pattern_mismatch":
             return f"{key} is {shown}; use letters, digits, '.', '_' and '-' only"
+        case "string_too_long":
+            return f"{key} has {len(value)} characters; it takes {context['max_length']}"
+        case "not_plain":
+            return f"{key} {detail['msg']}"
         case "too_short" if key == "goals":
             return "goals is empty; a task needs at least one goal"
         case "too_short":

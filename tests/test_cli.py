@@ -7,14 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
 from benchmarks.store import Store
 from coartic import __version__, cli
 from coartic.files import LISTING
 from coartic.record import run_seed
 
-from .test_task import BAD, GOOD
+from .attacks.inputs import GOOD
 
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
@@ -90,64 +89,6 @@ def test_run_own_task(monkeypatch, capsys, tmp_path):
     assert list(runs.method) == [f"dual-process/EC{k}" for k in (1, 1, 2, 2, 3, 3, 4, 4)]
     assert set(runs.task) == {"mine"}
     assert "Reconstructed" not in text
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_task_files(case, monkeypatch, capsys, tmp_path):
-    path = tmp_path / "bad.toml"
-    path.write_text(BAD[case][0], encoding="utf-8")
-    code, out, error = call(
-        monkeypatch, capsys, "run", "paper", "--task-file", path, "--out", tmp_path / "out"
-    )
-    assert (code, out) == (2, "")
-    assert error.startswith(f"error: {path}: ")
-    assert BAD[case][1] in error
-    assert error.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["run", "papr", "--out", "x"], "did you mean 'paper'?"),
-        (
-            ["run", "paper", "--out", "x", "--tasks", "nope"],
-            "unknown task 'nope'",
-        ),
-        (["run", "paper", "--out", "x", "--tasks", "ascending,"], "has an empty name"),
-        (["run", "paper", "--out", "x", "--methods", "EC9"], "unknown method 'EC9'"),
-        (["run", "paper", "--out", "x", "--jobs", "0"], "--jobs 0"),
-        (["run", "paper", "--out", "x", "--runs", "0"], "Invalid value for '--runs'"),
-        (["run", "paper", "--out", "x", "--seed", "-1"], "Invalid value for '--seed'"),
-        (["run", "paper", "--out", "x", "--trials", "many"], "Invalid value for '--trials'"),
-        (["run", "paper", "--out", "x", "--jobs", "99999"], "Invalid value for '--jobs'"),
-        (["run", "paper", "--out", "x", "--runs", "9999999"], "Invalid value for '--runs'"),
-        (["run", "paper", "--out", " "], "--out is empty"),
-        (["run", "paper"], "Missing option"),
-        (["run", "paper", "--out", "/dev/null/x"], "cannot write to /dev/null/x"),
-        (["run", "paper", "--out", "x", "--time-limit", "0"], "--time-limit 0.0"),
-        (["run", "paper", "--out", "x", "--time-limit", "nan"], "--time-limit nan"),
-        (["run", "paper", "--out", "x", "--trial-budget", "0"], "Invalid value"),
-        (["run", "paper", "--out", "x", "--method-file", "no.py"], "no.py: cannot be read"),
-        (["run", "none.toml", "--out", "x"], "none.toml: cannot be read"),
-        (["check", "nothing"], "unknown method 'nothing'"),
-        (["show", "abc"], "no run 'abc' below results"),
-        (["show", "*"], "'*' is no run id"),
-        (["reproduce", "abc"], "no run 'abc' below results"),
-        (["run", "paper", "--out", "x", "--task-file", "no.toml"], "no.toml: cannot be read"),
-        (["draw", "--out", "x.bmp"], "the name must end in .png"),
-        (["draw", "--out", "/dev/null/x.png"], "cannot write /dev/null/x.png"),
-        (["draw", "--out", "x.png", "--tasks", "nope"], "unknown task 'nope'"),
-        (["fly"], "No such command 'fly'"),
-    ],
-)
-def test_usage_errors(arguments, words, monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    code, _, error = call(monkeypatch, capsys, *arguments)
-    assert code == 2
-    assert words in " ".join(error.replace("│", " ").split())
-    assert "Traceback" not in error
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
@@ -282,15 +223,6 @@ def test_a_terminal_without_the_signs(tmp_path):
         capture_output=True, check=True, env={"PYTHONIOENCODING": "ascii"}, cwd=ROOT,
     )  # fmt: skip
     assert b"ascending" in done.stdout
-
-
-def test_modules_of_our_names_in_the_current_folder(tmp_path):
-    (tmp_path / "analysis.py").write_text("x = 1\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "coartic", "list"], capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.returncode == 2
-    assert "module 'analysis' is taken from" in done.stderr
 
 
 def test_list(monkeypatch, capsys):

@@ -11,8 +11,8 @@ from benchmarks.methods import registry
 from benchmarks.reproduce import perform_once
 from coartic.task import TASK_FOLDER
 
+from .attacks.inputs import GOOD
 from .test_sandbox import spec_of
-from .test_task import GOOD
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
 KNOWN = registry([BROKEN])

@@ -15,11 +15,12 @@ from analysis.results import load_results
 from benchmarks import tables
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
-from benchmarks.methods import CLASSES, registry
+from benchmarks.methods import CLASSES, Entry, registry
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import (
     Cell,
+    distinct,
     load_suite,
     manifest_of,
     run_specs,
@@ -31,7 +32,8 @@ from benchmarks.worker import ForeignCodeError, perform
 from coartic import CoarticError, Movement, execute, hand_sequences, learn, load_task
 from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
-from coartic.method import Information, Session
+from coartic.inputs import MOST_PLANNED
+from coartic.method import Information, Parameters, Session
 from coartic.record import run_seed
 from coartic.tables import FORMAT, RUNS, TIMINGS
 
@@ -614,6 +616,32 @@ def test_manifest(results):
     assert np.isfinite(manifest["format"])
 
 
+def test_cells_that_only_print_alike_are_refused():
+    """-0.0 equals the default 0.0, and a text can hold a comma."""
+
+    class Odd(KNOWN["dual-process/EC1"].method):
+        class Parameters(Parameters):
+            shift: float = 0.0
+            mode: str = "a"
+            kind: str = "b"
+
+    odd, task = Entry(Odd, "here", "0"), load_task("ascending")
+    for first, second in (
+        ({}, {"shift": -0.0}),
+        ({"mode": "c, kind=d"}, {"mode": "c", "kind": "d"}),
+    ):
+        cells = [Cell(task, odd, tuple(parameters.items())) for parameters in (first, second)]
+        assert distinct([cells[0], cells[0]]) == [cells[0]]
+        with pytest.raises(CoarticError, match="two different cells are called"):
+            distinct(cells)
+
+
+def test_plans_are_bounded_before_they_are_made():
+    (cell,) = paper_cells(tasks=["ascending"])
+    with pytest.raises(CoarticError, match="2_000_001 runs are planned"):
+        run_specs([cell], runs=MOST_PLANNED + 1, seed=0)
+
+
 def test_a_suite_can_move_one_goal(tmp_path):
     cells = suite_of(
         tmp_path,
@@ -628,6 +656,15 @@ def test_a_suite_can_move_one_goal(tmp_path):
     for cell, moved in zip(cells, ((6.0, 1.5), (6.25, 2.0)), strict=True):
         assert cell.task.goals == (base.goals[0], moved, base.goals[2])
         assert np.array_equal(cell.task.q0, base.q0)
+    close = "[[0, 0.1], [0, 0.1000000001], [0, 0.12345678]]"
+    moved = suite_of(
+        tmp_path,
+        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+        f"move = {{ goal = 2, by = {close} }}",
+    )
+    assert [cell.task.name.rpartition("_")[2] for cell in moved] == [
+        *("0.1", "0.1000000001", "0.12345678"),
+    ]
     with pytest.raises(CoarticError, match="has no goal 4 to move"):
         suite_of(
             tmp_path,
