@@ -146,10 +146,10 @@ def cells_frame(first: Results, second: Results) -> pd.DataFrame:
     """One row per cell that both folders have, in the order of the first one's plan.
 
     ``n_*`` runs, ``solved_*`` those with a solution, ``mean_*`` reward; ``shared`` seeds and
-    ``identical`` runs among them: the same status, joints, ticks and rewards of all trials. ``difference`` is the
-    mean of B less that of A with its 95 % BCa interval (``low``, ``high``), ``paired`` by seed
-    where at least three are shared; ``p`` is of the two-sided bootstrap test, ``p_adjusted``
-    after Holm over all cells tested. ``verdict`` is ``identical`` (every run), ``equivalent``,
+    ``identical`` runs among them: the same status, joints, ticks and rewards of all trials.
+    ``difference`` is the mean of B less that of A with its 95 % BCa interval (``low``,
+    ``high``), ``paired`` by seed where at least three are shared; ``p`` is of the two-sided
+    bootstrap test, ``p_adjusted`` after Holm over all cells tested. ``verdict`` is ``identical`` (every run), ``equivalent``,
     ``undecided`` or ``different`` (:class:`~analysis.inference.equivalence.Equivalence`,
     ``margin`` in ticks), ``no interval`` (fewer than three runs) or ``not compared``
     (``remarks`` say why). ``SPENT_*`` are medians over runs, time in s.
@@ -380,8 +380,8 @@ def _list(values: Iterable[Any]) -> str:
 
 def _notes(first: Results, second: Results) -> list[str]:
     notes = [
-        "Identical runs have the same seed, status, reward and hands; a cell is identical where "
-        "all its runs are, and is not tested then.",
+        "Runs are compared with those of the same seed; a cell is identical where all its runs "
+        "are, and is not tested then.",
         "B − A: difference of mean rewards (more is better) with its BCa interval, paired by "
         f"seed where at least {FEWEST} seeds are shared (marked ‖), of independent runs "
         "otherwise. p: two-sided bootstrap test, Holm over the cells tested here. Verdict: by "
