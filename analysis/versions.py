@@ -149,10 +149,11 @@ def cells_frame(first: Results, second: Results) -> pd.DataFrame:
     ``identical`` runs among them: the same status, joints, ticks and rewards of all trials.
     ``difference`` is the mean of B less that of A with its 95 % BCa interval (``low``,
     ``high``), ``paired`` by seed where at least three are shared; ``p`` is of the two-sided
-    bootstrap test, ``p_adjusted`` after Holm over all cells tested. ``verdict`` is ``identical`` (every run), ``equivalent``,
-    ``undecided`` or ``different`` (:class:`~analysis.inference.equivalence.Equivalence`,
-    ``margin`` in ticks), ``no interval`` (fewer than three runs) or ``not compared``
-    (``remarks`` say why). ``SPENT_*`` are medians over runs, time in s.
+    bootstrap test, ``p_adjusted`` after Holm over all cells tested. ``verdict`` is
+    ``identical`` (every run), ``equivalent``, ``undecided`` or ``different``
+    (:class:`~analysis.inference.equivalence.Equivalence`, ``margin`` in ticks), ``no
+    interval`` (fewer than three runs) or ``not compared`` (``remarks`` say why). ``SPENT_*``
+    are medians over runs, time in s.
     """
     here, there = _cells(first), _cells(second)
     tasks = _differing_tasks(first, second)
