@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -69,3 +70,65 @@ def test_no_module_is_imported_but_undeclared():
             if root in PACKAGES or root in sys.stdlib_module_names:
                 continue
             assert f'"{aliases.get(root, root)}>=' in declared, f"{path}: {root}"
+
+
+WITHOUT_POSIX = """
+import importlib, os, pkgutil, signal, sys
+from pathlib import Path
+from types import SimpleNamespace
+
+PACKAGES = sys.argv[2].split(",")
+
+def everything():
+    for name in PACKAGES:
+        package = importlib.import_module(name)
+        for module in pkgutil.walk_packages(package.__path__, f"{name}."):
+            if not module.name.endswith("__main__"):
+                importlib.import_module(module.name)
+
+everything()  # with all the libraries, which know by themselves where they are
+for name in [name for name in sys.modules if name.partition(".")[0] in PACKAGES]:
+    del sys.modules[name]
+for name in ("fcntl", "grp", "pwd", "resource", "termios"):
+    sys.modules[name] = None
+for module, names in (
+    (os, "fork getuid geteuid killpg setsid uname fchmod O_DIRECTORY O_NOFOLLOW"),
+    (signal, "SIGKILL SIGHUP SIGSTOP SIGALRM"),
+):
+    for name in names.split():
+        if hasattr(module, name):
+            delattr(module, name)
+everything()
+
+import json, psutil
+from benchmarks.harness import record_of
+from benchmarks.methods import registry
+from benchmarks.store import Store
+from benchmarks.suites import load_suite, manifest_of, run_specs, select_cells
+from benchmarks.tables import write_tables
+from benchmarks.worker import perform
+from analysis.results import load_results
+
+psutil.Process.memory_info = lambda process: SimpleNamespace(peak_wset=2**20)
+suite = load_suite("quick")
+cells = select_cells(suite, registry())
+assert len(run_specs(cells, runs=2, seed=0, trials=5)) > len(cells)
+planned = run_specs(cells[:1], runs=1, seed=0, trials=5)
+((_, spec),) = planned
+said = {"error": None, "answer": perform(spec.job())}
+record = record_of({"run_id": spec.run_id, "outcome": json.dumps(said)}, spec)
+assert record.timing.process_peak_mb == 1.0
+store = Store(Path(sys.argv[1]))
+with store.locked():
+    store.write(record)
+    write_tables(store, manifest_of(suite, 1, 0, planned))
+assert store.read(spec.run_id) == record
+assert load_results(store.folder).runs.reward.tolist() == [record.solution.reward]
+"""
+
+
+def test_nothing_needs_what_posix_alone_has(tmp_path):
+    """As on Windows: modules are imported, a suite is planned, a record kept and read."""
+    command = [sys.executable, "-c", WITHOUT_POSIX, tmp_path / "out", ",".join(PACKAGES)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -7,11 +7,12 @@ import pytest
 
 from analysis.optimum import entries
 from benchmarks.conformance import check_method, check_task_file
+from benchmarks.harness import record_of
 from benchmarks.methods import registry
-from benchmarks.reproduce import perform_once
 from coartic.task import TASK_FOLDER
 
 from .attacks.inputs import GOOD
+from .test_harness import InProcess
 from .test_sandbox import spec_of
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
@@ -54,7 +55,8 @@ def test_what_a_session_shows_cannot_be_written():
     laws = {law.name: law for law in check_method(KNOWN["test/forger"])}
     assert all(law.passed for law in laws.values())
     (spec,) = spec_of(KNOWN, "test/forger")
-    record = perform_once(spec)
+    (answer,) = InProcess().perform([spec.job()])
+    record = record_of(answer, spec)
     assert record.meter.trials == 1
     assert len(record.rewards) == 1
     assert record.rewards[0] < 0

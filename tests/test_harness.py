@@ -13,6 +13,7 @@ from analysis.comparison import compare
 from analysis.integrity import read_manifest
 from analysis.results import load_results
 from benchmarks import tables
+from benchmarks.declaration import declared
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
 from benchmarks.methods import CLASSES, Entry, registry
@@ -616,16 +617,19 @@ def test_manifest(results):
     assert np.isfinite(manifest["format"])
 
 
-def test_cells_that_only_print_alike_are_refused():
+def test_cells_that_only_print_alike_are_refused(monkeypatch):
     """-0.0 equals the default 0.0, and a text can hold a comma."""
 
-    class Odd(KNOWN["dual-process/EC1"].method):
+    class Odd(CLASSES["dual-process/EC1"]):
+        name = "odd"
+
         class Parameters(Parameters):
             shift: float = 0.0
             mode: str = "a"
             kind: str = "b"
 
-    odd, task = Entry(Odd, "here", "0"), load_task("ascending")
+    monkeypatch.setitem(CLASSES, "odd", Odd)
+    odd, task = Entry(declared(Odd), "here", "0"), load_task("ascending")
     for first, second in (
         ({}, {"shift": -0.0}),
         ({"mode": "c, kind=d"}, {"mode": "c", "kind": "d"}),
