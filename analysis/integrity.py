@@ -8,6 +8,7 @@ afterwards; every check raises CoarticError that says what, and how it is made a
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -43,17 +44,18 @@ def read_manifest(folder: Path) -> Manifest:
     except FileNotFoundError:
         if (folder / "records").is_dir():
             raise CoarticError(
-                f"{folder} has records of runs but no tables yet: its run was interrupted, or is "
-                "still at work; start the same `coartic run` again, which does what is missing"
+                f"{folder} has records of runs but no manifest.json yet: its run was interrupted, "
+                "or is still at work; start the same `coartic run` again, which does what is "
+                "missing"
             ) from None
         raise CoarticError(f"{folder} is not a results folder: {path} is missing") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise CoarticError(f"{folder}: results cannot be read: {error}") from None
+        raise CoarticError(f"{path}: results cannot be read: {error}") from None
     if not isinstance(content, dict):
         damaged(path, f"it holds a {type(content).__name__}, not an object")
     if content.get("format") != FORMAT:
         raise CoarticError(
-            f"{folder}: its tables have format {content.get('format')!r}, this version reads "
+            f"{path}: its tables have format {content.get('format')!r}, this version reads "
             f"{FORMAT}; run the same `coartic run` again to make them anew"
         )
     seal = content.pop("seal", None)
@@ -94,7 +96,8 @@ def check_tables(folder: Path, manifest: Manifest, records: Mapping[str, Record]
     for name, due in tables_of(manifest, records).items():
         path = folder / f"{name}.parquet"
         try:
-            found = pq.read_table(path)
+            data = path.read_bytes()
+            found = pq.read_table(pa.BufferReader(data))
         except FileNotFoundError:
             raise CoarticError(f"{path} is missing; {ANEW}") from None
         except (OSError, ValueError, pa.ArrowException) as error:
@@ -107,6 +110,8 @@ def check_tables(folder: Path, manifest: Manifest, records: Mapping[str, Record]
             damaged(path, f"its columns are not those of this table: {what}")
         if not found.equals(due):
             damaged(path, _difference(found, due))
+        if hashlib.sha256(data).hexdigest() != manifest.tables.get(path.name):
+            damaged(path, "it says what its records say, but is not the file that was written")
 
 
 def _check_plan(path: Path, plan: Plan) -> None:
@@ -121,7 +126,6 @@ def _check_plan(path: Path, plan: Plan) -> None:
             damaged(path, f"{where} is of a task or method that it does not describe")
         method = plan.methods[cell.method]
         ours = method.origin == BUILT_IN
-        left = {name: method.defaults.get(name) for name in cell.complete if name != "trials"}
         laws = (
             (
                 len(cell.run_ids) == (plan.runs if method.stochastic else 1),
@@ -130,7 +134,7 @@ def _check_plan(path: Path, plan: Plan) -> None:
             (cell.variant == variant_of(cell.parameters, method.defaults), "has another variant"),
             (cell.complete == {**cell.complete, **cell.parameters}, "has other parameters"),
             (
-                not ours or {**left, **cell.parameters}.items() >= _untrained(cell).items(),
+                not ours or cell.complete == {**method.defaults, **_set(cell)},
                 "has parameters that nobody set",
             ),
             (_trials(cell) <= plan.trials, "makes more trials than planned"),
@@ -144,8 +148,10 @@ def _check_plan(path: Path, plan: Plan) -> None:
         damaged(path, "no cell makes as many trials as it says")
 
 
-def _untrained(cell: PlannedCell) -> dict[str, Any]:
-    return {name: value for name, value in cell.complete.items() if name != "trials"}
+def _set(cell: PlannedCell) -> dict[str, Any]:
+    """What a suite sets: parameters of the cell, and trials, which are the suite's."""
+    trials = {name: cell.complete[name] for name in cell.complete if name == "trials"}
+    return {**trials, **cell.parameters}
 
 
 def _trials(cell: PlannedCell) -> int:

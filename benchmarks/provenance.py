@@ -61,6 +61,7 @@ def environment() -> dict[str, Any]:
         "cores": cpu_count(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command(),
+        "threads": None,
     }
 
 

@@ -53,7 +53,7 @@ class RunSpec:
         """All parameters, defaults included, as plain data."""
         return self.entry.complete(dict(self.parameters))
 
-    @cached_property
+    @property
     def specification(self) -> Specification:
         """Everything the result depends on, but for the code.
 

@@ -483,6 +483,7 @@ def manifest_of(
         specification=_plan(suite, runs, seed, planned),
         limits=PlanLimits(time_s=limits.time_s, trials=limits.trials),
         environment=surroundings(),
+        tables={},  # until they are written
     )
 
 

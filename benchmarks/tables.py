@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 
 import pyarrow.parquet as pq
@@ -22,12 +23,17 @@ def write_tables(store: Store, manifest: Manifest) -> dict[str, Record]:
     records = {run_id: store.read(run_id) for run_id in manifest.specification.run_ids}
     for record in records.values():
         record.check()
+    files = {}
+    for name, table in tables_of(manifest, records).items():
+        sink = io.BytesIO()
+        pq.write_table(table, sink, **parquet_options(name))
+        files[f"{name}.parquet"] = sink.getvalue()
+    digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
+    text = manifest.model_copy(update={"tables": digests}).text()
     try:
-        for name, table in tables_of(manifest, records).items():
-            sink = io.BytesIO()
-            pq.write_table(table, sink, **parquet_options(name))
-            write_atomically(store.folder / f"{name}.parquet", sink.getvalue())
-        write_atomically(store.folder / "manifest.json", manifest.text().encode())
+        for name, data in files.items():
+            write_atomically(store.folder / name, data)
+        write_atomically(store.folder / "manifest.json", text.encode())
     except OSError as error:
         raise CoarticError(f"cannot write to {store.folder}: {error.strerror or error}") from None
     return records

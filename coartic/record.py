@@ -177,7 +177,8 @@ class Environment(Plain):
     cores: Annotated[int, Field(gt=0)]
     date: Line
     command: tuple[Annotated[str, Field(max_length=LONGEST_REASON), printable], ...]
-    threads: dict[Line, Line | None] | None = None
+    threads: dict[Line, Line | None] | None
+    """Bounds on threads of libraries, in a worker."""
 
 
 class Timing(Plain):

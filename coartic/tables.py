@@ -162,6 +162,8 @@ class Manifest(Plain):
     specification: Plan
     limits: PlanLimits
     environment: Environment
+    tables: dict[Line, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
+    """SHA-256 of each table's file, by its name."""
 
     def seal(self) -> str:
         """Hash of the whole content, kept beside it: a changed manifest is noticed."""

@@ -37,6 +37,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     code, text, error = call(monkeypatch, capsys, *command)
     assert code == 0
     assert {path.name for path in out.iterdir()} == {
+        LISTING,
         "records",
         "runs.parquet",
         "solutions.parquet",

@@ -37,6 +37,7 @@ from analysis.study import Study
 from analysis.table import Table
 from analysis.versions import compare_versions
 from benchmarks.harness import Progress
+from benchmarks.store import Store
 from benchmarks.suites import Cell
 from coartic import CoarticError, cli, load_task
 from coartic.text import json_text, one_line, plain, printed, shell_line
@@ -329,7 +330,16 @@ def named(results):
     hostile = replace(results, manifest=manifest, runs=runs, sequences=sequences)
     # Names of tasks are checked when they are read: here they come past that.
     hostile.__dict__["tasks"] = {
-        tasks[name]: task.model_copy(update={"name": tasks[name], "title": EVIL})
+        tasks[name]: task.model_copy(
+            update={
+                "name": tasks[name],
+                "title": EVIL,
+                "provenance": {
+                    key: origin.model_copy(update={"source": EVIL})
+                    for key, origin in task.provenance.items()
+                },
+            }
+        )
         for name, task in results.tasks.items()
     }
     return hostile
@@ -339,8 +349,8 @@ def named(results):
 def hostile(tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign") / "results"
     learner, alone = KNOWN["dual-process/EC4"], KNOWN["corrective-alone/given"]
-    shelf = tiny_task(provenance={"goals": {"status": "inferred", "source": EVIL},
-                                  "start": {"status": "chosen", "source": EVIL}})  # fmt: skip
+    shelf = tiny_task(provenance={"goals": {"status": "inferred", "source": "x"},
+                                  "start": {"status": "chosen", "source": "x"}})  # fmt: skip
     cells = [
         *(
             Cell(load_task(name), KNOWN["dual-process/EC1"])
@@ -449,8 +459,8 @@ def report(hostile, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
         patch.setattr(
-            analysis.report.build, "save",
-            lambda plot, folder: (folder / f"{plot.id}.svg").write_text(SVG, encoding="utf-8"),
+            analysis.report.build, "rendered",
+            lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
         )  # fmt: skip
         study = Study(hostile)
         write(build(study), study, folder)
@@ -623,7 +633,9 @@ def test_progress(monkeypatch):
 
 
 def test_show(hostile, monkeypatch, capsys, tmp_path):
-    record = {"run_id": "0a-1b", "rewards": [1], "origin": f"{EVIL.strip()}.py", "reason": EVIL}
+    found = Store(hostile.folder).read(hostile.runs.run_id.iloc[0])
+    words = {"run_id": "0a-1b", "origin": f"{EVIL.strip()}.py", "reason": EVIL}
+    record = found.model_copy(update=words)
 
     class Folder:
         folder = tmp_path / "-\x1b it's $(id)"

@@ -603,7 +603,10 @@ def test_manifests_that_are_none(results, tmp_path, content, words):
 def test_a_first_run_that_was_interrupted(results, tmp_path):
     folder = shutil.copytree(results.folder, tmp_path / "copy")
     (folder / "manifest.json").unlink()
-    with pytest.raises(CoarticError, match="no tables yet.*start the same `coartic run` again"):
+    with pytest.raises(
+        CoarticError,
+        match="no manifest.json yet.*start the same `coartic run` again",
+    ):
         load_results(folder)
 
 

@@ -438,7 +438,7 @@ def consistent_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
 
 
 UNSEEN = re.compile(
-    r"sealed/manifest/(environment.*|limits/time_s|specification/(suite|methods/\*/(title|citation)))"
+    r"sealed/manifest/(environment.*|limits/time_s|specification/(suite|methods/\*/(title|citation|defaults/trials)))"
 )
 """Edits of a manifest whose seal was made anew, of words and surroundings that nothing else in a
 folder repeats."""
@@ -459,7 +459,7 @@ def sealed_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
     """The edits of the manifest, and a run left out everywhere, each with a seal that fits."""
     harms = {f"manifest/{what}" for what in HARM}
     for name, edit in (*manifest_edits(folder), *consistent_edits(folder)):
-        if name not in harms and not UNSEEN.fullmatch(f"sealed/{name}"):
+        if name not in harms and "/seal" not in name and not UNSEEN.fullmatch(f"sealed/{name}"):
             yield f"sealed/{name}", partial(_sealed, edit)
 
 

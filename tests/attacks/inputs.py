@@ -764,9 +764,9 @@ def _make_cases() -> list[Case]:
         ("empty", "", "defines no subclass"),
         ("syntax", "def x(:\n", "cannot be run: SyntaxError"),
         ("raises", "raise RuntimeError('no')\n", "cannot be run: RuntimeError: no"),
-        ("taken", METHODS.replace('"mine"', '"dual-process/EC1"'), "is already taken"),
+        ("taken", METHODS.replace('"mine"', '"dual-process/EC1"'), "is reserved"),
         ("no title", METHODS.replace('    title = "Mine"\n', ""), "does not declare 'title'"),
-        ("name is a number", METHODS.replace('"mine"', "3"), "name is 3"),
+        ("name is a number", METHODS.replace('"mine"', "3"), "name: input should be a valid"),
     ):
         listing = ("list", "--method-file", "bad.py")
         case("method", name, listing, words, files={"bad.py": source})
