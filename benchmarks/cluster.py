@@ -16,7 +16,7 @@ from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, S
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.executors import Answer, Job
-from benchmarks.sandbox import SandboxError, failure, supervise
+from benchmarks.sandbox import failure, supervise
 from coartic import CoarticError
 from coartic.text import plain
 
@@ -138,8 +138,8 @@ class Dask:
             answer = failure(run_id, "crashed", "every worker that tried this run died", 0.0)
         except CancelledError:  # by Dask itself, when it loses the scheduler
             answer = self.lost(ConnectionError("the connection was closed"))
-        except (CoarticError, SandboxError) as problem:
-            answer = CoarticError(str(problem))
+        except CoarticError as problem:
+            answer = problem
         except Exception as problem:
             answer = CoarticError(
                 f"the Dask workers of {self.shown} cannot perform runs: {self._why(problem)}; "

@@ -12,8 +12,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-from benchmarks.sandbox import Keeper, SandboxError, keeper
-from coartic import CoarticError
+from benchmarks.sandbox import Keeper, keeper
 
 Job = dict[str, Any]
 Answer = dict[str, Any]
@@ -35,7 +34,7 @@ class Local:
         self.jobs = jobs
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
-        """Answers as they come. Raises CoarticError where no worker can be started."""
+        """Answers as they come. Raises SandboxError where no worker can be started."""
         from joblib import effective_n_jobs
 
         waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
@@ -64,8 +63,6 @@ class Local:
             while answered < len(jobs):
                 with contextlib.suppress(queue.Empty):
                     answer = answers.get(timeout=_LOOK_S)
-                    if isinstance(answer, SandboxError):
-                        raise CoarticError(str(answer))
                     if isinstance(answer, BaseException):
                         raise answer
                     answered += 1

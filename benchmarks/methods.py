@@ -43,7 +43,7 @@ from coartic.inputs import read_text
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Method
 from coartic.record import SEARCH
-from coartic.text import plain
+from coartic.text import LONGEST_LINE, plain
 
 ENTRY_POINTS = "coartic.methods"
 BUILT_IN_ORIGIN = "built in"
@@ -121,7 +121,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     found = dict(_built_in())
 
     def add(foreign: Foreign, origin: str) -> None:
-        origin = plain(origin, 200)
+        origin = plain(origin, LONGEST_LINE)
         for declaration in _described(foreign, origin):
             name = declaration.name
             if name.startswith(RESERVED):

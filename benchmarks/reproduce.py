@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.harness import record_of
 from benchmarks.methods import Registry, unknown
-from benchmarks.sandbox import SandboxError, supervise
+from benchmarks.sandbox import supervise
 from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import Store
 from coartic import CoarticError, Trajectory, trajectory
@@ -63,10 +63,7 @@ def spec_of(record: Record, known: Registry, limits: Limits) -> RunSpec:
 
 def perform_once(spec: RunSpec) -> Record:
     """The record of one run, performed in a process of its own."""
-    try:
-        return record_of(supervise(spec.job()), spec)
-    except SandboxError as error:
-        raise CoarticError(str(error)) from None
+    return record_of(supervise(spec.job()), spec)
 
 
 def command_for(record: Record, folder: Path) -> str:

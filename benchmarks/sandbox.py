@@ -19,13 +19,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import IO, Any
 
 import psutil
 
 from benchmarks.guard import end, end_below
+from coartic.errors import CoarticError
 from coartic.text import plain
 
 # One run, one core: BLAS and OpenMP threads would only get in each other's way.
@@ -49,7 +50,7 @@ _RETRIES = 2  # fresh processes for a run whose process was killed
 _START_LIMIT_S = 300.0  # imports and a cold compilation, on a slow machine
 
 
-class SandboxError(RuntimeError):
+class SandboxError(CoarticError):
     """The worker cannot even start: no run would do better."""
 
 
@@ -80,18 +81,18 @@ class Sandbox:
             )
         except OSError as error:
             raise SandboxError(f"a worker process did not start: {error.strerror}") from None
+        self._questions: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._said = bytearray()
         self._worker: psutil.Process | None = None
-        self._readers = [
-            threading.Thread(target=read, args=(stream,), daemon=True)
-            for read, stream in (
+        _, _, self._listener = (
+            _started(carry, stream)
+            for carry, stream in (
+                (self._write_questions, self._guard.stdin),
                 (self._read_answers, self._guard.stdout),
                 (self._read_messages, self._guard.stderr),
             )
-        ]
-        for reader in self._readers:
-            reader.start()
+        )
         with _lock:
             _open[:] = [other for other in _open if other.alive]
             _open.append(self)
@@ -113,14 +114,10 @@ class Sandbox:
         The limit counts the time that the worker had: not while it, or this process, was
         stopped or asleep.
         """
-        assert self._guard.stdin is not None
         self._said.clear()
+        self._questions.put(json.dumps(question).encode() + b"\n")
         try:
-            self._guard.stdin.write(json.dumps(question).encode() + b"\n")
-            self._guard.stdin.flush()
             answer = self._answer(limit_s)
-        except (BrokenPipeError, ValueError):  # it is ending, or was closed from elsewhere
-            answer = self._end_of_worker(0.0)
         except BaseException:  # Ctrl-C: never read one question's answer as the next one's
             self.close()
             raise
@@ -139,9 +136,7 @@ class Sandbox:
             end([self._worker])
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._guard.wait(_END_LIMIT_S)
-        with contextlib.suppress(OSError):  # a question it never read may be in the pipe
-            if self._guard.stdin is not None:
-                self._guard.stdin.close()
+        self._questions.put(None)
 
     def _answer(self, limit_s: float | None) -> bytes | Failure:
         clock = before = time.monotonic()
@@ -178,7 +173,7 @@ class Sandbox:
     def _end_of_worker(self, wall_s: float) -> Failure:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._guard.wait(_END_LIMIT_S)  # it closed its output: it is ending
-        self._readers[1].join(1.0)
+        self._listener.join(1.0)
         code = self._guard.poll()
         number = 0 if code is None else code - 128 if code > 128 else -code if code < 0 else 0
         how = f"killed by {_signal_name(number)}" if number else f"exit code {code or 0}"
@@ -198,6 +193,13 @@ class Sandbox:
     def _last_words(self) -> str:
         lines = bytes(self._said).decode(errors="replace").strip().splitlines()
         return plain("\n".join(lines[-3:]), 1000) or "it left no message"
+
+    def _write_questions(self, stream: IO[bytes]) -> None:
+        """Apart from who asks, who would wait without end for a worker that does not read."""
+        with contextlib.suppress(OSError), stream:
+            while (question := self._questions.get()) is not None:
+                stream.write(question)
+                stream.flush()
 
     def _read_answers(self, stream: IO[bytes]) -> None:
         with stream:
@@ -318,6 +320,12 @@ def close_all() -> None:
         _idle.clear()
     for sandbox in sandboxes:
         sandbox.close()
+
+
+def _started(carry: Callable[[IO[bytes]], None], stream: IO[bytes] | None) -> threading.Thread:
+    thread = threading.Thread(target=carry, args=(stream,), daemon=True)
+    thread.start()
+    return thread
 
 
 def _path() -> str:
