@@ -287,11 +287,12 @@ class Record(Plain):
 
     def disagreement(self) -> str | None:
         """The first law that the record breaks by what it states; None where it breaks none."""
-        best = max((reward for reward in self.rewards if reward is not None), default=None)
+        known = [reward for reward in self.rewards if reward is not None]
+        best, ticks = max(known, default=None), -sum(known)
         reward = None if self.solution is None else self.solution.reward
         learner = self.method.startswith(METHOD_PREFIX)
         spent = self.meter
-        failed = sum(r is None for r in self.rewards)
+        failed = len(self.rewards) - len(known)
         laws: Sequence[tuple[bool, str]] = (
             (
                 self.run_id == f"{self.specification.key()}-{self.code}",
@@ -318,7 +319,7 @@ class Record(Plain):
                 "more failed rewards than failed trials",
             ),
             (
-                spent is None or -sum(r or 0 for r in self.rewards) <= spent.movement_ticks,
+                spent is None or ticks <= spent.movement_ticks,
                 "its trials' rewards are more than its ticks",
             ),
             (
@@ -331,7 +332,7 @@ class Record(Plain):
                 not (learner and spent and self.rewards)
                 or failed > 0
                 or self.specification.task.get("initial_hands") in INITIAL_POLICIES
-                or spent.movement_ticks == -sum(r or 0 for r in self.rewards),
+                or spent.movement_ticks == ticks,
                 "its ticks are not those of its trials",
             ),
             (
