@@ -82,7 +82,7 @@ class Sandbox:
         except OSError as error:
             raise SandboxError(f"a worker process did not start: {error.strerror}") from None
         self._questions: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._answers: queue.Queue[bytes | None] = queue.Queue(2)  # a flood has to wait
         self._said = bytearray()
         self._worker: psutil.Process | None = None
         _, _, self._listener = (
@@ -115,6 +115,7 @@ class Sandbox:
         stopped or asleep.
         """
         self._said.clear()
+        self._discard_answers()  # to questions that nobody asked
         self._questions.put(json.dumps(question).encode() + b"\n")
         try:
             answer = self._answer(limit_s)
@@ -137,6 +138,13 @@ class Sandbox:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._guard.wait(_END_LIMIT_S)
         self._questions.put(None)
+        self._discard_answers()
+
+    def _discard_answers(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while self._answers.get_nowait() is not None:
+                pass
+            self._answers.put(None)  # there will be none
 
     def _answer(self, limit_s: float | None) -> bytes | Failure:
         clock = before = time.monotonic()
