@@ -18,13 +18,23 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import ValidationError
 
-from coartic import CoarticError, parse_task
-from coartic.errors import TaskError
+from coartic import PAPER, CoarticError, parse_task
+from coartic.inputs import read_bytes
 from coartic.record import Record, RecordError, problems, read_record, run_seed
-from coartic.tables import FORMAT, Manifest, Plan, PlannedCell, tables_of, variant_of
+from coartic.tables import (
+    BUILT_IN,
+    FORMAT,
+    Manifest,
+    Plan,
+    PlannedCell,
+    tables_of,
+    trials_in,
+    variant_of,
+)
 
 ANEW = "start the same `coartic run` again: it makes the tables anew from the records"
-BUILT_IN = "built in"  # origin of this project's methods
+LARGEST_TABLE = 1 << 32
+"""Bytes of a table or a manifest."""
 BASE = "task"  # base locked as the task has it: the case that rewards compare with
 
 
@@ -39,24 +49,23 @@ def read_manifest(folder: Path) -> Manifest:
     Raises CoarticError where there is none, it has another format, or was altered.
     """
     path = folder / "manifest.json"
+    if not path.exists() and (folder / "records").is_dir():
+        raise CoarticError(
+            f"{folder} has records of runs but no manifest.json yet: its run was interrupted, or "
+            "is still at work; start the same `coartic run` again, which does what is missing"
+        )
+    if not path.exists():
+        raise CoarticError(f"{folder} is not a results folder: {path} is missing")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        if (folder / "records").is_dir():
-            raise CoarticError(
-                f"{folder} has records of runs but no manifest.json yet: its run was interrupted, "
-                "or is still at work; start the same `coartic run` again, which does what is "
-                "missing"
-            ) from None
-        raise CoarticError(f"{folder} is not a results folder: {path} is missing") from None
-    except (OSError, ValueError, RecursionError) as error:
+        content = json.loads(read_bytes(path, LARGEST_TABLE), parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
         raise CoarticError(f"{path}: results cannot be read: {error}") from None
     if not isinstance(content, dict):
         damaged(path, f"it holds a {type(content).__name__}, not an object")
     if content.get("format") != FORMAT:
         raise CoarticError(
             f"{path}: its tables have format {content.get('format')!r}, this version reads "
-            f"{FORMAT}; run the same `coartic run` again to make them anew"
+            f"{FORMAT}; start the same `coartic run` again with another --out"
         )
     seal = content.pop("seal", None)
     try:
@@ -66,6 +75,10 @@ def read_manifest(folder: Path) -> Manifest:
     if manifest.seal() != seal:
         damaged(path, "it is not as it was written: its seal does not fit")
     return manifest
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number")
 
 
 def read_records(folder: Path, manifest: Manifest) -> dict[str, Record]:
@@ -81,7 +94,7 @@ def read_records(folder: Path, manifest: Manifest) -> dict[str, Record]:
             try:
                 record = read_record(folder / "records" / f"{run_id}.json")
                 record.check()
-            except (RecordError, TaskError) as error:
+            except RecordError as error:
                 raise CoarticError(f"{error}; start the same `coartic run` again") from None
             problem = _departure(manifest, cell, run, record)
             if problem is not None:
@@ -95,11 +108,11 @@ def check_tables(folder: Path, manifest: Manifest, records: Mapping[str, Record]
     """Every table of a folder is what follows from its manifest and records, in all columns."""
     for name, due in tables_of(manifest, records).items():
         path = folder / f"{name}.parquet"
+        if not path.exists():
+            raise CoarticError(f"{path} is missing; {ANEW}")
+        data = read_bytes(path, LARGEST_TABLE)
         try:
-            data = path.read_bytes()
             found = pq.read_table(pa.BufferReader(data))
-        except FileNotFoundError:
-            raise CoarticError(f"{path} is missing; {ANEW}") from None
         except (OSError, ValueError, pa.ArrowException) as error:
             damaged(path, str(error).splitlines()[0] if str(error) else type(error).__name__)
         if not found.schema.equals(due.schema, check_metadata=True):
@@ -120,6 +133,9 @@ def _check_plan(path: Path, plan: Plan) -> None:
         if parse_task(content, str(path)).name != name:
             damaged(path, f"its task {name!r} has another name")
     seen: set[str] = set()
+    labels = {(cell.task, cell.method, cell.variant) for cell in plan.cells}
+    if len(labels) < len(plan.cells):
+        damaged(path, "two of its cells have the same task, method and variant")
     for cell in plan.cells:
         where = f"its cell {cell.task} x {cell.method} {cell.variant}".rstrip()
         if cell.task not in plan.tasks or cell.method not in plan.methods:
@@ -132,19 +148,18 @@ def _check_plan(path: Path, plan: Plan) -> None:
                 "has another number of runs",
             ),
             (cell.variant == variant_of(cell.parameters, method.defaults), "has another variant"),
-            (cell.complete == {**cell.complete, **cell.parameters}, "has other parameters"),
             (
                 not ours or cell.complete == {**method.defaults, **_set(cell)},
                 "has parameters that nobody set",
             ),
-            (_trials(cell) <= plan.trials, "makes more trials than planned"),
+            (trials_in(cell.complete) <= plan.trials, "makes more trials than planned"),
             (seen.isdisjoint(cell.run_ids), "has a run that is planned twice"),
         )
         problem = next((words for holds, words in laws if not holds), None)
         if problem is not None:
             damaged(path, f"{where} {problem}")
         seen.update(cell.run_ids)
-    if plan.trials != max(map(_trials, plan.cells), default=0):
+    if plan.trials != max((trials_in(cell.complete) for cell in plan.cells), default=0):
         damaged(path, "no cell makes as many trials as it says")
 
 
@@ -152,11 +167,6 @@ def _set(cell: PlannedCell) -> dict[str, Any]:
     """What a suite sets: parameters of the cell, and trials, which are the suite's."""
     trials = {name: cell.complete[name] for name in cell.complete if name == "trials"}
     return {**trials, **cell.parameters}
-
-
-def _trials(cell: PlannedCell) -> int:
-    trials = cell.complete.get("trials")
-    return trials if isinstance(trials, int) else 0
 
 
 def _departure(manifest: Manifest, cell: PlannedCell, run: int, record: Record) -> str | None:
@@ -167,6 +177,7 @@ def _departure(manifest: Manifest, cell: PlannedCell, run: int, record: Record) 
         ("task", own.task, plan.tasks[cell.task]),
         ("method", own.method, cell.method),
         ("parameters", own.parameters, cell.complete),
+        ("model", own.model, PAPER._asdict()),
         ("number", record.run, run),
         ("seed", own.seed, run_seed(plan.seed, cell.task, run)),
         ("trial budget", own.trial_budget, manifest.limits.trials),

@@ -20,9 +20,10 @@ import pandas as pd
 
 from analysis.results import Results, load_results
 from coartic import CoarticError, Task
+from coartic.record import SEARCH
 from coartic.text import one_line
 
-METHODS = "optimum/"  # methods that search for it
+METHODS = SEARCH  # methods that search for it
 DATA = Path(__file__).with_name("optimum.json")
 BASE = "task"  # base locked as the task has it: the case that rewards compare with
 

@@ -384,8 +384,7 @@ def _list(values: Iterable[Any]) -> str:
 
 def _notes(first: Results, second: Results) -> list[str]:
     notes = [
-        "Identical runs have the same seed, status, reward and hands; a cell is identical where "
-        "all its runs are, and is not tested then.",
+        "A cell is identical where all its runs are, and is not tested then.",
         "B − A: difference of mean rewards (more is better) with its BCa interval, paired by "
         f"seed where at least {FEWEST} seeds are shared (marked ‖), of independent runs "
         "otherwise. p: two-sided bootstrap test, Holm over the cells tested here. Verdict: by "

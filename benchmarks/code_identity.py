@@ -16,7 +16,10 @@ from pathlib import Path
 
 from benchmarks.declaration import Foreign, MethodFileError, brief
 from coartic.compiled import PACKAGE, model_files
+from coartic.inputs import read_bytes
 
+LARGEST_MODULE = 10_000_000
+"""Bytes of a module that belongs to a method."""
 _PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
 
 
@@ -26,7 +29,7 @@ def built_in_code(module: str) -> str:
     imports."""
     if module.partition(".")[0] == "coartic":
         return _code_hash([])  # part of the model's code anyway
-    found: dict[str, str] = {}
+    found: dict[str, bytes] = {}
     waiting = [module]
     while waiting:
         name = waiting.pop()
@@ -72,7 +75,7 @@ def _files_of(root: str) -> list[Path]:
     return [Path(spec.origin)] if spec.origin and spec.origin.endswith(".py") else []
 
 
-def _imported(source: str, name: str) -> list[str]:
+def _imported(source: str | bytes, name: str) -> list[str]:
     names: list[str] = []
     for node in ast.walk(_tree(source, name)):
         if isinstance(node, ast.Import):
@@ -82,7 +85,7 @@ def _imported(source: str, name: str) -> list[str]:
     return names
 
 
-def _code_hash(sources: Iterable[str], name: str = "") -> str:
+def _code_hash(sources: Iterable[str | bytes], name: str = "") -> str:
     digest = hashlib.sha256(_model())
     for source in sources:
         digest.update(_essence(source, name))
@@ -96,7 +99,7 @@ def _model() -> bytes:
     return b"".join(path.name.encode() + _essence(_text(path), str(path)) for path in files)
 
 
-def _essence(source: str, name: str) -> bytes:
+def _essence(source: str | bytes, name: str) -> bytes:
     """A module's syntax tree without docstrings."""
     tree = _tree(source, name)
     for node in ast.walk(tree):
@@ -115,12 +118,12 @@ def _is_text(node: ast.AST) -> bool:
     )
 
 
-def _tree(source: str, name: str) -> ast.Module:
+def _tree(source: str | bytes, name: str) -> ast.Module:
     try:
-        return ast.parse(source)
+        return ast.parse(source, name or "<method>")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise MethodFileError(f"{name}: cannot be run: {brief(error)}") from None
+        raise MethodFileError(f"cannot be run: {brief(error)}") from None
 
 
-def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8")
+def _text(path: Path) -> bytes:
+    return read_bytes(path, LARGEST_MODULE, error=MethodFileError)

@@ -15,14 +15,12 @@ from importlib import metadata
 from types import ModuleType
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, JsonValue, ValidationError
+from pydantic import Field, ValidationError
 
 from coartic import CoarticError, Task
 from coartic.method import Information, Method
-from coartic.record import Plain
+from coartic.record import Plain, Values
 from coartic.text import Line, plain
-
-Scalar = bool | int | float | str | None
 
 
 class MethodFileError(CoarticError):
@@ -45,14 +43,14 @@ class Declaration(Plain):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+/-]*$", max_length=80)]
     title: Line
     citation: Line
-    told: tuple[Information, ...]
+    told: Annotated[tuple[Information, ...], Field(max_length=len(Information))]
     secondary: Annotated[tuple[Line, ...], Field(max_length=20)]
     stochastic: bool
     frozen: bool
     """Whether its parameters cannot be changed once they are validated."""
-    defaults: dict[Line, JsonValue]
+    defaults: Values
     """Its parameters; None for one that has no default."""
-    quick: dict[Line, JsonValue]
+    quick: Values
     """Parameters for a check in seconds."""
 
 
@@ -121,7 +119,7 @@ def methods_of(foreign: Foreign) -> list[type[Method]]:
     try:
         target = _loaded(foreign)
     except (Exception, SystemExit, KeyboardInterrupt) as error:
-        raise MethodFileError(f"{foreign.where}: cannot be run: {brief(error)}") from None
+        raise MethodFileError(f"cannot be run: {brief(error)}") from None
     if inspect.isclass(target) and issubclass(target, Method):
         return [target]
     found = [
@@ -133,7 +131,13 @@ def methods_of(foreign: Foreign) -> list[type[Method]]:
         and value.__module__ == getattr(target, "__name__", None)
     ]
     if not found:
-        raise MethodFileError(f"{foreign.where}: defines no subclass of coartic.method.Method")
+        unfinished = [
+            f"{value.__name__} has no {', '.join(sorted(vars(value)['__abstractmethods__']))}"
+            for value in vars(target).values()
+            if inspect.isclass(value) and value is not Method and inspect.isabstract(value)
+        ]
+        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
+        raise MethodFileError(f"defines no subclass of coartic.method.Method{why}")
     return found
 
 

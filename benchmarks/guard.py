@@ -68,7 +68,9 @@ def main() -> None:
         parent = psutil.Process(int(sys.argv[1]))
     except psutil.NoSuchProcess:  # it ended before we looked
         return
-    worker = subprocess.Popen([sys.executable, "-P", "-m", "benchmarks.worker"])
+    worker = subprocess.Popen(
+        [sys.executable, "-P", "-m", "benchmarks.worker"], start_new_session=True
+    )
     with open(os.devnull, "r+b") as nothing:  # the streams are the worker's: it ends them
         for stream in (0, 1, 2):
             os.dup2(nothing.fileno(), stream)

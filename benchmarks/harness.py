@@ -18,7 +18,6 @@ from coartic.method import Information
 from coartic.record import (
     MOST_MOVEMENTS,
     SEARCH,
-    Details,
     Environment,
     Plain,
     PlainMovement,
@@ -28,6 +27,7 @@ from coartic.record import (
     Spent,
     Status,
     Timing,
+    Values,
     problems,
     solved,
 )
@@ -138,7 +138,7 @@ class Outcome(Plain):
     initial: Handed = ()
     replay: Handed = ()
     bound: Reward | None = None
-    details: Details = Field(default_factory=dict)
+    details: Values = Field(default_factory=dict)
     used: tuple[Information, ...] = ()
     meter: Spent | None = None
     rewards: tuple[Reward | None, ...] = ()
@@ -169,7 +169,7 @@ def record_of(answer: Answer, spec: RunSpec) -> Record:
         return _failure(
             spec, "solver-failed", f"what it handed over cannot be kept: {problems(error)}"
         )
-    if said.foreign_code:
+    if said.foreign_code and spec.entry.foreign is None:
         raise CoarticError(plain(said.error or "other code"))
     if said.answer is None:
         return _failure(spec, "crashed", said.error or "it gave no answer")

@@ -30,7 +30,7 @@ from benchmarks.store import Store
 from coartic.tables import TIMINGS
 
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
-SUITE = ("run", "quick", "--runs", "3", "--trials", "3000")
+SUITE = ("run", "quick", "--tasks", "ascending,two-armed-2", "--runs", "3", "--trials", "3000")
 SHARED_MEMORY = Path("/dev/shm")
 _MARK = "COARTIC_KILL_RESUME"
 _KILLS_A_TURN = 5

@@ -6,7 +6,6 @@ code is run in sandboxes alone, to describe them and to perform their runs.
 
 from __future__ import annotations
 
-import atexit
 import difflib
 import json
 import threading
@@ -18,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 import baselines.cma_es
 import baselines.corrective_alone
@@ -37,16 +36,15 @@ from benchmarks.declaration import (
     reason_against,
 )
 from benchmarks.sandbox import Failure, Sandbox
-from coartic import CoarticError, Task
+from coartic import CoarticError, Task, tables
 from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import read_text
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Method
-from coartic.record import SEARCH
+from coartic.record import SEARCH, Values, problems
 from coartic.text import LONGEST_LINE, plain
 
 ENTRY_POINTS = "coartic.methods"
-BUILT_IN_ORIGIN = "built in"
 RESERVED = (METHOD_PREFIX, SEARCH)
 """Ids that begin so have a meaning in every table: methods of this project alone have them."""
 QUESTION_LIMIT_S = 60.0
@@ -151,7 +149,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
 @cache
 def _built_in() -> dict[str, Entry]:
     return {
-        name: Entry(declared(method), BUILT_IN_ORIGIN, built_in_code(method.__module__))
+        name: Entry(declared(method), tables.BUILT_IN, built_in_code(method.__module__))
         for name, method in CLASSES.items()
     }
 
@@ -175,9 +173,10 @@ def _complete(foreign: Foreign | None, name: str, parameters: str) -> dict[str, 
     if foreign is None:
         return completed(CLASSES[name], given)
     found = _ask(foreign, question="complete", method=name, parameters=given)
-    if not isinstance(found, dict):
-        raise MethodFileError(f"method {name!r}: its parameters are no table")
-    return found
+    try:
+        return _VALUES.validate_python(found)
+    except ValidationError as error:
+        raise MethodFileError(f"method {name!r}: its parameters: {problems(error)}") from None
 
 
 @cache
@@ -193,6 +192,7 @@ def _described(foreign: Foreign, origin: str) -> tuple[Declaration, ...]:
 
 
 _asked: dict[Foreign, Sandbox] = {}
+_VALUES: TypeAdapter[dict[str, Any]] = TypeAdapter(Values)
 _lock = threading.Lock()
 
 
@@ -215,9 +215,3 @@ def _ask(foreign: Foreign, **question: Any) -> Any:
     if error is not None:
         raise MethodFileError(plain(str(error)))
     return result
-
-
-@atexit.register
-def _dismiss() -> None:
-    for sandbox in _asked.values():
-        sandbox.close()

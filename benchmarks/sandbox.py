@@ -14,6 +14,7 @@ import contextlib
 import json
 import os
 import queue
+import secrets
 import signal
 import subprocess
 import sys
@@ -40,6 +41,8 @@ THREADS = dict.fromkeys(
     ),
     "1",
 )
+MARK = "COARTIC_SANDBOX"
+"""Environment variable that a sandbox's processes can be told by."""
 LARGEST_ANSWER = 128 << 20
 """Bytes of one answer."""
 LAST_WORDS = 4096
@@ -62,21 +65,22 @@ class Failure:
     """``timeout`` or ``crashed``."""
     reason: str
     wall_s: float
-    killed: bool = False
-    """By a signal: out of memory, an operator, or its own doing."""
+    disturbed: bool = False
+    """Maybe from outside: by a signal (out of memory, an operator), by another's words."""
 
 
 class Sandbox:
     """One worker process."""
 
     def __init__(self) -> None:
+        self._mark = secrets.token_hex(8)
         try:
             self._guard = subprocess.Popen(
                 [sys.executable, "-P", "-m", "benchmarks.guard", str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                env={**os.environ, **THREADS, "PYTHONPATH": _path()},
+                env={**os.environ, **THREADS, "PYTHONPATH": _path(), MARK: self._mark},
                 start_new_session=True,  # Ctrl-C is for the parent
             )
         except OSError as error:
@@ -108,30 +112,42 @@ class Sandbox:
         """Whether the worker still runs."""
         return self._guard.poll() is None
 
-    def ask(self, question: dict[str, Any], limit_s: float | None) -> bytes | Failure:
+    def ask(
+        self, question: dict[str, Any], limit_s: float | None, *, patient: bool = False
+    ) -> bytes | Failure:
         """One answer as it was given, or why there is none, which ends the worker.
 
-        The limit counts the time that the worker had: not while it, or this process, was
-        stopped or asleep.
+        The limit does not count while this process was stopped or asleep, nor, where it is
+        ``patient``, while the worker was stopped. A method that nobody has read can stop itself.
         """
         self._said.clear()
         self._discard_answers()  # to questions that nobody asked
-        self._questions.put(json.dumps(question).encode() + b"\n")
+        token = secrets.token_hex(8)
+        self._questions.put(json.dumps({**question, "token": token}).encode() + b"\n")
         try:
-            answer = self._answer(limit_s)
+            answer = self._answer(limit_s, patient)
         except BaseException:  # Ctrl-C: never read one question's answer as the next one's
             self.close()
             raise
+        if isinstance(answer, bytes):
+            said, _, answer = answer.partition(b" ")
+            if said != token.encode():
+                answer = Failure(
+                    "crashed", "it answered what nobody had asked", 0.0, disturbed=True
+                )
         if isinstance(answer, Failure):
             self.close()
         return answer
 
     def close(self) -> None:
         """End the worker at once, with all that it has started."""
+        guarded = self.alive
         with contextlib.suppress(psutil.Error):
             guard = psutil.Process(self._guard.pid)
             end_below(guard)
             end([guard])
+        if not guarded:  # it may have been ended so that something is left
+            end(filter(self._is_ours, psutil.process_iter()))
         if self._worker is not None and self._worker.is_running():  # it has lost its guard
             end_below(self._worker)
             end([self._worker])
@@ -140,13 +156,19 @@ class Sandbox:
         self._questions.put(None)
         self._discard_answers()
 
+    def _is_ours(self, process: psutil.Process) -> bool:
+        try:
+            return bool(process.environ().get(MARK) == self._mark)
+        except (psutil.Error, OSError):
+            return False
+
     def _discard_answers(self) -> None:
         with contextlib.suppress(queue.Empty):
             while self._answers.get_nowait() is not None:
                 pass
             self._answers.put(None)  # there will be none
 
-    def _answer(self, limit_s: float | None) -> bytes | Failure:
+    def _answer(self, limit_s: float | None, patient: bool = False) -> bytes | Failure:
         clock = before = time.monotonic()
         had = 0.0
         while True:
@@ -155,7 +177,7 @@ class Sandbox:
                 answer = self._answers.get(timeout=left)
             except queue.Empty:
                 now = time.monotonic()
-                if not self._stopped():
+                if not (patient and self._stopped()):
                     had += min(now - before, 2 * _LOOK_S)
                 before = now
                 if limit_s is not None and had >= limit_s:
@@ -189,7 +211,7 @@ class Sandbox:
             "crashed",
             f"the worker process ended ({how}): {self._last_words()}",
             wall_s,
-            killed=bool(number),
+            disturbed=bool(number),
         )
 
     def _stopped(self) -> bool:
@@ -243,13 +265,13 @@ class Keeper:
         """The answer to one job: ``outcome`` as the worker states it (text), or ``failure``,
         ``reason`` and ``wall_s``. Raises SandboxError where no worker can be started.
 
-        A run whose worker was killed by a signal is tried again in a fresh one first.
+        A run whose worker was disturbed is tried again in a fresh one first.
         """
-        found = self._suited(job).ask({"question": "solve", **job}, job["time_limit_s"])
+        found = self._ask(self._suited(job), job)
         for _ in range(_RETRIES):
-            if isinstance(found, bytes) or not found.killed:
+            if isinstance(found, bytes) or not found.disturbed:
                 break
-            found = self._fresh(job).ask({"question": "solve", **job}, job["time_limit_s"])
+            found = self._ask(self._fresh(job), job)
         if isinstance(found, bytes):
             return {"run_id": job["run_id"], "outcome": found.decode(errors="replace")}
         return failure(job["run_id"], found.outcome, found.reason, found.wall_s)
@@ -265,6 +287,10 @@ class Keeper:
         self._dismissed = True
         if (sandbox := self._sandbox) is not None:
             sandbox.close()
+
+    def _ask(self, sandbox: Sandbox, job: dict[str, Any]) -> bytes | Failure:
+        question = {"question": "solve", **job}
+        return sandbox.ask(question, job["time_limit_s"], patient=job["owner"] is None)
 
     def _suited(self, job: dict[str, Any]) -> Sandbox:
         sandbox = self._sandbox

@@ -46,7 +46,15 @@ from coartic.inputs import (
 from coartic.learner import METHOD_PREFIX
 from coartic.record import run_seed
 from coartic.robot import Finite
-from coartic.tables import DeclaredMethod, Manifest, Plan, PlanLimits, PlannedCell, variant_of
+from coartic.tables import (
+    DeclaredMethod,
+    Manifest,
+    Plan,
+    PlanLimits,
+    PlannedCell,
+    trials_in,
+    variant_of,
+)
 from coartic.task import LONGEST_NAME, NAME_PATTERN
 from coartic.text import Line, plain
 
@@ -377,8 +385,8 @@ def run_specs(
         if trials is not None and "trials" in cell.defaults:
             parameters.setdefault("trials", trials)
         cell.entry.complete(parameters)  # refuse wrong parameters before any run
-        asked = {**cell.defaults, **parameters}.get("trials")
-        if isinstance(asked, int) and asked > MOST_TRIALS:
+        asked = trials_in({**cell.defaults, **parameters})
+        if asked > MOST_TRIALS:
             raise CoarticError(
                 f"{cell.task.name} x {cell.label}: {asked:_} trials a run; "
                 f"at most {MOST_TRIALS:_} are kept"
@@ -492,12 +500,11 @@ def _plan(suite: Suite, runs: int, seed: int, planned: Sequence[tuple[Cell, RunS
     for cell, spec in planned:
         by_cell.setdefault((cell.task.name, cell.label), (cell, []))[1].append(spec)
     cells = [cell for cell, _ in by_cell.values()]
-    trials = [spec.all_parameters.get("trials") for _, spec in planned]
     return Plan(
         suite=suite.name,
         runs=runs,
         seed=seed,
-        trials=max((count for count in trials if isinstance(count, int)), default=0),
+        trials=max((trials_in(spec.all_parameters) for _, spec in planned), default=0),
         tasks={cell.task.name: cell.task.model_dump(mode="json") for cell in cells},
         methods={
             cell.method: DeclaredMethod(

@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import io
+from pathlib import Path
 
 import pyarrow.parquet as pq
 
 from benchmarks.store import Store
-from coartic import CoarticError
-from coartic.files import write_atomically
+from coartic.files import check_folder, publish
 from coartic.record import Record
-from coartic.tables import Manifest, parquet_options, tables_of
+from coartic.tables import TABLES, Manifest, parquet_options, tables_of
+
+OWNER = "run"
+"""Whose files of a results folder these are, and ``comparison.md`` and ``methods.csv``."""
+PAGES = ("comparison.md", "methods.csv")
+DERIVED = (*(f"{name}.parquet" for name in TABLES), "manifest.json")
+
+
+def check_results_folder(folder: Path) -> None:
+    """Raises CoarticError where something in a folder is in the way of its tables."""
+    names = (*DERIVED, *PAGES)
+    check_folder(folder, owner=OWNER, alone=False, names=names, derived=DERIVED)
 
 
 def write_tables(store: Store, manifest: Manifest) -> dict[str, Record]:
@@ -30,10 +41,6 @@ def write_tables(store: Store, manifest: Manifest) -> dict[str, Record]:
         files[f"{name}.parquet"] = sink.getvalue()
     digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
     text = manifest.model_copy(update={"tables": digests}).text()
-    try:
-        for name, data in files.items():
-            write_atomically(store.folder / name, data)
-        write_atomically(store.folder / "manifest.json", text.encode())
-    except OSError as error:
-        raise CoarticError(f"cannot write to {store.folder}: {error.strerror or error}") from None
+    files["manifest.json"] = text.encode()
+    publish(store.folder, files, owner=OWNER, alone=False, derived=files)
     return records

@@ -202,15 +202,17 @@ def main() -> None:
     answers.flush()
     for line in questions:
         said: dict[str, Any] = {"error": None, "answer": None}
+        question = json.loads(line)
+        token = question.pop("token")
         try:
-            said["answer"] = answer(json.loads(line))
+            said["answer"] = answer(question)
             text = json.dumps(said, allow_nan=False)
         except CoarticError as error:
             other = isinstance(error, ForeignCodeError)
             text = json.dumps({"error": str(error), "answer": None, "foreign_code": other})
         except (Exception, SystemExit, KeyboardInterrupt) as error:
             text = json.dumps({"error": brief(error), "answer": None})
-        answers.write(text.encode() + b"\n")
+        answers.write(f"{token} {text}\n".encode())
         answers.flush()
 
 

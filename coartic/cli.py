@@ -185,7 +185,7 @@ def run(
     from benchmarks.specification import Limits
     from benchmarks.store import Store
     from benchmarks.suites import load_suite, manifest_of, run_specs, select_cells
-    from benchmarks.tables import write_tables
+    from benchmarks.tables import OWNER, check_results_folder, write_tables
     from coartic.files import publish
 
     if jobs == 0:
@@ -210,6 +210,7 @@ def run(
     runs = runs or chosen.runs
     planned = run_specs(cells, runs=runs, seed=seed, trials=trials or chosen.trials, limits=limits)
     manifest, clock = manifest_of(chosen, runs, seed, planned, limits), time.perf_counter()
+    check_results_folder(out)
     store = Store(out)
     with store.locked(), _Display(chosen.name) as display:
         try:
@@ -240,7 +241,7 @@ def run(
         publish(
             out,
             {name: text.encode() for name, text in pages.items()},
-            owner="run",
+            owner=OWNER,
             alone=False,
         )
 
@@ -630,18 +631,21 @@ def cite(
     """Print what to cite: the software, the paper, and the methods of a results folder."""
     from analysis.citations import MethodSource, bibliography
     from analysis.results import load_results
-    from benchmarks.methods import BUILT_IN, BUILT_IN_ORIGIN
+    from benchmarks.methods import CLASSES
+    from coartic.tables import BUILT_IN
 
     if style != "bibtex":
         raise CoarticError(f"--format {style}: the one format is bibtex")
     environment = None
     if folder is None:
-        methods = [MethodSource(item.name, item.title, item.citation, True) for item in BUILT_IN]
+        methods = [
+            MethodSource(item.name, item.title, item.citation, True) for item in CLASSES.values()
+        ]
     else:
         manifest = load_results(folder).manifest
         environment = manifest["environment"]
         methods = [
-            MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN_ORIGIN)
+            MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN)
             for name, item in manifest["specification"]["methods"].items()
         ]
     text = bibliography(methods, analysis=analysis, environment=environment)

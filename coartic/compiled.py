@@ -61,7 +61,7 @@ def source_fingerprint() -> str:
 
 def _cache_folder() -> Path | None:
     """A writable folder for compiled code, or None where there is none."""
-    roots = [Path(numba.config.CACHE_DIR)] if numba.config.CACHE_DIR else []
+    roots = [Path(numba.config.CACHE_DIR) / "coartic"] if numba.config.CACHE_DIR else []
     roots.append(PACKAGE / "__pycache__")
     given = os.environ.get("XDG_CACHE_HOME", "")
     if Path(given).is_absolute():
@@ -83,7 +83,7 @@ def _cache_folder() -> Path | None:
 
 def _prune(root: Path, current: Path) -> None:
     """Remove machine code of older sources that nobody has used for a month."""
-    for folder in root.glob("kernel-*"):
+    for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
         with contextlib.suppress(OSError):
             used = max(path.stat().st_atime for path in [folder, *folder.rglob("*")])
             if folder != current and time.time() - used > 30 * 24 * 3600:

@@ -76,20 +76,31 @@ def clear_leftovers(folder: Path) -> None:
     with os.scandir(folder) as entries:
         parts = [Path(entry.path) for entry in entries if _is_leftover(entry)]
     for part in parts:
-        busy = (FileNotFoundError, BlockingIOError, PermissionError)
-        with contextlib.suppress(*busy), part.open("r+b") as file:
-            _hold(file)
-            part.unlink()
+        with contextlib.suppress(FileNotFoundError, BlockingIOError, PermissionError):
+            with part.open("r+b") as file:
+                _hold(file)
+                if fcntl is not None:
+                    part.unlink()
+            if fcntl is None:
+                part.unlink()
 
 
-def publish(folder: Path, files: Mapping[str, bytes], *, owner: str, alone: bool) -> None:
+def publish(
+    folder: Path,
+    files: Mapping[str, bytes],
+    *,
+    owner: str,
+    alone: bool,
+    derived: Collection[str] = (),
+) -> None:
     """Write a command's files into ``folder`` and list them there (:data:`LISTING`).
 
     ``files`` are contents by path below the folder, with slashes; ``owner`` is the command. A
     file that is there is replaced if the listing has it as this command's, unchanged since.
     ``alone``: the folder is this command's alone. What it wrote earlier and writes no longer
     is removed. Without, other files are left alone. Killed at any moment, the next call
-    finishes; calls at the same time wait for each other.
+    finishes; calls at the same time wait for each other. Files that are ``derived`` from others
+    hold nothing that anybody wrote: one that is listed is replaced though it was changed.
 
     Raises CoarticError, before anything is written, where something else is in the way: a file
     that is not listed, or was changed; a link or a folder in a file's place; with ``alone``
@@ -105,7 +116,7 @@ def publish(folder: Path, files: Mapping[str, bytes], *, owner: str, alone: bool
         folder.mkdir(parents=True, exist_ok=True)
         with _locked(folder):
             listing = _read_listing(folder)
-            found = _survey(folder, digests, listing.get(owner, {}), owner, alone)
+            found = _survey(folder, digests, listing.get(owner, {}), owner, alone, derived)
             for place in ("", *found.folders):
                 clear_leftovers(folder / place)
             kept = {} if alone else listing.get(owner, {})
@@ -129,7 +140,14 @@ def publish(folder: Path, files: Mapping[str, bytes], *, owner: str, alone: bool
                 _write_listing(folder, final)
 
 
-def check_folder(folder: Path, *, owner: str, alone: bool, names: Collection[str] = ()) -> None:
+def check_folder(
+    folder: Path,
+    *,
+    owner: str,
+    alone: bool,
+    names: Collection[str] = (),
+    derived: Collection[str] = (),
+) -> None:
     """Raises CoarticError where :func:`publish` would for what is in the way now.
 
     For those who work long before they write; ``names`` are the files to be.
@@ -139,7 +157,7 @@ def check_folder(folder: Path, *, owner: str, alone: bool, names: Collection[str
         if folder.exists():
             with _locked(folder):
                 listed = _read_listing(folder).get(owner, {})
-                _survey(folder, dict.fromkeys(names, ""), listed, owner, alone)
+                _survey(folder, dict.fromkeys(names, ""), listed, owner, alone, derived)
 
 
 def write_outputs(files: Mapping[Path, bytes], *, replace: bool) -> None:
@@ -192,6 +210,7 @@ def _survey(
     listed: Mapping[str, list[str]],
     owner: str,
     alone: bool,
+    derived: Collection[str] = (),
 ) -> _Found:
     """Look at what is in the folder; without ``alone`` only in the places of ``digests``.
 
@@ -214,7 +233,8 @@ def _survey(
                 with open(entry.path, "rb") as file:
                     digest = hashlib.file_digest(file, "sha256").hexdigest()
                 known = listed.get(name, [])
-                if digest in known or digest == digests.get(name):
+                ours_still = digest in known or (known and name in derived)
+                if ours_still or digest == digests.get(name):
                     found.digests[name] = digest
                 else:
                     (changed if known else foreign).append(name)
@@ -311,7 +331,6 @@ def _locked(folder: Path) -> Iterator[None]:
             return
     with FileLock(path):
         yield
-    path.unlink(missing_ok=True)
 
 
 def _is_at(path: Path, file: IO[bytes]) -> bool:

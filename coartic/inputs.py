@@ -43,6 +43,15 @@ def read_text(
 
     Raises ``error`` for anything else: no pipe is waited for, no device read without end.
     """
+    content = read_bytes(path, most, error=error)
+    try:  # Notepad's mark, too
+        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig").read()
+    except UnicodeDecodeError:
+        raise error(f"{plain(str(path))}: is not a text file in UTF-8") from None
+
+
+def read_bytes(path: str | Path, most: int, *, error: type[CoarticError] = CoarticError) -> bytes:
+    """The content of a regular file of at most ``most`` bytes; raises ``error`` otherwise."""
     shown = plain(str(path))
     try:
         with open(path, "rb", opener=_open_at_once) as file:
@@ -55,10 +64,7 @@ def read_text(
         raise error(f"{shown}: is not the name of a file") from None
     if len(content) > most:
         raise error(f"{shown}: is longer than {most:_} bytes, the most that is read")
-    try:  # Notepad's mark, too
-        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig").read()
-    except UnicodeDecodeError:
-        raise error(f"{shown}: is not a text file in UTF-8") from None
+    return content
 
 
 def _open_at_once(path: str, flags: int) -> int:

@@ -30,9 +30,11 @@ from pydantic import (
 )
 
 from coartic.errors import CoarticError, IncompleteError, SolutionError
+from coartic.inputs import MOST_BYTES, read_bytes
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
+from coartic.movement import configuration
 from coartic.robot import Hand
 from coartic.solution import Execution, Kind, Movement, execute, other_arm_travel
 from coartic.task import INITIAL_POLICIES, Task, parse_task
@@ -41,8 +43,12 @@ from coartic.text import LONGEST_REASON, Line, printable
 RECORD_FORMAT: Literal[2] = 2
 MOST_MOVEMENTS = 10_000
 """Movements of one solution."""
+MOST_STEPS = 1_000_000
+"""Movement steps along one solution, its targets visited in order: thousands do."""
 LARGEST_DETAILS = 64 * 1024
-"""Characters of a method's details, as JSON."""
+"""Characters of a method's details, or of its parameters, as JSON."""
+LARGEST_RECORD = 1 << 28
+"""Bytes of a record: rewards of ten million trials, twice over."""
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
 _PREFIX = "sha256:"
@@ -52,15 +58,21 @@ Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
 LARGEST_COUNT = 2**53
 Count = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
 Reward = Annotated[int, Field(ge=-(2**31) + 1, le=0)]
-Seconds = Annotated[float, Field(ge=0)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Amount = Annotated[float, Field(ge=0)]
 Reason = Annotated[str, Field(max_length=LONGEST_REASON), printable]
 
 
-def _is_small(details: dict[str, Any]) -> dict[str, Any]:
-    size = len(json.dumps(details))
-    if size > LARGEST_DETAILS:
-        raise ValueError(f"{size} characters as JSON; at most {LARGEST_DETAILS} are kept")
-    return details
+def _json(most: int) -> AfterValidator:
+    """JSON of at most ``most`` characters, in which every number is one."""
+
+    def check(content: dict[str, Any]) -> dict[str, Any]:
+        size = len(json.dumps(content, allow_nan=False))
+        if size > most:
+            raise ValueError(f"{size} characters as JSON; at most {most} are kept")
+        return content
+
+    return AfterValidator(check)
 
 
 def _is_whole(meter: Any) -> Any:
@@ -77,7 +89,9 @@ def _counts(meter: Meter) -> Meter:
     return meter
 
 
-Details = Annotated[dict[Line, JsonValue], AfterValidator(_is_small)]
+Values = Annotated[dict[Line, JsonValue], _json(LARGEST_DETAILS)]
+"""Details or parameters of a method."""
+TaskContent = Annotated[dict[str, JsonValue], _json(MOST_BYTES)]
 Spent = Annotated[Meter, BeforeValidator(_is_whole), AfterValidator(_counts)]
 
 
@@ -136,7 +150,7 @@ class Solved(Plain):
     ticks_by_goal: tuple[Count, ...]
     corrections: Count
     """Corrective movements that were needed."""
-    other_arm_travel: Seconds
+    other_arm_travel: Amount
     """Of the arm that is not chosen, rad."""
     movements: Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
 
@@ -145,11 +159,11 @@ class Specification(Plain):
     """Everything the result of a run depends on, but for the code."""
 
     format: Literal[2]
-    task: dict[str, JsonValue]
+    task: TaskContent
     method: Line
-    parameters: dict[str, JsonValue]
+    parameters: Values
     model: dict[str, float | int]
-    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    seed: Seed
     trial_budget: Annotated[int, Field(gt=0)] | None
 
     def key(self) -> str:
@@ -184,11 +198,11 @@ class Environment(Plain):
 class Timing(Plain):
     """Times and memory of a run. None where they went with the process."""
 
-    wall_s: Seconds
-    cpu_s: Seconds | None = None
+    wall_s: Amount
+    cpu_s: Amount | None = None
     warm: bool | None = None
     """Whether the process had run the method before."""
-    process_peak_mb: Seconds | None = None
+    process_peak_mb: Amount | None = None
     """Of the process so far, all its runs included."""
     time_limit_s: Annotated[float, Field(gt=0)] | None = None
 
@@ -216,7 +230,7 @@ class Record(Plain):
     used: tuple[Information, ...]
     meter: Spent | None
     """None where it went with the process."""
-    details: Details
+    details: Values
     rewards: tuple[Reward | None, ...]
     """Of each trial; None where it failed."""
     timing: Timing
@@ -364,6 +378,15 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
     """
     if len(solution) > MOST_MOVEMENTS:
         raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are kept")
+    corners = [task.q0]
+    for movement in solution:
+        path = () if movement.waypoints is None else movement.waypoints
+        corners += [configuration(task.robot, point) for point in path]
+        if movement.target is not None:
+            corners.append(configuration(task.robot, movement.target))
+    steps = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()) / model.step
+    if steps > MOST_STEPS:
+        raise SolutionError(f"its way is {steps:.0f} steps long; at most {MOST_STEPS} are made")
     execution = execute(task, solution, model=model)
     if not execution.completed:
         raise IncompleteError(execution.reason)
@@ -429,14 +452,9 @@ def decode(data: bytes, source: Path) -> Record:
 
 def read_record(path: Path) -> Record:
     """The record of a file, which is named by the run's id. Raises RecordError otherwise."""
-    try:
-        if path.exists() and not path.is_file():
-            raise RecordError(f"{path}: is not a file")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise RecordError(f"no record of run {path.stem} in {path.parent.parent}") from None
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if not path.exists():
+        raise RecordError(f"no record of run {path.stem} in {path.parent.parent}")
+    data = read_bytes(path, LARGEST_RECORD, error=RecordError)
     record = decode(data, path)
     if record.run_id != path.stem:
         raise RecordError(f"{path}: holds the record of run {record.run_id}")

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pyarrow as pa
-from pydantic import Field, JsonValue
+from pydantic import Field
 
 from coartic.errors import NotApplicableError
 from coartic.initial import hand_sequences, ranked_sequences
@@ -26,13 +26,20 @@ from coartic.record import (
     Environment,
     Plain,
     PlainMovement,
+    Reason,
     Record,
+    Seed,
+    TaskContent,
+    Values,
     content_hash,
 )
 from coartic.task import Task, parse_task
 from coartic.text import Line
 
 FORMAT = 4  # of manifest and tables; raised when one of them changes its meaning
+
+BUILT_IN = "built in"
+"""Origin of this project's methods."""
 
 RUNS = pa.schema(
     [
@@ -67,7 +74,7 @@ RUNS = pa.schema(
         ("commit", pa.string()),
         ("code", pa.string()),  # hash of the code that produced the result
         ("packages", pa.string()),  # hash of Python's and all libraries' versions
-        ("result", pa.string()),  # hash of all that a repetition has to give again
+        ("result", pa.string()),  # hash of status, solutions, rewards of all trials, bound
     ]
 )
 TIMINGS = (
@@ -103,6 +110,10 @@ SEQUENCES = pa.schema(
 )
 
 
+TABLES = ("runs", "solutions", "paths", "learning", "sequences")
+"""Names of the tables."""
+
+
 class DeclaredMethod(Plain):
     """What a method declares of itself, and where it comes from."""
 
@@ -112,7 +123,7 @@ class DeclaredMethod(Plain):
     secondary: tuple[Line, ...]
     stochastic: bool
     """Whether its cells have as many runs as the plan says; the others have one."""
-    defaults: dict[Line, JsonValue]
+    defaults: Values
     """Its parameters; None for one that has no default."""
     origin: Line
     code: Line
@@ -123,10 +134,10 @@ class PlannedCell(Plain):
 
     task: Line
     method: Line
-    variant: Line
-    parameters: dict[str, JsonValue]
+    variant: Reason
+    parameters: Values
     """What the suite says of its parameters."""
-    complete: dict[str, JsonValue]
+    complete: Values
     """All of them, as its runs have them."""
     run_ids: tuple[Line, ...]
 
@@ -136,9 +147,9 @@ class Plan(Plain):
 
     suite: Line
     runs: Count
-    seed: Count
+    seed: Seed
     trials: Count
-    tasks: dict[Line, dict[str, JsonValue]]
+    tasks: dict[Line, TaskContent]
     methods: dict[Line, DeclaredMethod]
     cells: tuple[PlannedCell, ...]
 
@@ -173,6 +184,12 @@ class Manifest(Plain):
         """The file's text."""
         content = {**self.model_dump(mode="json"), "seal": self.seal()}
         return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def trials_in(parameters: Mapping[str, Any]) -> int:
+    """Trials that a run with these parameters makes; 0 where they do not say."""
+    trials = parameters.get("trials")
+    return trials if type(trials) is int and trials > 0 else 0
 
 
 def variant_of(parameters: Mapping[str, Any], defaults: Mapping[str, Any]) -> str:

@@ -28,7 +28,7 @@ _DOUBTFUL = re.compile("[^ -~]")  # the rest prints
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Text as one printable line (:func:`one_line`) of at most ``most`` characters."""
-    shown = one_line(text.strip())
+    shown = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
     return shown if len(shown) <= most else shown[: most - 1] + "…"
 
 

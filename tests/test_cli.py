@@ -138,6 +138,32 @@ def test_the_commit_is_recorded(monkeypatch, capsys, tmp_path):
         assert commit is None
 
 
+def test_a_run_writes_over_nothing_of_the_users(monkeypatch, capsys, tmp_path):
+    command = (
+        "run",
+        "paper",
+        "--tasks",
+        "ascending",
+        "--runs",
+        1,
+        "--trials",
+        1,
+        "--out",
+        tmp_path,
+    )
+    for name in ("manifest.json", "runs.parquet", "comparison.md"):
+        (tmp_path / name).write_text("mine")
+        code, _, error = call(monkeypatch, capsys, *command)
+        assert code == 2
+        assert f"holds {name}, not listed there" in error
+        assert not (tmp_path / "records").exists()  # before any run
+        assert (tmp_path / name).read_text() == "mine"
+        (tmp_path / name).unlink()
+    assert call(monkeypatch, capsys, *command, "--seed", 2**63 - 1)[0] == 0
+    (tmp_path / "runs.parquet").write_bytes(b"damaged")
+    assert call(monkeypatch, capsys, *command, "--seed", 2**63 - 1)[0] == 0  # made anew
+
+
 def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):
     code, text, _ = call(
         monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--methods", "test/dies",

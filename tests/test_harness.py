@@ -12,7 +12,6 @@ import pytest
 from analysis.comparison import compare
 from analysis.integrity import read_manifest
 from analysis.results import load_results
-from benchmarks import tables
 from benchmarks.declaration import declared
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
@@ -30,7 +29,7 @@ from benchmarks.suites import (
 )
 from benchmarks.tables import write_tables
 from benchmarks.worker import ForeignCodeError, perform
-from coartic import CoarticError, Movement, execute, hand_sequences, learn, load_task
+from coartic import CoarticError, Movement, execute, files, hand_sequences, learn, load_task
 from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
@@ -444,7 +443,9 @@ def test_a_failed_write_leaves_the_old_tables(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(tables, "write_atomically", full)
+    monkeypatch.setattr(files, "write_atomically", full)
+    other = manifest.limits.model_copy(update={"time_s": 1.0})
+    manifest = manifest.model_copy(update={"limits": other})
     with pytest.raises(CoarticError, match="No space left on device"):
         write_tables(Store(tmp_path), manifest)
     assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}

@@ -71,7 +71,7 @@ def test_a_killed_worker_is_a_crash_with_its_signal(known):
     os.kill(worker, signal.SIGKILL)
     answer = sandbox.ask({"question": "prepare"}, 60.0)
     assert isinstance(answer, Failure)
-    assert answer.killed
+    assert answer.disturbed
     assert "killed by SIGKILL" in answer.reason
     assert not sandbox.alive
 
@@ -221,10 +221,10 @@ def test_the_clock_stops_where_the_run_is_stopped(known):
     own = os.getpid()
     try:
         (warm,) = spec_of(known, "test/good")
-        keeper.perform({**warm.job(), "owner": spec.job()["owner"]})
+        keeper.perform({**warm.job(), "owner": None})  # as if it were this project's
         stop.start()
         go_on.start()
-        record = record_of(keeper.perform(spec.job()), spec)
+        record = record_of(keeper.perform({**spec.job(), "owner": None}), spec)
     finally:
         keeper.close()
     assert record.status == "ok"
@@ -251,6 +251,26 @@ def test_a_score_is_what_the_solution_gives_elsewhere(known):
     assert perform_once(cheat).solution == perform_once(honest).solution
     (prover,) = spec_of(known, "test/prover")
     assert "states a bound, which is for methods optimum/*" in perform_once(prover).reason
+
+
+def test_a_line_from_elsewhere_is_no_answer():
+    """Whoever may write into a worker's stream does not know what it was asked."""
+    own = Sandbox()
+    try:
+        (worker,) = workers_of(os.getpid())
+        stream = next(
+            path for path in Path(f"/proc/{worker}/fd").iterdir()
+            if os.readlink(path) == os.readlink(f"/proc/self/fd/{own._guard.stdout.fileno()}")
+        )  # fmt: skip
+        line = b'{"error": null, "answer": 1}\n'
+        other = threading.Timer(0.05, lambda: stream.write_bytes(line))
+        other.start()
+        answer = own.ask({"question": "prepare"}, 60.0)  # loads kernels, which takes longer
+        other.join()
+    finally:
+        own.close()
+    assert isinstance(answer, Failure)
+    assert answer.reason == "it answered what nobody had asked"
 
 
 def test_a_worker_that_cannot_start_is_a_sentence(known, monkeypatch):

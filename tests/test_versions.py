@@ -343,7 +343,7 @@ def test_folders_that_cannot_be_compared(first, tmp_path):
             load_pair(first, missing)
     old = shutil.copytree(first, tmp_path / "old")
     (old / "manifest.json").write_text(json.dumps({"format": 2}), encoding="utf-8")
-    words = f"have format 2, this version reads {FORMAT}; run the same"
+    words = f"have format 2, this version reads {FORMAT}; start the same"
     with pytest.raises(CoarticError, match=words):
         load_pair(first, old)
     damaged = shutil.copytree(first, tmp_path / "damaged")

@@ -15,6 +15,7 @@ from analysis.page import Heading, Part, page
 from analysis.pairs.overall import NEAR, everywhere
 from analysis.study import Study
 from analysis.table import NONE, Table, interval, short
+from coartic.record import SEARCH
 
 _KINDS = {"conditions": 0, "method": 1, "variant": 2}
 
@@ -276,7 +277,7 @@ def _across(overall: pd.DataFrame, scores: pd.DataFrame) -> Iterator[Part]:
         ),
     )
     left = [name for name in dict.fromkeys(scores.method) if name not in everywhere(scores)]
-    left = [name for name in left if not name.startswith("optimum/")]
+    left = [name for name in left if not name.startswith(SEARCH)]
     if left:
         yield f"Not run on all of these tasks: {escaped(', '.join(left))}."
 

@@ -625,7 +625,7 @@ attack(
     "neighbour/import-tables",
     "replaces what makes the rows of tables while it is imported",
     before="""
-    import benchmarks.tables as tables
+    import coartic.tables as tables
     row = tables._run_row
     def forged(*a, **k):
         found = row(*a, **k)

@@ -4,9 +4,11 @@
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,8 @@ from analysis.integrity import read_manifest
 from analysis.results import load_results
 from benchmarks.store import Store
 from benchmarks.tables import write_tables
-from coartic import CoarticError
+from coartic import PAPER, CoarticError
+from coartic.record import solved
 
 from .checkout import PART_OF_A_FOLDER, Ended, in_process
 from .edits import accepted, edits, finished
@@ -43,6 +46,7 @@ TOGETHER = (
     "end/foreign",
     "exhaust/errors",
     "left/daemon",
+    "end/sigstop",
 )
 REFUSED = ("import/exit-0", "name/learner", "name/escape", "told/none")
 
@@ -97,6 +101,15 @@ def test_every_command_refuses_an_edited_folder(name, whole, copied):
     assert in_process(["report", folder])[0] == 2
 
 
+@pytest.mark.parametrize("name", ["manifest.json", "runs.parquet"])
+def test_nobody_waits_for_a_pipe(name, copied):
+    folder = copied()
+    (folder / name).unlink()
+    os.mkfifo(folder / name)
+    with pytest.raises(CoarticError, match=f"{name}: is not a regular file"):
+        load_results(folder)
+
+
 def test_every_forgery_is_seen_once_its_tables_are_made_again(whole, copied):
     manifest = read_manifest(whole)
 
@@ -116,6 +129,45 @@ def test_every_forgery_is_seen_once_its_tables_are_made_again(whole, copied):
         if how := through(folder, made_again):
             got[name] = how
     assert got == {}
+
+
+def test_a_forger_who_makes_ids_and_seals_anew_is_seen(whole, copied):
+    """Other constants, and everything in the folder made to fit them."""
+    folder = copied()
+    manifest, store = read_manifest(folder), Store(folder)
+    (cell,) = [c for c in manifest.specification.cells if c.method == "dual-process/EC1"]
+    giant = PAPER._replace(step=0.02)
+    ids = []
+    for run_id in cell.run_ids:
+        record = store.read(run_id)
+        scored = {
+            name: solved(record.task, [m.movement() for m in old.movements], giant)
+            for name in ("solution", "initial", "replay")
+            if (old := getattr(record, name)) is not None
+        }
+        scored["initial"] = scored["solution"]
+        specification = record.specification.model_copy(update={"model": giant._asdict()})
+        rewards = [scored["initial"].reward] * 40
+        ids.append(f"{specification.key()}-{record.code}")
+        forged = record.model_copy(
+            update={
+                **scored,
+                "specification": specification,
+                "run_id": ids[-1],
+                "rewards": tuple(rewards),
+                "meter": replace(record.meter, movement_ticks=-sum(rewards)),
+            }
+        )
+        store.write(forged)
+        store.read(ids[-1]).check()  # by itself it is right
+    cells = [
+        c.model_copy(update={"run_ids": tuple(ids)}) if c == cell else c
+        for c in manifest.specification.cells
+    ]
+    plan = manifest.specification.model_copy(update={"cells": tuple(cells)})
+    write_tables(store, manifest.model_copy(update={"specification": plan}))
+    with pytest.raises(CoarticError, match=f"{ids[0]} is not as planned: it has another model"):
+        load_results(folder)
 
 
 def test_hostile_methods_forge_nothing_and_leave_nothing(tmp_path):
