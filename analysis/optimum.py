@@ -18,6 +18,7 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.integrity import BASE
 from analysis.results import Results, load_results
 from coartic import CoarticError, Task
 from coartic.record import SEARCH
@@ -25,7 +26,6 @@ from coartic.text import one_line
 
 METHODS = SEARCH  # methods that search for it
 DATA = Path(__file__).with_name("optimum.json")
-BASE = "task"  # base locked as the task has it: the case that rewards compare with
 
 
 @dataclass(frozen=True)

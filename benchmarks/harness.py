@@ -34,7 +34,7 @@ from coartic.record import (
 from coartic.text import plain
 
 Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
-MOST_TRIALS = 1_000_000
+MOST_REWARDS = 1_000_000
 """Trials whose rewards are kept of a method that is not built in."""
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
 RETRIED = frozenset({"timeout", "crashed"})
@@ -69,11 +69,11 @@ def perform_plan(
 ) -> Progress:
     """Perform every run that the store has no good record of.
 
-    A record is good where its checksum fits. One that timed out under a shorter limit
-    than now asked for is redone, and with ``retry_failed`` every timeout and crash is;
-    ``redo`` performs everything anew. ``watch`` is called before the first run and after
-    each. Raises
-    CoarticError where records cannot be written or runs keep getting lost.
+    A record is good where it is as it was written and agrees with itself
+    (:meth:`coartic.record.Record.check`). One that timed out under a shorter limit than now
+    asked for is redone, and with ``retry_failed`` every timeout and crash is; ``redo`` performs
+    everything anew. ``watch`` is called before the first run and after each. Raises CoarticError
+    where records cannot be written or runs keep getting lost.
     """
     with store.locked():
         return _perform(specs, store, executor, retry_failed, redo, watch)
@@ -205,8 +205,8 @@ def _false_claim(spec: RunSpec, outcome: Outcome) -> tuple[Status, str] | None:
     trials = len(outcome.rewards)
     if undeclared:
         return "crashed", f"the method used {undeclared[0].value!r}, which it does not declare"
-    if spec.entry.foreign is not None and trials > MOST_TRIALS:
-        return "solver-failed", f"it states {trials} rewards; at most {MOST_TRIALS} are kept"
+    if spec.entry.foreign is not None and trials > MOST_REWARDS:
+        return "solver-failed", f"it states {trials} rewards; at most {MOST_REWARDS} are kept"
     if outcome.bound is not None and not spec.method.startswith(SEARCH):
         return (
             "solver-failed",

@@ -197,8 +197,7 @@ def test_what_a_method_starts_ends_with_it(known, tmp_path):
     assert sleepers() == []
 
 
-def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known, tmp_path):
-    store = Store(tmp_path)
+def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known):
     names = ("test/leaver", "test/good", "dual-process/EC1", "test/leaver")
     keeper = Keeper()
     workers = []
@@ -210,7 +209,7 @@ def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known, tmp_path)
             workers += [workers_of(os.getpid())[-1:], record.details.get("pid")]
     finally:
         keeper.close()
-    assert len({tuple(w) for w in workers[::2]}) == 4, store  # none is used for another method
+    assert len({tuple(w) for w in workers[::2]}) == 4  # none is used for another method
 
 
 def test_the_clock_stops_where_the_run_is_stopped(known):

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.optimum import BASE, DATA, METHODS, entries, essence, optima
+from analysis.integrity import BASE
+from analysis.optimum import DATA, METHODS, entries, essence, optima
 from analysis.results import CellRuns, Results
 
 SHIPPED = f"shipped data (analysis/{DATA.name})"
