@@ -155,8 +155,8 @@ class Plan(Plain):
 
     @property
     def run_ids(self) -> list[str]:
-        """Ids of all runs, each once, in the order of the plan."""
-        return list(dict.fromkeys(run_id for cell in self.cells for run_id in cell.run_ids))
+        """Ids of all runs, in the order of the plan, which has each once."""
+        return [run_id for cell in self.cells for run_id in cell.run_ids]
 
 
 class PlanLimits(Plain):
@@ -202,10 +202,7 @@ def variant_of(parameters: Mapping[str, Any], defaults: Mapping[str, Any]) -> st
 
 
 def tables_of(manifest: Manifest, records: Mapping[str, Record]) -> dict[str, pa.Table]:
-    """All tables by name (``runs``, ...); ``records`` by run id has the plan's at least.
-
-    A cell that shares its runs with another has rows of its own.
-    """
+    """All tables by name (``runs``, ...); ``records`` by run id has the plan's at least."""
     plan = manifest.specification
     rows = [(cell, records[run_id]) for cell in plan.cells for run_id in cell.run_ids]
     distinct = [records[run_id] for run_id in plan.run_ids]
