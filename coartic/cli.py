@@ -6,9 +6,12 @@ import csv
 import importlib.util
 import io
 import os
+import signal
 import sys
 import time
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
@@ -46,6 +49,9 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: _complain("warning", str(message))
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
+    # Ctrl-C ends the process; where something is to be saved before, it is caught there. As an
+    # exception, in the middle of an import, it can get lost.
+    interrupted = signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         _check_arguments()
         _check_packages()
@@ -58,6 +64,32 @@ def main() -> None:
     except OSError as error:
         _complain("error", str(error.strerror or error))
         sys.exit(1)
+    finally:
+        signal.signal(signal.SIGINT, interrupted)
+
+
+@contextmanager
+def _interruptible() -> Iterator[Callable[[], None]]:
+    """Within it Ctrl-C is a KeyboardInterrupt; if that gets lost, the next call raises it again.
+
+    An exception that a signal raises in a destructor or a callback is printed and dropped.
+    """
+    asked = False
+
+    def interrupt(*_: object) -> None:
+        nonlocal asked
+        asked = True
+        raise KeyboardInterrupt
+
+    def again() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield again
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _check_arguments() -> None:
@@ -213,15 +245,21 @@ def run(
     check_results_folder(out)
     store = Store(out)
     with store.locked(), _Display(chosen.name) as display:
+
+        def watch(progress: Progress, spec: RunSpec | None) -> None:
+            display.update(progress, spec)
+            interrupted()
+
         try:
-            progress = perform_plan(
-                [spec for _, spec in planned],
-                store,
-                Local(jobs) if scheduler is None else Dask(scheduler, say=display.line),
-                retry_failed=retry_failed,
-                redo=redo,
-                watch=display.update,
-            )
+            with _interruptible() as interrupted:
+                progress = perform_plan(
+                    [spec for _, spec in planned],
+                    store,
+                    Local(jobs) if scheduler is None else Dask(scheduler, say=display.line),
+                    retry_failed=retry_failed,
+                    redo=redo,
+                    watch=watch,
+                )
         except KeyboardInterrupt:
             display.close()
             _say(
