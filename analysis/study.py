@@ -8,11 +8,11 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.frontier.frames import pareto_frame
-from analysis.frontier.progress import Progress, progress
-from analysis.methods import methods_frame
-from analysis.optimum import Optimum, optima
-from analysis.results import CellRuns, Results
+from analysis.comparisons.frontier import pareto_frame
+from analysis.comparisons.methods import methods_frame
+from analysis.comparisons.progress import Progress, progress
+from analysis.results.folder import CellRuns, Results
+from analysis.results.optima import Optimum, optima
 from analysis.signatures import signatures_frame
 from analysis.signatures.cell import Cell, cells_of
 
@@ -24,7 +24,7 @@ SEED = 0
 class Study:
     """Stored results and what follows from them. Keys are a task's name and a label.
 
-    A label is a method with its variant, as :attr:`analysis.results.CellRuns.label`.
+    A label is a method with its variant, as :attr:`analysis.results.folder.CellRuns.label`.
     """
 
     results: Results
@@ -50,7 +50,7 @@ class Study:
 
     @cached_property
     def methods(self) -> dict[tuple[str, str], dict[str, Any]]:
-        """Rows of :func:`analysis.methods.methods_frame`."""
+        """Rows of :func:`analysis.comparisons.methods.methods_frame`."""
         return {
             (row["task"], f"{row['method']} {row['variant']}".strip()): {
                 str(key): value for key, value in row.items()
@@ -65,7 +65,7 @@ class Study:
 
     @cached_property
     def pareto(self) -> pd.DataFrame:
-        """:func:`analysis.frontier.frames.pareto_frame`, a bootstrap."""
+        """:func:`analysis.comparisons.frontier.pareto_frame`, a bootstrap."""
         return pareto_frame(self.results)
 
     @cached_property

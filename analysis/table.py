@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.inference.statistics import Inference
 from analysis.markup import markdown_text
+from analysis.statistics.estimates import Inference
 from coartic.text import one_line
 
 NONE = "–"

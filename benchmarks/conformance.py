@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.harness import record_of
-from benchmarks.methods import Entry, Registry
+from benchmarks.registry import Entry, Registry
 from benchmarks.reproduce import differences, perform_once
 from benchmarks.sandbox import Keeper
 from benchmarks.specification import Limits, RunSpec

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.harness import record_of
-from benchmarks.methods import Registry, unknown
+from benchmarks.registry import Registry, unknown
 from benchmarks.sandbox import supervise
 from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import Store

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from benchmarks.methods import Entry
 from benchmarks.provenance import command
+from benchmarks.registry import Entry
 from coartic import PAPER, MotionModel, Task
 from coartic.record import RECORD_FORMAT, Specification
 

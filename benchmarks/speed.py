@@ -19,7 +19,7 @@ from joblib import Parallel, delayed
 
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import Suite, load_suite, manifest_of, run_specs, select_cells

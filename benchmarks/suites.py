@@ -20,8 +20,8 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from benchmarks.declaration import decapitalised
-from benchmarks.methods import Entry, Registry, unknown
 from benchmarks.provenance import surroundings
+from benchmarks.registry import Entry, Registry, unknown
 from benchmarks.specification import UNLIMITED, Limits, RunSpec
 from coartic import (
     CONDITIONS,

@@ -181,7 +181,7 @@ def _foreign_code(foreign: Foreign) -> str:
 
 def _method(name: str, foreign: Foreign | None) -> type[Method]:
     if foreign is None:
-        from benchmarks.methods import CLASSES  # its imports are no use to other methods
+        from benchmarks.registry import CLASSES  # its imports are no use to other methods
 
         if name not in CLASSES:
             raise MethodFileError("it is not installed on this worker")

@@ -29,7 +29,7 @@ from coartic.text import json_text, one_line
 
 if TYPE_CHECKING:
     from benchmarks.harness import Progress
-    from benchmarks.methods import Entry
+    from benchmarks.registry import Entry
     from benchmarks.specification import RunSpec
     from coartic import Task
 
@@ -206,14 +206,14 @@ def run(
 
     Interrupted by whatever, the same command goes on where it stopped.
     """
-    from analysis.comparison import compare
+    from analysis.comparisons.methods import methods_frame
+    from analysis.comparisons.paper import compare
     from analysis.markup import words
-    from analysis.methods import methods_frame
-    from analysis.results import load_results
+    from analysis.results.folder import load_results
     from benchmarks.cluster import Dask
     from benchmarks.executors import Local
     from benchmarks.harness import perform_plan
-    from benchmarks.methods import registry
+    from benchmarks.registry import registry
     from benchmarks.specification import Limits
     from benchmarks.store import Store
     from benchmarks.suites import load_suite, manifest_of, run_specs, select_cells
@@ -305,7 +305,7 @@ def run(
 @app.command(name="list")
 def list_(method_file: MethodFiles = None) -> None:
     """List tasks, methods and suites."""
-    from benchmarks.methods import registry
+    from benchmarks.registry import registry
     from benchmarks.suites import suites
 
     console = _console()
@@ -367,19 +367,19 @@ def analyse(
 ) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
     from analysis.claims import claims_frame, claims_page, judge
-    from analysis.frontier.frames import (
+    from analysis.comparisons.frontier import (
         anytime_frame,
         area_frame,
         for_both_arms,
         targets_frame,
     )
-    from analysis.frontier.page import frontier_page
-    from analysis.inference.across_tasks import scores_frame
-    from analysis.pairs.overall import combined, overall_frame, profiles_frame
-    from analysis.pairs.page import comparisons_page
-    from analysis.pairs.pairwise import pairwise_frame
-    from analysis.results import load_results
+    from analysis.comparisons.frontier_page import frontier_page
+    from analysis.comparisons.overall import combined, overall_frame, profiles_frame
+    from analysis.comparisons.pairs import pairwise_frame
+    from analysis.comparisons.pairs_page import comparisons_page
+    from analysis.results.folder import load_results
     from analysis.signatures.page import signatures_page
+    from analysis.statistics.across_tasks import scores_frame
     from analysis.study import Study
     from coartic.files import publish
 
@@ -446,7 +446,7 @@ def reproduce(
     method_file: MethodFiles = None,
 ) -> None:
     """Perform one run again and say whether the result is identical."""
-    from benchmarks.methods import registry
+    from benchmarks.registry import registry
     from benchmarks.reproduce import differences, find_record, perform_once, spec_of
     from benchmarks.specification import Limits
 
@@ -474,7 +474,7 @@ def check(
 ) -> None:
     """Check a method or a task file against the laws of the benchmark."""
     from benchmarks.conformance import check_method, check_task_file
-    from benchmarks.methods import registry, unknown
+    from benchmarks.registry import registry, unknown
 
     known = registry(method_file or [])
     if subject.endswith(".toml"):
@@ -542,7 +542,7 @@ def report(
     """
     from analysis.report.build import build, write
     from analysis.report.write import check_report_folder
-    from analysis.results import load_results
+    from analysis.results.folder import load_results
     from analysis.study import Study
 
     started = time.monotonic()
@@ -590,7 +590,7 @@ def compare(
     replace: Replace = False,
 ) -> None:
     """Compare two results folders cell by cell: versions, machines, parameters."""
-    from analysis.versions import compare_versions, load_pair
+    from analysis.comparisons.versions import compare_versions, load_pair
     from coartic.files import check_outputs, write_outputs
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
@@ -630,8 +630,8 @@ def animate(
     replace: Replace = False,
 ) -> None:
     """Show a run's solution tick by tick, alone or beside another one."""
-    from analysis.animation import Panel, check_output
-    from analysis.animation import animate as film
+    from analysis.figures.animation import Panel, check_output
+    from analysis.figures.animation import animate as film
     from benchmarks.reproduce import find_record, trajectory_of
     from coartic import corrective_trial, initial_hands, trajectory
 
@@ -668,8 +668,8 @@ def cite(
 ) -> None:
     """Print what to cite: the software, the paper, and the methods of a results folder."""
     from analysis.citations import MethodSource, bibliography
-    from analysis.results import load_results
-    from benchmarks.methods import CLASSES
+    from analysis.results.folder import load_results
+    from benchmarks.registry import CLASSES
     from coartic.tables import BUILT_IN
 
     if style != "bibtex":

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.inference import across_tasks, statistics
-from analysis.pairs.overall import profiles_frame
+from analysis.comparisons.overall import profiles_frame
+from analysis.statistics import across_tasks
+from analysis.statistics import estimates as statistics
 from tests.test_comparison import fake_results
 
 

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.inference.statistics import holm
-from analysis.results import load_results
+from analysis.results.folder import load_results
 from analysis.signatures.page import signatures_page
+from analysis.statistics.estimates import holm
 from analysis.study import Study
 
 from .test_cli import call

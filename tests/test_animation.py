@@ -8,9 +8,9 @@ import pytest
 from matplotlib import rc_context
 from PIL import Image
 
-from analysis.animation import Panel, _figure, animate, timing
+from analysis.figures.animation import Panel, _figure, animate, timing
 from analysis.figures.robot import MARKERS
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from benchmarks.reproduce import trajectory_of
 from benchmarks.store import Store
 from benchmarks.suites import Cell

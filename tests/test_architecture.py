@@ -102,12 +102,12 @@ everything()
 
 import json, psutil
 from benchmarks.harness import record_of
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from benchmarks.store import Store
 from benchmarks.suites import load_suite, manifest_of, run_specs, select_cells
 from benchmarks.tables import write_tables
 from benchmarks.worker import perform
-from analysis.results import load_results
+from analysis.results.folder import load_results
 
 psutil.Process.memory_info = lambda process: SimpleNamespace(peak_wset=2**20)
 suite = load_suite("quick")

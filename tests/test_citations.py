@@ -20,8 +20,8 @@ from analysis.citations import (
     software,
     solver_keys_of,
 )
-from analysis.integrity import read_manifest
-from benchmarks.methods import BUILT_IN, registry
+from analysis.results.laws import read_manifest
+from benchmarks.registry import BUILT_IN, registry
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
 from coartic.record import Commit

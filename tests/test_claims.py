@@ -19,12 +19,12 @@ from analysis.claims import (
     general,
     judge,
 )
-from analysis.claims.reach import shortest_reach
-from analysis.inference.statistics import Inference, bootstrap_test, mean
-from analysis.results import Results
+from analysis.claims.judges.reach import shortest_reach
+from analysis.results.folder import Results
+from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.study import Study
 from analysis.table import interval
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
 from coartic.cli import app

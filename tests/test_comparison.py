@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparison import Comparison, Table, compare
+from analysis.comparisons.paper import Comparison, Table, compare
 from analysis.markup import words
 from analysis.published import (
     Summary,
@@ -13,8 +13,8 @@ from analysis.published import (
     published_exhaustive,
     published_initial,
 )
-from analysis.results import Results
-from benchmarks.methods import registry
+from analysis.results.folder import Results
+from benchmarks.registry import registry
 from benchmarks.suites import load_suite, select_cells
 from coartic import load_task
 

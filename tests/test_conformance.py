@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.optimum import entries
+from analysis.results.optima import entries
 from benchmarks.conformance import check_method, check_task_file
 from benchmarks.harness import record_of
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from coartic.task import TASK_FOLDER
 
 from .attacks.inputs import GOOD

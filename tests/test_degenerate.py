@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import benchmarks.executors
-from analysis.inference import spread
-from analysis.inference.equivalence import bootstrap_equivalence, difference
-from analysis.inference.statistics import (
-    bootstrap_test,
-    interquartile_mean,
-    permutation_test,
-    standard_error,
-)
 from analysis.published import Summary
 from analysis.signatures import intervals
 from analysis.signatures.context import context_dependence, distance, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, synergy
+from analysis.statistics import spread
+from analysis.statistics.equivalence import bootstrap_equivalence, difference
+from analysis.statistics.estimates import (
+    bootstrap_test,
+    interquartile_mean,
+    permutation_test,
+    standard_error,
+)
 from coartic import load_task
 
 from .test_cli import call

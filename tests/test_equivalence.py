@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.inference.equivalence import bootstrap_equivalence, difference, shares
 from analysis.published import Summary
+from analysis.statistics.equivalence import bootstrap_equivalence, difference, shares
 
 
 def test_interval_is_welchs():

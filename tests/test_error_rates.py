@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from analysis.inference import error_rates
-from analysis.inference.error_rates import Check
+from analysis.calibration import error_rates
+from analysis.calibration.error_rates import Check
 
 
 def test_errors_are_counted_and_marked(monkeypatch):

@@ -19,23 +19,23 @@ from markdown_it import MarkdownIt
 from rich.console import Console
 
 import analysis.report.build
-import analysis.results
-import benchmarks.methods
+import analysis.results.folder
+import benchmarks.registry
 import benchmarks.reproduce
 from analysis.citations import MethodSource, bibliography
-from analysis.comparison import compare
+from analysis.comparisons.methods import methods_frame
+from analysis.comparisons.paper import compare
+from analysis.comparisons.versions import compare_versions
 from analysis.figures.plot import svg_text
 from analysis.figures.tasks import tasks_plot
 from analysis.markup import code, escaped, markdown, markdown_text, words
-from analysis.methods import methods_frame
 from analysis.page import Heading, page
 from analysis.report.build import build, write
-from analysis.report.latex import latex_text
+from analysis.report.formats.latex import latex_text
 from analysis.report.numbers import Number, numbers_tex
 from analysis.report.trace import trace, trace_text
 from analysis.study import Study
 from analysis.table import Table
-from analysis.versions import compare_versions
 from benchmarks.harness import Progress
 from benchmarks.store import Store
 from benchmarks.suites import Cell
@@ -403,7 +403,7 @@ SIGN = "alert(1)</script>"  # of EVIL: it must be seen as what it is
 
 def test_comparison_page(hostile, monkeypatch):
     frame = methods_frame(hostile).assign(beaten=1, corrections=2, told="G")
-    monkeypatch.setattr("analysis.methods.methods_frame", lambda results: frame)
+    monkeypatch.setattr("analysis.comparisons.methods.methods_frame", lambda results: frame)
     page = compare(hostile).to_markdown()
     assert page.count("are better than the optimum") == len(frame)
     words_alone(page)
@@ -416,7 +416,7 @@ def printable(text):
 
 
 def test_analyse(hostile, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(analysis.results, "load_results", lambda folder: hostile)
+    monkeypatch.setattr(analysis.results.folder, "load_results", lambda folder: hostile)
     code, out, error = call(monkeypatch, capsys, "analyse", tmp_path)
     assert (code, error) == (0, "")
     assert printable(out)
@@ -444,8 +444,10 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
     other.__dict__["cells"] = fewer
     assert EVIL[:60] in MARKDOWN.render(compare_versions(hostile, other).to_markdown()).replace(
         "&lt;", "<").replace("&gt;", ">")  # fmt: skip
-    monkeypatch.setattr("analysis.versions.load_results", lambda folder: {"a": hostile}.get(
-        folder.name, other))  # fmt: skip
+    load = {"a": hostile}
+    monkeypatch.setattr(
+        "analysis.comparisons.versions.load_results", lambda folder: load.get(folder.name, other)
+    )
     out = tmp_path / "page.md"
     code, text, error = call(monkeypatch, capsys, "compare", "a", "b", "--out", out)
     assert (code, error) == (0, "")
@@ -566,7 +568,7 @@ def test_figures(hostile):
 
 
 def test_terminal(hostile, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(analysis.results, "load_results", lambda folder: hostile)
+    monkeypatch.setattr(analysis.results.folder, "load_results", lambda folder: hostile)
     code, out, error = call(monkeypatch, capsys, "cite", tmp_path)
     assert (code, error) == (0, "")
     assert printable(out)
@@ -576,7 +578,7 @@ def test_terminal(hostile, monkeypatch, capsys, tmp_path):
         warnings.warn(EVIL, stacklevel=1)
         raise CoarticError(f"first {EVIL}")
 
-    monkeypatch.setattr(benchmarks.methods, "registry", fail)
+    monkeypatch.setattr(benchmarks.registry, "registry", fail)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         code, out, error = call(monkeypatch, capsys, "list")

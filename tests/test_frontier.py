@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import bootstrap
 
-from analysis.frontier.frames import (
+from analysis.comparisons.frontier import (
     anytime_frame,
     area_frame,
     dominated,
@@ -18,9 +18,14 @@ from analysis.frontier.frames import (
     pareto_frame,
     targets_frame,
 )
-from analysis.frontier.page import areas_tables, frontier_page, pareto_tables, targets_tables
-from analysis.frontier.progress import SPENDS, by_trial, progress
-from analysis.results import Results
+from analysis.comparisons.frontier_page import (
+    areas_tables,
+    frontier_page,
+    pareto_tables,
+    targets_tables,
+)
+from analysis.comparisons.progress import SPENDS, by_trial, progress
+from analysis.results.folder import Results
 from coartic import load_task
 
 from .strategies import tiny_task

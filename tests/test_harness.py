@@ -9,13 +9,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.comparison import compare
-from analysis.integrity import read_manifest
-from analysis.results import load_results
+from analysis.comparisons.paper import compare
+from analysis.results.folder import load_results
+from analysis.results.laws import read_manifest
 from benchmarks.declaration import declared
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan
-from benchmarks.methods import CLASSES, Entry, registry
+from benchmarks.registry import CLASSES, Entry, registry
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import (

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.methods import TOLD, methods_frame, methods_notes, methods_tables
-from analysis.optimum import optima
-from analysis.results import Results
+from analysis.comparisons.methods import TOLD, methods_frame, methods_notes, methods_tables
+from analysis.results.folder import Results
+from analysis.results.optima import optima
 from coartic import load_task
 from coartic.method import Information
 

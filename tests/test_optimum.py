@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.optimum import collect, entries, essence
-from analysis.results import Results
+from analysis.results.folder import Results
+from analysis.results.optima import collect, entries, essence
 from baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic import builtin_tasks, execute, load_task
 from coartic.frames import movement_rows, movements_from

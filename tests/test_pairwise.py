@@ -7,15 +7,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.inference.across_tasks import scores_frame
-from analysis.inference.sample_size import power, runs_needed
-from analysis.optimum import optima
-from analysis.pairs.overall import NEAR, combined, everywhere, overall_frame, profiles_frame
-from analysis.pairs.page import comparisons_page
-from analysis.pairs.pairwise import COLUMNS, pairs, pairwise_frame
-from analysis.results import Results
+from analysis.comparisons.overall import NEAR, combined, everywhere, overall_frame, profiles_frame
+from analysis.comparisons.pairs import COLUMNS, pairs, pairwise_frame
+from analysis.comparisons.pairs_page import comparisons_page
+from analysis.results.folder import Results
+from analysis.results.optima import optima
+from analysis.statistics.across_tasks import scores_frame
+from analysis.statistics.power import power, runs_needed
 from analysis.study import Study
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import load_task
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from coartic import CoarticError
 
 ROOT = Path(__file__).parent.parent

@@ -28,13 +28,13 @@ from analysis.report.document import (
     Row,
     Section,
 )
-from analysis.report.html import MOST_ROWS, html
-from analysis.report.latex import MOST_ROWS as MOST_LATEX
-from analysis.report.latex import PACKAGES, latex_table, latex_tables, latex_text
+from analysis.report.formats.csv import runs_csv, table_csv
+from analysis.report.formats.html import MOST_ROWS, html
+from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
+from analysis.report.formats.latex import PACKAGES, latex_table, latex_tables, latex_text
+from analysis.report.formats.markdown import markdown
 from analysis.report.legends import with_legends
-from analysis.report.markdown import markdown
 from analysis.report.summary import without_variants
-from analysis.report.tables_csv import runs_csv, table_csv
 from analysis.report.text import number_text, parts, typographic
 from analysis.report.write import write_report
 from coartic import CoarticError

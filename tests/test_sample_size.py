@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.inference.sample_size import power, runs_needed, smallest_difference
+from analysis.statistics.power import power, runs_needed, smallest_difference
 
 
 @pytest.mark.parametrize(

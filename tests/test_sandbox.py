@@ -14,7 +14,7 @@ import pytest
 from benchmarks import sandbox
 from benchmarks.executors import Local
 from benchmarks.harness import perform_plan, record_of
-from benchmarks.methods import registry
+from benchmarks.registry import registry
 from benchmarks.reproduce import perform_once
 from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
 from benchmarks.specification import Limits

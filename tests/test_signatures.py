@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from analysis.results import Results
+from analysis.calibration import signatures as signature_nulls
+from analysis.results.folder import Results
 from analysis.signatures import intervals, signatures_frame
-from analysis.signatures import nulls as signature_nulls
 from analysis.signatures.cell import Cell
 from analysis.signatures.context import (
     context_dependence,

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.inference import statistics
+from analysis.statistics import estimates as statistics
 
 # Survival times of mice in days: Efron & Tibshirani (1993), table 2.1.
 TREATMENT = [94, 197, 16, 38, 99, 141, 23]

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from analysis.inference import statistics
+from analysis.statistics import estimates as statistics
 from analysis.table import interval, short, tally
 
 

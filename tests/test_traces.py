@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import analysis.report.build
-from analysis import optimum as shipped
-from analysis.inference import statistics
-from analysis.integrity import read_manifest
 from analysis.report.build import build, write
-from analysis.report.optimum_source import optimum_sources
 from analysis.report.trace import FILE, trace, trace_text
-from analysis.results import load_results
+from analysis.results import optima as shipped
+from analysis.results.folder import load_results
+from analysis.results.laws import read_manifest
+from analysis.results.optimum_source import optimum_sources
+from analysis.statistics import estimates as statistics
 from analysis.study import Study
 from benchmarks.suites import Cell
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
@@ -533,7 +533,7 @@ def test_shipped_optima_name_their_runs(home):
         found = trace(home, f"coarticTwoArmedOne{name}")
         assert found.sources == ()
         known = ", ".join(shipped_runs("two-armed-1", arm))
-        assert found.how == f"proven; shipped data (analysis/optimum.json), runs {known}"
+        assert found.how == f"proven; shipped data (analysis/results/optima.json), runs {known}"
         assert trace_text(found).splitlines()[-1].startswith("runs: none; this value is the opt")
     for name, reward, arm in (("Gap", -465, "free"), ("GapPercentLow", -465, "free"),
                               ("GapStill", -490, "still")):  # fmt: skip
@@ -627,8 +627,8 @@ def test_searches_in_the_folder_are_the_optimums_runs(searched):
     assert [source.label for source in still.sources] == own["still"]
     stored = ", ".join(shipped_runs("ascending", "still"))
     assert still.how == (
-        "proven; reward: searches of this folder; bound: shipped data (analysis/optimum.json), "
-        f"runs {stored}"
+        "proven; reward: searches of this folder; bound: shipped data "
+        f"(analysis/results/optima.json), runs {stored}"
     )
     for name in ("coarticAscendingECOneGap", "coarticAscendingECOneGapPercent"):
         assert labels(name) == ["dual-process/EC1", *own["free"]]

@@ -11,11 +11,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.inference.equivalence import MARGIN
-from analysis.integrity import read_manifest
-from analysis.results import load_results
-from analysis.versions import cells_frame, compare_versions, load_pair
-from benchmarks.methods import registry
+from analysis.comparisons.versions import cells_frame, compare_versions, load_pair
+from analysis.results.folder import load_results
+from analysis.results.laws import read_manifest
+from analysis.statistics.equivalence import MARGIN
+from benchmarks.registry import registry
 from benchmarks.sandbox import failure
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task

@@ -19,15 +19,15 @@ from analysis.claims.data import (
     MissingError,
     rewards_of,
 )
+from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Claim, Finding
-from analysis.claims.resemblance import CRITERION, TEST, resembles
-from analysis.frontier.frames import targets_frame
-from analysis.inference.equivalence import MARGIN, difference
-from analysis.inference.statistics import LEVEL, Inference, difference_of_means, mean
-from analysis.methods import LEARNER, TOLD
-from analysis.optimum import METHODS as OPTIMUM
+from analysis.comparisons.frontier import targets_frame
+from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.published import published_cell
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.statistics.equivalence import MARGIN, difference
+from analysis.statistics.estimates import LEVEL, Inference, difference_of_means, mean
 from analysis.study import SEED
 from analysis.table import NONE, Table, interval, short
 from coartic.method import Information

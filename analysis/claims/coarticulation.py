@@ -6,11 +6,11 @@ import numpy as np
 
 from analysis.claims.data import ONE, Data, MissingError
 from analysis.claims.register import Claim, Finding
-from analysis.inference.statistics import FEWEST, bootstrap_test, mean, share_test
-from analysis.methods import LEARNER
+from analysis.comparisons.methods import LEARNER
 from analysis.signatures.cell import Cell
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
+from analysis.statistics.estimates import FEWEST, bootstrap_test, mean, share_test
 from analysis.study import SEED
 from analysis.table import interval
 from coartic.robot import Array

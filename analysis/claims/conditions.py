@@ -9,7 +9,7 @@ from scipy import stats
 
 from analysis.claims.data import ONE, TWO, Data
 from analysis.claims.register import Claim, Finding
-from analysis.inference.statistics import (
+from analysis.statistics.estimates import (
     Inference,
     bootstrap_test,
     difference_of_means,

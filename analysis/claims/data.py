@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.inference.statistics import FEWEST
-from analysis.methods import LEARNER, TOLD
+from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.published import TRIALS
-from analysis.results import Results
+from analysis.results.folder import Results
 from analysis.signatures.cell import Cell
 from analysis.signatures.recruitment import best_sequences
+from analysis.statistics.estimates import FEWEST
 from analysis.study import Study
 from coartic import Execution, Task, corrective_trial, initial_hands
 from coartic.errors import NotApplicableError

@@ -21,14 +21,14 @@ from analysis.claims.data import (
     Data,
     MissingError,
 )
-from analysis.claims.reach import shortest_reach
+from analysis.claims.judges.reach import shortest_reach
+from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.register import Claim, Finding
-from analysis.claims.resemblance import CRITERION, TEST, resembles
-from analysis.inference.statistics import bootstrap_test, mean
-from analysis.methods import LEARNER
-from analysis.optimum import METHODS as OPTIMUM
+from analysis.comparisons.methods import LEARNER
 from analysis.published import TRIALS
+from analysis.results.optima import METHODS as OPTIMUM
 from analysis.signatures.subtasks import postures_before
+from analysis.statistics.estimates import bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval, short
 from coartic.task import hands_of

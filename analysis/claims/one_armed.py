@@ -6,9 +6,9 @@ import numpy as np
 
 from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
 from analysis.claims.register import Claim, Finding
-from analysis.inference.statistics import Inference, bootstrap_test, mean
-from analysis.methods import LEARNER
+from analysis.comparisons.methods import LEARNER
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
+from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval
 

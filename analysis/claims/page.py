@@ -13,7 +13,7 @@ from analysis.claims import register
 from analysis.claims.register import Judged
 from analysis.markup import code, escaped
 from analysis.page import Heading, Part, page
-from analysis.results import Results
+from analysis.results.folder import Results
 from analysis.table import NONE, Table
 
 FITTED = (

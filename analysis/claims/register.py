@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from analysis.claims.data import Data, MissingError
-from analysis.inference.statistics import LEVEL, RESAMPLES, Inference, holm
+from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference, holm
 from analysis.study import Study
 from analysis.table import Table
 

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.claims.data import ONE, Data, MissingError, rewards_of
-from analysis.claims.hands import better_hands
-from analysis.claims.register import Claim, Finding
-from analysis.claims.shares import (
+from analysis.claims.judges.hands import better_hands
+from analysis.claims.judges.shares import (
     AS_OFTEN,
     MOST,
     NEARLY_ALL,
@@ -19,9 +18,10 @@ from analysis.claims.shares import (
     nearly_all,
     not_nearly_all,
 )
-from analysis.inference.statistics import FEWEST, bootstrap_test, mean
-from analysis.methods import LEARNER
+from analysis.claims.register import Claim, Finding
+from analysis.comparisons.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
+from analysis.statistics.estimates import FEWEST, bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval, tally
 from coartic.robot import Array

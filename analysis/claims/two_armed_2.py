@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 
 from analysis.claims.data import TWO, Data
-from analysis.claims.hands import better_hands
+from analysis.claims.judges.hands import better_hands
+from analysis.claims.judges.shares import AS_OFTEN, as_often
 from analysis.claims.register import Claim, Finding
-from analysis.claims.shares import AS_OFTEN, as_often
 from analysis.published import published_exhaustive
 from analysis.table import tally
 

@@ -29,8 +29,8 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.inference.statistics import CONFIDENCE, RESAMPLES, bootstrap_test, holm, mean
 from analysis.published import Summary, published_cell, published_initial
+from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, bootstrap_test, holm, mean
 from analysis.study import SEED, Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))

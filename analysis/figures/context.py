@@ -28,8 +28,8 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.inference.statistics import holm
-from analysis.signatures.frame import CONTEXT
+from analysis.signatures.register import CONTEXT
+from analysis.statistics.estimates import holm
 from analysis.study import Study
 
 MOST = 6

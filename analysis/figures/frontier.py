@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from analysis.comparisons.frontier import anytime_frame
+from analysis.comparisons.progress import SPENDS
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, known_tasks, missing
 from analysis.figures.style import (
@@ -26,10 +28,8 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.frontier.frames import anytime_frame
-from analysis.frontier.progress import SPENDS
-from analysis.inference.statistics import CONFIDENCE
-from analysis.optimum import METHODS as OPTIMUM
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.statistics.estimates import CONFIDENCE
 from analysis.study import Study
 from coartic import Task
 
@@ -53,7 +53,7 @@ def frontier(
 
     Methods that plan are a point at all that they spend; those that spend nothing of a kind
     stand at the left edge. Raises CoarticError where there is nothing to draw and ValueError
-    for a spend that is not one of :data:`analysis.frontier.progress.SPENDS`.
+    for a spend that is not one of :data:`analysis.comparisons.progress.SPENDS`.
     """
     unknown = [spend for spend in spends if spend not in SPENDS]
     if unknown:

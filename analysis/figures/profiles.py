@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
 from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, short, styled
-from analysis.inference.across_tasks import by_task, profile, scores_frame
-from analysis.inference.statistics import CONFIDENCE
+from analysis.statistics.across_tasks import by_task, profile, scores_frame
+from analysis.statistics.estimates import CONFIDENCE
 from analysis.study import SEED, Study
 from coartic import CoarticError
 from coartic.robot import Array

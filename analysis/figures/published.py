@@ -26,9 +26,9 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.inference.equivalence import MARGIN, difference
-from analysis.inference.statistics import CONFIDENCE
 from analysis.published import TRIALS, Summary, published_cell
+from analysis.statistics.equivalence import MARGIN, difference
+from analysis.statistics.estimates import CONFIDENCE
 from analysis.study import Study
 
 _MARKS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 
-from analysis.results import CellRuns
+from analysis.results.folder import CellRuns
 from analysis.study import Study
 from coartic import CoarticError, Task
 from coartic.robot import Array

@@ -12,13 +12,12 @@ import pandas as pd
 from analysis.claims import judge
 from analysis.claims.page import FITTED
 from analysis.claims.register import Judged
+from analysis.comparisons.frontier import area_frame, for_both_arms, targets_frame
+from analysis.comparisons.overall import combined, overall_frame
+from analysis.comparisons.pairs import pairwise_frame
 from analysis.figures import Figures, Plot, all_figures
 from analysis.figures.plot import FILES, rendered, svg_text
-from analysis.frontier.frames import area_frame, for_both_arms, targets_frame
-from analysis.inference.across_tasks import scores_frame
 from analysis.markup import escaped, words
-from analysis.pairs.overall import combined, overall_frame
-from analysis.pairs.pairwise import pairwise_frame
 from analysis.report import tables
 from analysis.report.document import (
     Block,
@@ -39,7 +38,8 @@ from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
-from analysis.results import Results
+from analysis.results.folder import Results
+from analysis.statistics.across_tasks import scores_frame
 from analysis.study import Study
 from analysis.table import Table
 from coartic import CoarticError

@@ -1,6 +1,6 @@
 """What a report consists of: sections of prose, tables, figures and a player.
 
-A document holds content and raw values, no presentation: :mod:`analysis.report.html`,
+A document holds content and raw values, no presentation: :mod:`analysis.report.formats.html`,
 ``markdown`` and ``latex`` decide how it looks, and CSV files hold the raw values. Every
 number of a table names the cells (task, label) it was computed from, and the document
 knows the run ids of every cell, so each number leads to its runs.

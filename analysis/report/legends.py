@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from analysis.methods import TOLD
+from analysis.comparisons.methods import TOLD
 from analysis.report.document import DataTable
 
 _LETTERS = {"told", "told_more", "told_less"}  # columns with letters of information

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from analysis.inference.sample_size import POWER, smallest_difference
-from analysis.inference.spread import sd
-from analysis.inference.statistics import FEWEST
+from analysis.comparisons.methods import LEARNER
 from analysis.markup import code, escaped
-from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
 from analysis.report.summary import unlike_printed
 from analysis.report.text import typographic
+from analysis.statistics.estimates import FEWEST
+from analysis.statistics.power import POWER, smallest_difference
+from analysis.statistics.spread import sd
 from analysis.study import Study
 
 

@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.inference.spread import sd
-from analysis.inference.statistics import (
+from analysis.comparisons.methods import LEARNER, solve_times
+from analysis.published import published_cell, published_initial
+from analysis.results.folder import CellRuns
+from analysis.results.optimum_source import SHIPPED, OptimumSource, optimum_sources
+from analysis.statistics.estimates import (
     Inference,
     difference_of_means,
     mean,
     probability_of_improvement,
 )
-from analysis.methods import LEARNER, solve_times
-from analysis.published import published_cell, published_initial
-from analysis.report.optimum_source import SHIPPED, OptimumSource, optimum_sources
-from analysis.results import CellRuns
+from analysis.statistics.spread import sd
 from analysis.study import SEED, Study
 from coartic.text import one_line
 

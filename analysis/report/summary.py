@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.claims.register import Judged, Verdict
-from analysis.comparison import published_of
-from analysis.inference.equivalence import difference
-from analysis.inference.statistics import mean
-from analysis.methods import LEARNER
+from analysis.comparisons.methods import LEARNER
+from analysis.comparisons.paper import published_of
 from analysis.published import TRIALS, published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.report.optimum_source import optimum_sources
 from analysis.report.text import typographic
+from analysis.results.optimum_source import optimum_sources
+from analysis.statistics.equivalence import difference
+from analysis.statistics.estimates import mean
 from analysis.study import SEED, Study
 
 _CONDITION = re.compile(r"dual-process/EC[1-4]")

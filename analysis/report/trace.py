@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.comparisons.methods import methods_notes
 from analysis.markup import words
-from analysis.methods import methods_notes
 from analysis.report.document import DataTable, Document, Row
 from analysis.report.numbers import Number
-from analysis.report.optimum_source import SHIPPED, optimum_sources
 from analysis.report.text import parts
-from analysis.results import Results
+from analysis.results.folder import Results
+from analysis.results.optimum_source import SHIPPED, optimum_sources
 from analysis.table import NONE
 from coartic import CoarticError, builtin_tasks
 from coartic.text import json_text, one_line, shell_line

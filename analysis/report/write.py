@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from analysis.report.document import Document
-from analysis.report.html import html
-from analysis.report.latex import latex_inputs, latex_tables
-from analysis.report.markdown import markdown
-from analysis.report.tables_csv import runs_csv, table_csv
+from analysis.report.formats.csv import runs_csv, table_csv
+from analysis.report.formats.html import html
+from analysis.report.formats.latex import latex_inputs, latex_tables
+from analysis.report.formats.markdown import markdown
 from coartic import CoarticError
 from coartic.files import check_folder, publish
 

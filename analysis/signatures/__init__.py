@@ -4,6 +4,6 @@ One concept a file; each signature is a pure function of arrays or of tick-by-ti
 trajectories. :func:`signatures_frame` applies them all to a results folder.
 """
 
-from analysis.signatures.frame import signatures_frame
+from analysis.signatures.register import signatures_frame
 
 __all__ = ["signatures_frame"]

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from analysis.results import Results
+from analysis.results.folder import Results
 from coartic import Execution, Hand, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
 from coartic.frames import movements_from

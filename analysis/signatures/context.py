@@ -15,8 +15,8 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.inference.spread import mean
 from analysis.signatures.permutation import RESAMPLES, divisions, p_values
+from analysis.statistics.spread import mean
 from coartic import Task
 from coartic.robot import Array
 

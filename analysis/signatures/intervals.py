@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.inference import spread
-from analysis.inference.statistics import CONFIDENCE
+from analysis.statistics import spread
+from analysis.statistics.estimates import CONFIDENCE
 
 
 class Interval(NamedTuple):

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from analysis.inference.spread import mean
-from analysis.inference.statistics import CONFIDENCE
 from analysis.signatures.permutation import orders, p_values
+from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.spread import mean
 from coartic import Task
 from coartic.robot import Array
 

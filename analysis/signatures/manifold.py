@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
-from analysis.inference.spread import sd
-from analysis.inference.statistics import CONFIDENCE
+from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.spread import sd
 from coartic import Hand, Task
 from coartic.robot import Array
 
@@ -93,7 +93,7 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     inference (Verrel 2010); it equals ½ ln(V_ucm/V_ort) + ½ ln(d_ucm/d_ort). Its interval and
     test are the jackknife's, with Student's t and runs - 1 degrees of freedom (Miller 1974):
     they allow correlated joints and unequal variances within either space; with markedly
-    skewed scatter about 7 % of nulls are rejected at 5 % (analysis/signatures/nulls.py).
+    skewed scatter about 7 % of nulls are rejected at 5 % (analysis/calibration/signatures.py).
 
     All NaN below two runs, for a space of dimension 0 and where runs do not differ, or differ
     in one of the spaces only. No interval and no test where they differ along one line (as any

@@ -10,10 +10,10 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.inference.statistics import holm
 from analysis.markup import escaped
 from analysis.page import Heading, Part, page
-from analysis.signatures.frame import NO_RUN
+from analysis.signatures.register import NO_RUN
+from analysis.statistics.estimates import holm
 from analysis.study import Study
 from analysis.table import NONE, Table
 from coartic import Task

@@ -826,8 +826,18 @@ def attack(root: Path, cases: Sequence[str] = (), *, words: bool = True) -> list
 _COMMANDS_IMPORT = (
     *("coartic.cli", "benchmarks.suites", "benchmarks.harness", "benchmarks.executors"),
     *("benchmarks.tables", "benchmarks.reproduce", "benchmarks.conformance"),
-    *("analysis.comparison", "analysis.methods", "analysis.results", "analysis.figures.tasks"),
-    *("analysis.claims", "analysis.citations", "analysis.animation", "analysis.versions"),
+    *(
+        "analysis.comparisons.paper",
+        "analysis.comparisons.methods",
+        "analysis.results.folder",
+        "analysis.figures.tasks",
+    ),
+    *(
+        "analysis.claims",
+        "analysis.citations",
+        "analysis.figures.animation",
+        "analysis.comparisons.versions",
+    ),
     *("analysis.study", "analysis.report.build", "analysis.report.trace"),
 )
 

@@ -638,7 +638,7 @@ attack(
     "neighbour/import-registry",
     "replaces a built-in method in the registry while it is imported",
     before="""
-    import benchmarks.methods as methods
+    import benchmarks.registry as methods
     from coartic.dual_process import DUAL_PROCESS
     def worse(self, session):
         return honest(session)

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from analysis.integrity import read_manifest
-from analysis.results import load_results
+from analysis.results.folder import load_results
+from analysis.results.laws import read_manifest
 from benchmarks.store import Store
 from benchmarks.tables import write_tables
 from coartic import PAPER, CoarticError

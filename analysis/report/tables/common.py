@@ -7,10 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.inference.spread import sd
-from analysis.inference.statistics import mean
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.slugs import slugs
+from analysis.statistics.estimates import mean
+from analysis.statistics.spread import sd
 from analysis.study import SEED, Study
 
 

@@ -6,7 +6,7 @@ import math
 
 import pandas as pd
 
-from analysis.frontier.frames import LABELS
+from analysis.comparisons.frontier import LABELS
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pandas as pd
 
+from analysis.comparisons.methods import methods_notes
+from analysis.comparisons.overall import NEAR
 from analysis.markup import escaped
-from analysis.methods import methods_notes
-from analysis.pairs.overall import NEAR
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
 from analysis.report.text import typographic

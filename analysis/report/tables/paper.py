@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.comparison import published_of
-from analysis.inference.equivalence import MARGIN, difference
+from analysis.comparisons.paper import published_of
 from analysis.published import TRIALS, Summary, published_exhaustive, published_initial
 from analysis.report.document import Column, DataTable, Estimate, Row
 from analysis.report.tables.common import counts, marked, mean_of, table, with_interval
 from analysis.report.text import typographic
+from analysis.statistics.equivalence import MARGIN, difference
 from analysis.study import Study
 
 

@@ -1,4 +1,4 @@
-"""What the signatures' tests and intervals do: ``python -m analysis.signatures.nulls [N]``.
+"""What the signatures' tests and intervals do: ``python -m analysis.calibration.signatures [N]``.
 
 Every row simulates N data sets (2000 by default) and prints a share with its exact binomial
 interval. Nulls: nothing to find, tested at 5 %, how often a test rejects. Planted effects: of

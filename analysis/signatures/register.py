@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.inference import spread
-from analysis.results import Results
+from analysis.results.folder import Results
 from analysis.signatures.cell import Cell, cells_of, last_ticks, postures
 from analysis.signatures.context import (
     context_dependence,
@@ -40,6 +39,7 @@ from analysis.signatures.other_arm import (
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
 from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
 from analysis.signatures.subtasks import change_from, excess, sacrifice_p, sacrifices
+from analysis.statistics import spread
 from coartic import Execution, Task
 from coartic.robot import HANDS, Array, Hand
 

@@ -12,7 +12,7 @@ import math
 
 from scipy import optimize, special, stats
 
-from analysis.inference.statistics import LEVEL
+from analysis.statistics.estimates import LEVEL
 
 POWER = 0.8
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
-from analysis.inference.spread import mean, variance
-from analysis.inference.statistics import (
+from analysis.published import Summary
+from analysis.statistics.estimates import (
     CONFIDENCE,
     FEWEST,
     RESAMPLES,
@@ -29,7 +29,7 @@ from analysis.inference.statistics import (
     standard_error,
     studentised_null,
 )
-from analysis.published import Summary
+from analysis.statistics.spread import mean, variance
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -142,7 +142,7 @@ def bootstrap_equivalence(
 def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:
     """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
 
-    Newcombe's interval (:func:`~analysis.inference.statistics.difference_of_shares`). ``p`` is
+    Newcombe's interval (:func:`~analysis.statistics.estimates.difference_of_shares`). ``p`` is
     half the error rate at which the interval just touches the margin, 1 where the shares
     themselves differ by the margin or more.
     """

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.integrity import BASE
-from analysis.optimum import DATA, METHODS, entries, essence, optima
-from analysis.results import CellRuns, Results
+from analysis.results.laws import BASE
+from analysis.results.optima import DATA, METHODS, entries, essence, optima
+from analysis.results.folder import CellRuns, Results
 
 SHIPPED = f"shipped data (analysis/{DATA.name})"
 
@@ -27,7 +27,7 @@ class OptimumSource:
 
 
 def optimum_sources(results: Results) -> dict[tuple[str, str], OptimumSource]:
-    """Sources of :func:`analysis.optimum.optima`, by task and other arm (``free``, ``still``).
+    """Sources of :func:`analysis.results.optima.optima`, by task and other arm (``free``, ``still``).
 
     The folder's own searches come first: shipped data are named for what those do not give.
     """

@@ -5,7 +5,7 @@ with a plain number, the number is taken as known without error: the reward of a
 deterministic method, say. Every function that resamples takes a seed and gives the same
 result for the same seed; the seed belongs to the resampling, not to the runs.
 
-``analysis.inference.error_rates`` measures how well the nominal rates hold for data like ours.
+``analysis.calibration.error_rates`` measures how well the nominal rates hold for data like ours.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapters 14
 to 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application,
@@ -29,7 +29,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import optimize, special, stats
 
-from analysis.inference import spread
+from analysis.statistics import spread
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]

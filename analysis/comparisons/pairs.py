@@ -25,10 +25,11 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from analysis.frontier.frames import SHARES
-from analysis.inference.sample_size import runs_needed, smallest_difference
-from analysis.inference.spread import sd
-from analysis.inference.statistics import (
+from analysis.comparisons.frontier import SHARES
+from analysis.comparisons.methods import LEARNER, TOLD
+from analysis.results.folder import CellRuns
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.statistics.estimates import (
     Inference,
     bootstrap_test,
     cliffs_delta,
@@ -40,9 +41,8 @@ from analysis.inference.statistics import (
     probability_of_improvement,
     sign_flip_test,
 )
-from analysis.methods import LEARNER, TOLD
-from analysis.optimum import METHODS as OPTIMUM
-from analysis.results import CellRuns
+from analysis.statistics.power import runs_needed, smallest_difference
+from analysis.statistics.spread import sd
 from analysis.study import SEED, Study
 from coartic.exploration import CONDITIONS
 from coartic.robot import Array
@@ -53,7 +53,7 @@ SPENDS = {
     "evaluations": ("forward_kinematics", "jacobians"),
     "solve_s": ("solve_s",),
 }
-"""What a run spends: sums of columns of :func:`analysis.methods.methods_frame`."""
+"""What a run spends: sums of columns of :func:`analysis.comparisons.methods.methods_frame`."""
 COLUMNS = (
     "task kind first second runs_first runs_second n_first n_second mean_first mean_second "
     "sd_first sd_second difference low high interval pairs correlation independent_low "
@@ -132,7 +132,7 @@ def pairwise_frame(study: Study) -> pd.DataFrame:
     ``trials``, ``movement_ticks``, ``evaluations`` (forward kinematics and Jacobians),
     ``solve_s``: what the second spent in a run over what the first did, medians, NaN where
     the first spent none. ``told_more``, ``told_less``: letters of the information that only
-    the second, only the first is told (:data:`analysis.methods.TOLD`).
+    the second, only the first is told (:data:`analysis.comparisons.methods.TOLD`).
 
     ``runs_5``, ``runs_2``, ``runs_1``: runs of each that a one-tailed test at 5 % needs to
     find a difference of that share (%) of the optimum with power 80 %, at these SDs.

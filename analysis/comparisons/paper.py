@@ -9,11 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.inference.equivalence import MARGIN, difference
-from analysis.inference.spread import sd
-from analysis.inference.statistics import CONFIDENCE
+from analysis.comparisons.methods import methods_notes, methods_tables
 from analysis.markup import code, escaped
-from analysis.methods import methods_notes, methods_tables
 from analysis.page import Heading, Part, page
 from analysis.published import (
     RUNS,
@@ -25,7 +22,10 @@ from analysis.published import (
     published_exhaustive,
     published_initial,
 )
-from analysis.results import CellRuns, Results
+from analysis.results.folder import CellRuns, Results
+from analysis.statistics.equivalence import MARGIN, difference
+from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.spread import sd
 from analysis.table import NONE, Table, interval, tally
 
 Rewards = Sequence[float] | NDArray[np.float64]

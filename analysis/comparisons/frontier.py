@@ -1,9 +1,9 @@
 """Reward against what it costs: anytime curves, times to a target, Pareto sets.
 
 Spends are trials, control ticks, forward-kinematics evaluations and solve time
-(:data:`analysis.frontier.progress.SPENDS`); Pareto sets also count Jacobians and information.
-``steps`` is what :func:`analysis.frontier.progress.progress` read, for those who need it more than
-once.
+(:data:`analysis.comparisons.progress.SPENDS`); Pareto sets also count Jacobians and information.
+``steps`` is what :func:`analysis.comparisons.progress.progress` read, for those who need it
+more than once.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from analysis.frontier.progress import SPENDS, Progress, progress
-from analysis.inference import spread
-from analysis.inference.statistics import CONFIDENCE
-from analysis.inference.survival import kaplan_meier_median
-from analysis.methods import STILL, methods_frame, solve_times
-from analysis.optimum import METHODS as OPTIMUM
-from analysis.optimum import locks_base, optima
-from analysis.results import CellRuns, Results
+from analysis.comparisons.methods import STILL, methods_frame, solve_times
+from analysis.comparisons.progress import SPENDS, Progress, progress
+from analysis.results.folder import CellRuns, Results
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.results.optima import locks_base, optima
+from analysis.statistics import spread
+from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.survival import kaplan_meier_median
 from coartic.robot import Array
 
 SHARES = (0.05, 0.02, 0.01)
@@ -61,8 +61,8 @@ def anytime_frame(results: Results, steps: Steps | None = None, *, seed: int = 0
     Intervals are 95 % percentile bootstrap intervals of the mean over runs (Efron &
     Tibshirani, 1993), pointwise, not a band around the whole curve; they are missing for
     a single run. ``seed`` is that of the resampling; a cell's rows do not depend on other
-    cells. Runs whose time is not taken (:func:`analysis.methods.solve_times`) have no part
-    in the curve over time, nor methods with a base that a parameter locks in any.
+    cells. Runs whose time is not taken (:func:`analysis.comparisons.methods.solve_times`) have
+    no part in the curve over time, nor methods with a base that a parameter locks in any.
     """
     rows: list[dict[str, Any]] = []
     for cell, spend, runs in _selected(results, steps):
@@ -180,7 +180,7 @@ def targets_frame(
     ``target`` (the reward that this takes), ``runs``, ``reached`` (how many runs),
     ``reached_low`` and ``reached_high`` (exact 95 % interval of the probability to reach it,
     Clopper & Pearson, 1934), ``median`` spend to reach it with the interval ``low`` to ``high``
-    (:func:`analysis.inference.survival.kaplan_meier_median`), and ``horizon``.
+    (:func:`analysis.statistics.survival.kaplan_meier_median`), and ``horizon``.
 
     The median is over all runs, infinite where half of them did not reach the target; so
     are limits that the runs do not bound. Runs that could have gone on are right-censored,
@@ -188,7 +188,7 @@ def targets_frame(
     would make censoring depend on the outcome: worse trials take more ticks. Lin et al.,
     1997, on costs.) What was reached behind the horizon counts in ``reached`` only. A run
     could have gone on if its budget of trials stopped it (:attr:`Progress.stopped
-    <analysis.frontier.progress.Progress.stopped>`). Runs that ended by themselves never reach a
+    <analysis.comparisons.progress.Progress.stopped>`). Runs that ended by themselves never reach a
     target that they missed: a planner's, an exhaustive search's that tried all it had, one
     without a solution. The horizon is infinite where all runs ended by themselves. Runs
     whose time is not taken have no part in those over time.
@@ -238,7 +238,8 @@ def pareto_frame(results: Results, *, seed: int = 0) -> pd.DataFrame:
     A method is on the front if no other has a mean reward as high for as little spend, with
     either one better; ties are all on it. Times within :data:`TIME_TOLERANCE` of each other
     are ties: they vary between machines and between runs. Columns: ``task``, ``method``,
-    ``told`` (a letter for each kind of information, :data:`analysis.methods.TOLD`), ``runs``,
+    ``told`` (a letter for each kind of information,
+    :data:`analysis.comparisons.methods.TOLD`), ``runs``,
     ``solved``, mean ``reward``, ``spend`` (:data:`LABELS`; ``information`` is the number of
     kinds of information told, which does not weigh them), ``amount`` (median over runs),
     ``front``, ``front_share`` (of :data:`RESAMPLES` bootstrap resamples, in how many it is on

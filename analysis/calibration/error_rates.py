@@ -1,6 +1,7 @@
 """Do the tests and intervals of this package hold their nominal rates on data like ours?
 
-``python -m analysis.inference.error_rates`` simulates samples of 20 runs from normal distributions
+``python -m analysis.calibration.error_rates`` simulates samples of 20 runs from normal
+distributions
 and from distributions shaped like learned rewards (skewed, with several levels, in whole
 ticks), applies the functions that the tables use, and prints how often each errs: type-I
 error of tests at level 0.05, coverage of 95 % intervals, and how often means that differ by
@@ -22,11 +23,11 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy import stats
 
-from analysis.inference import statistics
-from analysis.inference.across_tasks import interquartile_mean
-from analysis.inference.equivalence import bootstrap_equivalence, difference
-from analysis.inference.statistics import LEVEL
 from analysis.published import Summary
+from analysis.statistics import estimates as statistics
+from analysis.statistics.across_tasks import interquartile_mean
+from analysis.statistics.equivalence import bootstrap_equivalence, difference
+from analysis.statistics.estimates import LEVEL
 from analysis.table import Table
 from coartic.robot import Array
 
@@ -301,7 +302,7 @@ def error_rates(simulations: int, seed: int, jobs: int) -> Table:
 
 
 def main() -> None:
-    """``python -m analysis.inference.error_rates``: print the table."""
+    """``python -m analysis.calibration.error_rates``: print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--simulations", type=int, default=SIMULATIONS)
     parser.add_argument("--seed", type=int, default=0)

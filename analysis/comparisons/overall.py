@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.inference.across_tasks import by_task, interquartile_mean, profile, task_mean
-from analysis.inference.statistics import FEWEST, Inference
-from analysis.methods import LEARNER
-from analysis.optimum import METHODS as OPTIMUM
+from analysis.comparisons.methods import LEARNER
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.statistics.across_tasks import by_task, interquartile_mean, profile, task_mean
+from analysis.statistics.estimates import FEWEST, Inference
 from analysis.study import SEED
 from coartic.robot import Array
 
@@ -32,7 +32,7 @@ _ONE_ARMED, _TWO_ARMED = "EC1", ("EC4", "EC3")
 def combined(scores: pd.DataFrame) -> pd.DataFrame:
     """``scores`` with rows of the learner over one-armed and two-armed tasks.
 
-    ``scores`` is of :func:`analysis.inference.across_tasks.scores_frame`. Where EC4 (likewise
+    ``scores`` is of :func:`analysis.statistics.across_tasks.scores_frame`. Where EC4 (likewise
     EC3) ran, its runs, elsewhere those of EC1, both as method ``dual-process (EC1, EC4)``;
     likewise variants of the two with the same name and parameters.
     """

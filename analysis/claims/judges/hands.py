@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from analysis.claims.data import Data
 from analysis.claims.register import Finding
-from analysis.inference.statistics import bootstrap_test, difference_of_means, mean
 from analysis.published import published_cell
+from analysis.statistics.estimates import bootstrap_test, difference_of_means, mean
 from analysis.study import SEED
 from analysis.table import interval
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.frontier.frames import LABELS, OTHER_ARMS, TIME_TOLERANCE
-from analysis.frontier.progress import SPENDS
-from analysis.inference.statistics import CONFIDENCE
+from analysis.comparisons.frontier import LABELS, OTHER_ARMS, TIME_TOLERANCE
+from analysis.comparisons.progress import SPENDS
 from analysis.markup import escaped
-from analysis.optimum import METHODS as OPTIMUM
-from analysis.optimum import Optimum, optima
 from analysis.page import Heading, Part, page
-from analysis.results import Results
+from analysis.results.folder import Results
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.results.optima import Optimum, optima
+from analysis.statistics.estimates import CONFIDENCE
 from analysis.table import NONE, Table, short
 
 SHOWN = ("trials", "forward_kinematics")
@@ -79,7 +79,7 @@ _NOTES = (
 
 
 def targets_tables(frame: pd.DataFrame, spend: str) -> list[tuple[Table, list[str]]]:
-    """:func:`~analysis.frontier.frames.targets_frame` over one spend, a table per task and arm.
+    """:func:`~.targets_frame` over one spend, a table per task and arm.
 
     A cell is: runs that reached the target of all runs, median spend [95 % interval]; the
     median is greater than the horizon where too few reached it within that. Methods none of
@@ -109,7 +109,7 @@ def targets_tables(frame: pd.DataFrame, spend: str) -> list[tuple[Table, list[st
 
 
 def areas_tables(frame: pd.DataFrame) -> list[Table]:
-    """:func:`analysis.frontier.frames.area_frame` as a table per task and other arm."""
+    """:func:`analysis.comparisons.frontier.area_frame` as a table per task and other arm."""
     frame = frame[~frame.method.str.startswith(OPTIMUM)]
     tables = []
     for (name, arm), rows in frame.groupby(["task", "other_arm"], sort=False):
@@ -126,7 +126,7 @@ def areas_tables(frame: pd.DataFrame) -> list[Table]:
 
 
 def pareto_tables(frame: pd.DataFrame) -> list[Table]:
-    """Methods on a front of :func:`~analysis.frontier.frames.pareto_frame`, a table per task."""
+    """Methods on a front of ``pareto_frame``, a table per task."""
     tables = []
     for name, rows in frame.groupby("task", sort=False):
         on_one = rows.told_share > 1 - SURE

@@ -8,9 +8,9 @@ from scipy import stats
 
 from analysis.claims.data import Data
 from analysis.claims.register import Finding
-from analysis.inference.equivalence import shares
-from analysis.inference.statistics import Inference, share_test
 from analysis.published import published_cell
+from analysis.statistics.equivalence import shares
+from analysis.statistics.estimates import Inference, share_test
 from analysis.table import tally
 
 MARGIN = 0.25

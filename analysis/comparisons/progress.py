@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.methods import solve_times
-from analysis.results import Results
+from analysis.comparisons.methods import solve_times
+from analysis.results.folder import Results
 from coartic.robot import Array
 
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
@@ -61,7 +61,7 @@ def progress(results: Results) -> dict[str, Progress]:
     evaluations were 0.6 to 1.5 times their even share, 3.4 times for the first 10 trials of
     CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
     a learner without its corrective process spends most of them on its first trial. Times
-    are those of :func:`analysis.methods.solve_times`: without building.
+    are those of :func:`analysis.comparisons.methods.solve_times`: without building.
 
     A run was stopped if it made as many trials as it was given: by its parameter ``trials``
     or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that

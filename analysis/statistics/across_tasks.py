@@ -20,8 +20,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from analysis.inference import spread
-from analysis.inference.statistics import (
+from analysis.results.folder import Results
+from analysis.results.optima import optima
+from analysis.statistics import spread
+from analysis.statistics.estimates import (
     CONFIDENCE,
     RESAMPLES,
     Inference,
@@ -30,8 +32,6 @@ from analysis.inference.statistics import (
     middle_mean,
     sample,
 )
-from analysis.optimum import optima
-from analysis.results import Results
 from coartic.initial import initial_hands
 from coartic.robot import Array
 

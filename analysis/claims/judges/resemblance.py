@@ -9,8 +9,8 @@ import numpy as np
 
 from analysis.claims.data import Data, MissingError
 from analysis.claims.register import Finding
-from analysis.inference.statistics import bootstrap_test, mean
-from analysis.methods import LEARNER
+from analysis.comparisons.methods import LEARNER
+from analysis.statistics.estimates import bootstrap_test, mean
 from analysis.study import SEED
 from analysis.table import interval
 from coartic.robot import Array

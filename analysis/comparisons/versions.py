@@ -16,8 +16,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.inference.equivalence import MARGIN, bootstrap_equivalence
-from analysis.inference.statistics import (
+from analysis.comparisons.methods import solve_times
+from analysis.markup import code, escaped
+from analysis.page import Heading, Part, page
+from analysis.results.folder import CellRuns, Results, load_results
+from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
+from analysis.statistics.estimates import (
     FEWEST,
     bootstrap_test,
     difference_of_means,
@@ -25,10 +29,6 @@ from analysis.inference.statistics import (
     paired_by_seed,
     paired_difference,
 )
-from analysis.markup import code, escaped
-from analysis.methods import solve_times
-from analysis.page import Heading, Part, page
-from analysis.results import CellRuns, Results, load_results
 from analysis.study import SEED
 from analysis.table import NONE, Table
 from coartic import CoarticError
@@ -122,7 +122,7 @@ def load_pair(first: Path, second: Path) -> tuple[Results, Results]:
     """Two results folders that can be compared.
 
     Raises CoarticError for one folder given twice, and for one that is no results folder,
-    is damaged or has another format (:func:`~analysis.results.load_results`).
+    is damaged or has another format (:func:`~analysis.results.folder.load_results`).
     """
     if first.exists() and second.exists() and first.samefile(second):
         raise CoarticError(
@@ -154,7 +154,7 @@ def cells_frame(first: Results, second: Results) -> pd.DataFrame:
     ``high``), ``paired`` by seed where at least three are shared; ``p`` is of the two-sided
     bootstrap test, ``p_adjusted`` after Holm over all cells tested. ``verdict`` is
     ``identical`` (every run), ``equivalent``, ``undecided`` or ``different``
-    (:class:`~analysis.inference.equivalence.Equivalence`, ``margin`` in ticks), ``no interval``
+    (:class:`~analysis.statistics.equivalence.Equivalence`, ``margin`` in ticks), ``no interval``
     (fewer than three runs) or ``not compared`` (``remarks`` say why). ``SPENT_*`` are medians
     over runs, time in s.
     """

@@ -1,7 +1,7 @@
 """The optimum of each task: the best reward known, and what is proven about it.
 
 ``optimum.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids
-and the solutions; ``python -m analysis.optimum FOLDER`` makes it from the results folder of
+and the solutions; ``python -m analysis.results.optima FOLDER`` makes it from the results folder of
 that suite. Optimum runs in a results folder of the user's own count as well, so a table for
 the user's own task has gaps as soon as the task's optimum is among its runs.
 """
@@ -18,14 +18,14 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.integrity import BASE
-from analysis.results import Results, load_results
+from analysis.results.laws import BASE
+from analysis.results.folder import Results, load_results
 from coartic import CoarticError, Task
 from coartic.record import SEARCH
 from coartic.text import one_line
 
 METHODS = SEARCH  # methods that search for it
-DATA = Path(__file__).with_name("optimum.json")
+DATA = Path(__file__).with_name("optima.json")
 
 
 @dataclass(frozen=True)
@@ -175,10 +175,10 @@ def _shipped() -> dict[tuple[str, str, str], dict[str, Any]]:
 
 
 def main() -> None:
-    """``python -m analysis.optimum FOLDER``: renew entries of ``optimum.json``."""
+    """``python -m analysis.results.optima FOLDER``: renew entries of ``optimum.json``."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(
-            "usage: python -m analysis.optimum RESULTS_FOLDER\n"
+            "usage: python -m analysis.results.optima RESULTS_FOLDER\n"
             f"Renews in {DATA} what the folder's optimum runs cover; the rest stays."
         )
     try:

@@ -8,11 +8,11 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.frontier.frames import SHARES
-from analysis.inference.statistics import LEVEL, RESAMPLES, Inference
+from analysis.comparisons.frontier import SHARES
+from analysis.comparisons.overall import NEAR, everywhere
 from analysis.markup import code, escaped
 from analysis.page import Heading, Part, page
-from analysis.pairs.overall import NEAR, everywhere
+from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
 from analysis.study import Study
 from analysis.table import NONE, Table, interval, short
 from coartic.record import SEARCH
@@ -23,8 +23,8 @@ _KINDS = {"conditions": 0, "method": 1, "variant": 2}
 def comparisons_page(
     study: Study, pairs: pd.DataFrame, overall: pd.DataFrame, scores: pd.DataFrame
 ) -> str:
-    """Markdown of :func:`analysis.pairs.pairwise.pairwise_frame` and
-    :func:`analysis.pairs.overall.overall_frame`; ``scores`` is what the latter was made of."""
+    """Markdown of :func:`analysis.comparisons.pairs.pairwise_frame` and
+    ``overall_frame``; ``scores`` is what the latter was made of."""
     specification = study.results.manifest["specification"]
     parts: list[Part] = [
         Heading(1, "Methods against each other"),

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.inference.spread import sd
 from analysis.markup import escaped
-from analysis.optimum import METHODS as OPTIMUM
-from analysis.optimum import Optimum, locks_base, optima
-from analysis.results import CellRuns, Results
+from analysis.results.folder import CellRuns, Results
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.results.optima import Optimum, locks_base, optima
+from analysis.statistics.spread import sd
 from analysis.table import NONE, Table, short, tally
 from coartic.method import Information
 

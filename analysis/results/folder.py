@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.integrity import check_tables, read_manifest, read_records
+from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
 
 
@@ -83,7 +83,7 @@ def load_results(folder: Path) -> Results:
     """Read a results folder. Every command that reads one passes here.
 
     Stored solutions are executed again, and tables made again from the records (see
-    :mod:`analysis.integrity`). Raises CoarticError where the folder is not a results folder,
+    :mod:`analysis.results.laws`). Raises CoarticError where the folder is not a results folder,
     is not finished, or does not agree with itself.
     """
     if not folder.exists():

@@ -1,0 +1,1 @@
+"""Do our own tests and intervals hold what they promise? Simulations, run as commands."""

@@ -1,0 +1,1 @@
+"""Tests that claims share."""
