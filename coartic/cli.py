@@ -366,47 +366,31 @@ def analyse(
     folder: Annotated[Path, typer.Argument(help="Results folder, such as results/all.")],
 ) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
-    from analysis.claims import claims_frame, claims_page, judge
-    from analysis.comparisons.frontier import (
-        anytime_frame,
-        area_frame,
-        for_both_arms,
-        targets_frame,
-    )
+    from analysis.claims import claims_page
     from analysis.comparisons.frontier_page import frontier_page
-    from analysis.comparisons.overall import combined, overall_frame, profiles_frame
-    from analysis.comparisons.pairs import pairwise_frame
     from analysis.comparisons.pairs_page import comparisons_page
-    from analysis.results.folder import load_results
     from analysis.signatures.page import signatures_page
-    from analysis.statistics.across_tasks import scores_frame
-    from analysis.study import Study
+    from analysis.study import load
     from coartic.files import publish
 
-    results = load_results(folder)
-    study = Study(results)
-    judged, steps = judge(study), study.steps
-    pairs, scores = pairwise_frame(study), combined(scores_frame(results))
-    overall = overall_frame(scores)
-    targets = for_both_arms(targets_frame, results, steps)
-    areas = for_both_arms(area_frame, results, steps)
-    pareto = study.pareto
+    study = load(folder)
+    results = study.results
     pages = {
-        "claims.md": claims_page(results, judged),
-        "comparisons.md": comparisons_page(study, pairs, overall, scores),
-        "frontier.md": frontier_page(results, targets, areas, pareto),
+        "claims.md": claims_page(results, study.judged),
+        "comparisons.md": comparisons_page(study, study.pairs, study.overall, study.scores),
+        "frontier.md": frontier_page(results, study.targets, study.areas, study.pareto),
         "signatures.md": signatures_page(study),
     }
     frames = {
-        "claims.csv": claims_frame(judged),
-        "comparisons.csv": pairs,
-        "across_tasks.csv": overall,
-        "profiles.csv": profiles_frame(scores),
+        "claims.csv": study.claims,
+        "comparisons.csv": study.pairs,
+        "across_tasks.csv": study.overall,
+        "profiles.csv": study.profiles,
         "signatures.csv": study.signatures.drop(columns="label"),
-        "anytime.csv": anytime_frame(results, steps),
-        "targets.csv": targets,
-        "areas.csv": areas,
-        "pareto.csv": pareto,
+        "anytime.csv": study.anytime,
+        "targets.csv": study.targets,
+        "areas.csv": study.areas,
+        "pareto.csv": study.pareto,
     }
     pages |= {name: frame.to_csv(index=False) for name, frame in frames.items()}
     files = {name: text.encode() for name, text in pages.items()}
@@ -417,7 +401,7 @@ def analyse(
         ("claim", "verdict", "statement"),
         [
             (entry.claim.id, entry.verdict + " †" * entry.claim.fitted, entry.claim.statement)
-            for entry in judged
+            for entry in study.judged
         ],
     )
     _say(f"In {folder}: {', '.join(pages)}.")
@@ -542,11 +526,10 @@ def report(
     """
     from analysis.report.build import build, write
     from analysis.report.write import check_report_folder
-    from analysis.results.folder import load_results
-    from analysis.study import Study
+    from analysis.study import load
 
     started = time.monotonic()
-    study = Study(load_results(folder))
+    study = load(folder)
     out = folder / "report" if out is None else out
     check_report_folder(out, folder)
     made = build(

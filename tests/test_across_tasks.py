@@ -11,7 +11,7 @@ from scipy import stats
 from analysis.comparisons.overall import profiles_frame
 from analysis.statistics import across_tasks
 from analysis.statistics import estimates as statistics
-from tests.test_comparison import fake_results
+from tests.support.made_up import fake_results
 
 
 def test_normalised_scores_and_gaps():

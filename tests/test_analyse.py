@@ -12,9 +12,8 @@ from analysis.results.folder import load_results
 from analysis.signatures.page import signatures_page
 from analysis.statistics.estimates import holm
 from analysis.study import Study
-
-from .test_cli import call
-from .test_harness import run_and_write, suite_of
+from tests.support.commands import call
+from tests.support.suites import run_and_write, suite_of
 
 WRITTEN = {
     "claims.md", "frontier.md", "signatures.md", "signatures.csv", "anytime.csv", "targets.csv",

@@ -25,9 +25,8 @@ from coartic import (
     trajectory,
 )
 from coartic.record import decode, encode, solved
-
-from .test_cli import BROKEN, call
-from .test_harness import run_and_write
+from tests.support.commands import call
+from tests.support.suites import BROKEN, run_and_write
 
 TASK = load_task("two-armed-1")
 

@@ -12,8 +12,7 @@ from coartic import PAPER, execute, load_task
 from coartic.robot import directions
 from coartic.solution import Movement
 from coartic.task import hands_of
-
-from .strategies import changed
+from tests.support.strategies import changed
 
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 

@@ -25,9 +25,8 @@ from benchmarks.registry import BUILT_IN, registry
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
 from coartic.record import Commit
-
-from .test_cli import BROKEN, call
-from .test_harness import run_and_write
+from tests.support.commands import call
+from tests.support.suites import BROKEN, run_and_write
 
 ROOT = Path(__file__).parent.parent
 BIB = references()

@@ -28,10 +28,9 @@ from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
 from coartic.cli import app
-
-from .strategies import changed
-from .test_harness import run_and_write
-from .test_methods_table import row
+from tests.support.made_up import row
+from tests.support.strategies import changed
+from tests.support.suites import run_and_write
 
 NOTHING = Results(
     None, {"specification": {"tasks": {}, "cells": []}}, pd.DataFrame(), pd.DataFrame()

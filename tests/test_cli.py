@@ -9,26 +9,13 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.store import Store
-from coartic import __version__, cli
+from coartic import __version__
 from coartic.files import LISTING
 from coartic.record import run_seed
+from tests.support.commands import call
+from tests.support.suites import BROKEN, ROOT
 
 from .attacks.inputs import GOOD
-
-ROOT = Path(__file__).parent.parent
-BROKEN = ROOT / "tests" / "plugins" / "broken.py"
-
-
-def call(monkeypatch, capsys, *arguments):
-    """Exit code, standard output, standard error."""
-    monkeypatch.setattr(sys, "argv", ["coartic", *map(str, arguments)])
-    try:
-        cli.main()
-        code = 0
-    except SystemExit as stop:
-        code = stop.code or 0
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def test_run_paper(monkeypatch, capsys, tmp_path):

@@ -1,7 +1,6 @@
 """The comparison with the paper: its statistics against independent ones."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from analysis.comparisons.paper import Comparison, Table, compare
@@ -13,10 +12,10 @@ from analysis.published import (
     published_exhaustive,
     published_initial,
 )
-from analysis.results.folder import Results
 from benchmarks.registry import registry
 from benchmarks.suites import load_suite, select_cells
 from coartic import load_task
+from tests.support.made_up import fake_results
 
 
 def test_published_numbers():
@@ -45,32 +44,6 @@ def test_pooling_groups_gives_mean_and_sd_of_all():
     assert summary.sd == pytest.approx(together.std(ddof=1))
     assert summary.runs == 20
     assert summary.derived
-
-
-def fake_results(tmp_path, runs):
-    manifest = {
-        "specification": {
-            "suite": "paper", "runs": 3, "trials": 10_000, "seed": 0,
-            "tasks": {"two-armed-1": load_task("two-armed-1").model_dump(mode="json")},
-            "cells": [{"task": "two-armed-1", "method": "dual-process/EC2", "variant": ""}],
-        },
-        "environment": {
-            "coartic": "0", "commit": {"id": "abc", "dirty": True}, "model_code": "code",
-            "python": "3", "platform": "here", "date": "today",
-        },
-    }  # fmt: skip
-    frame = pd.DataFrame(runs).assign(
-        task="two-armed-1", method="dual-process/EC2", variant="", commit="abc", packages="p"
-    )
-    frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
-    frame = frame.assign(
-        told="corrective process, reward by trial", parameters="{}", other_arm_travel=1.0,
-        movement_ticks=1, forward_kinematics=1, jacobians=1, solver_iterations=0, build_s=0.0,
-        solve_s=0.1, wall_s=0.2, warm=True, solution_corrections=0, proven_bound=None,
-    )  # fmt: skip
-    frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
-    sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
-    return Results(tmp_path, manifest, frame, sequences)
 
 
 def test_cells_and_sequences(tmp_path):

@@ -10,10 +10,9 @@ from benchmarks.conformance import check_method, check_task_file
 from benchmarks.harness import record_of
 from benchmarks.registry import registry
 from coartic.task import TASK_FOLDER
+from tests.support.suites import InProcess, spec_of
 
 from .attacks.inputs import GOOD
-from .test_harness import InProcess
-from .test_sandbox import spec_of
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
 KNOWN = registry([BROKEN])

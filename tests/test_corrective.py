@@ -10,8 +10,7 @@ from coartic import PAPER, MotionModel, Robot, correct, reference
 from coartic.corrective import shift_kernel
 from coartic.movement import scratch_for
 from coartic.robot import HANDS
-
-from .strategies import UNEVEN, configurations
+from tests.support.strategies import UNEVEN, configurations
 
 ROBOT = Robot()
 

@@ -24,9 +24,8 @@ import pytest
 from benchmarks import cluster as cluster_module
 from benchmarks.cluster import Dask
 from coartic import CoarticError
-
-from .test_cli import call
-from .test_harness import paper_cells, run_and_write, same_tables
+from tests.support.commands import call
+from tests.support.suites import paper_cells, run_and_write, same_tables
 
 LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 

@@ -26,10 +26,8 @@ from analysis.statistics.estimates import (
     standard_error,
 )
 from coartic import load_task
-
-from .test_cli import call
-from .test_harness import InProcess
-from .test_report_folders import undrawn  # noqa: F401
+from tests.support.commands import call
+from tests.support.suites import InProcess
 
 STUCK = """
 name = "stuck"
@@ -103,7 +101,7 @@ def shown(text):
 
 
 @pytest.mark.parametrize("name", FOLDERS)
-def test_every_command(name, folders, monkeypatch, capsys, tmp_path, undrawn):  # noqa: F811
+def test_every_command(name, folders, monkeypatch, capsys, tmp_path, undrawn):
     folder = folders(name, monkeypatch, capsys)
     other = folders("one of all", monkeypatch, capsys)
     copy = shutil.copytree(folder, tmp_path / "copy")

@@ -33,8 +33,7 @@ from analysis.study import Study
 from benchmarks.suites import load_suite, select_cells
 from coartic import CoarticError, corrective_trial, execute, load_task
 from coartic.frames import movements_from
-
-from .test_harness import KNOWN, run_and_write
+from tests.support.suites import KNOWN, run_and_write
 
 
 @pytest.fixture(scope="module")

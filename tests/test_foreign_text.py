@@ -41,12 +41,10 @@ from benchmarks.store import Store
 from benchmarks.suites import Cell
 from coartic import CoarticError, cli, load_task
 from coartic.text import json_text, one_line, plain, printed, shell_line
-
-from .strategies import tiny_task
-from .test_cli import call
-from .test_harness import KNOWN, run_and_write
-from .test_report import Page
-from .test_traces import with_environment
+from tests.support.commands import call
+from tests.support.reports import Page
+from tests.support.strategies import tiny_task
+from tests.support.suites import KNOWN, run_and_write, with_environment
 
 HTML = "<img src=x onerror=alert(1)></script><script>alert(1)</script>&lt;b&gt;<!--"
 LINKS = (

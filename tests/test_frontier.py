@@ -27,8 +27,7 @@ from analysis.comparisons.frontier_page import (
 from analysis.comparisons.progress import SPENDS, by_trial, progress
 from analysis.results.folder import Results
 from coartic import load_task
-
-from .strategies import tiny_task
+from tests.support.strategies import tiny_task
 
 BEST = -465  # proven optimum of two-armed 1
 NAN = math.nan

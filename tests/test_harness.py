@@ -14,7 +14,6 @@ from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
 from benchmarks.declaration import declared
 from benchmarks.executors import Local
-from benchmarks.harness import perform_plan
 from benchmarks.registry import CLASSES, Entry, registry
 from benchmarks.specification import Limits
 from benchmarks.store import Store
@@ -22,7 +21,6 @@ from benchmarks.suites import (
     Cell,
     distinct,
     load_suite,
-    manifest_of,
     run_specs,
     select_cells,
     suites,
@@ -35,38 +33,15 @@ from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
 from coartic.method import Information, Parameters, Session
 from coartic.record import run_seed
-from coartic.tables import FORMAT, RUNS, TIMINGS
-
-from .strategies import tiny_task
+from coartic.tables import FORMAT, RUNS
+from tests.support.strategies import tiny_task
+from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables, suite_of
 
 FIRST_COLUMNS = [
     *"run_id suite task method variant run seed status reason hands reward".split(),
     *"replay_reward replay_hands initial_reward initial_hands best_trial trials".split(),
 ]
-KNOWN = registry()
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
-
-
-class InProcess:
-    """An executor without processes, for tests of everything else."""
-
-    def perform(self, jobs):
-        for job in jobs:
-            said = {"error": None, "answer": perform(json.loads(json.dumps(job)))}
-            yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
-
-
-def paper_cells(**selection):
-    return select_cells(load_suite("paper"), KNOWN, **selection)
-
-
-def run_and_write(folder, cells=None, runs=2, trials=150, seed=0, executor=None, **options):
-    limits = options.pop("limits", Limits(300.0))
-    planned = run_specs(cells or paper_cells(), runs=runs, seed=seed, trials=trials, limits=limits)
-    store = Store(folder)
-    perform_plan([spec for _, spec in planned], store, executor or InProcess(), **options)
-    write_tables(store, manifest_of(load_suite("paper"), runs, seed, planned, limits))
-    return load_results(folder)
 
 
 @pytest.fixture(scope="module")
@@ -165,15 +140,6 @@ def test_tables_do_not_depend_on_executor_or_workers(results, tmp_path):
     for jobs in (1, 3):
         again = run_and_write(tmp_path / str(jobs), executor=Local(jobs))
         same_tables(again, results)
-
-
-def same_tables(a, b):
-    pd.testing.assert_frame_equal(
-        a.runs.drop(columns=list(TIMINGS)), b.runs.drop(columns=list(TIMINGS))
-    )
-    for table in ("solutions", "paths", "learning"):
-        pd.testing.assert_frame_equal(getattr(a, table)(), getattr(b, table)())
-    pd.testing.assert_frame_equal(a.sequences, b.sequences)
 
 
 def test_a_cell_does_not_depend_on_its_company(results, tmp_path):
@@ -293,13 +259,6 @@ def test_suite_files_that_cannot_be_used(block, words, tmp_path):
     with pytest.raises(CoarticError) as caught:
         select_cells(load_suite(str(path)), KNOWN)
     assert words in str(caught.value)
-
-
-def suite_of(tmp_path, *blocks):
-    path = tmp_path / "own.toml"
-    head = 'title = "x"\ndescription = "x"\nruns = 3\ntrials = 30\n'
-    path.write_text(head + "".join(f"[[cells]]\n{block}\n" for block in blocks))
-    return select_cells(load_suite(str(path)), KNOWN)
 
 
 def test_cells_are_told_apart_by_their_parameters(tmp_path):

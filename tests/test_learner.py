@@ -23,8 +23,7 @@ from coartic import (
 )
 from coartic.learner import TRIALS
 from coartic.robot import HANDS
-
-from .strategies import PAPER_CELLS, UNEVEN, tiny_task
+from tests.support.strategies import PAPER_CELLS, UNEVEN, tiny_task
 
 
 def same_run(a, b):

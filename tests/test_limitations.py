@@ -13,7 +13,15 @@ from analysis.report.limitations import limitations
 from analysis.study import Study
 from coartic import load_task
 
-from .test_traces import results, study  # noqa: F401 (fixtures)
+
+@pytest.fixture(scope="module")
+def study(traced):
+    return traced
+
+
+@pytest.fixture(scope="module")
+def results(traced):
+    return traced.results
 
 
 def said(of):
@@ -42,7 +50,7 @@ def of_tasks(of, *tasks):
 
 
 @pytest.fixture
-def clean(study):  # noqa: F811
+def clean(study):
     """One one-armed task, all at one clean commit."""
     one = of_tasks(study, load_task("ascending"))
     runs = one.results.runs.assign(commit="a" * 40)
@@ -61,7 +69,7 @@ def test_a_clean_folder(clean):
     assert "The paper has 20 runs a cell; here are 4." in " ".join(limitations(clean))
 
 
-def test_reconstructed_and_chosen_tasks(study, clean):  # noqa: F811
+def test_reconstructed_and_chosen_tasks(study, clean):
     found = said(study)
     assert "two-armed-1" in found["Reconstructed"]
     assert "goals (" in found["Reconstructed"]
@@ -151,7 +159,7 @@ def welch_power(difference, sd, n):
     return stats.nct.sf(stats.t.ppf(0.95, freedom), freedom, difference / (sd * (2 / n) ** 0.5))
 
 
-def test_differences_that_are_found(study):  # noqa: F811
+def test_differences_that_are_found(study):
     """Each printed difference is found with probability 80 %, by the rewards of the runs."""
     (text,) = (t for t in limitations(study) if "a one-tailed t-test at 5 % finds" in t)
     assert "with probability 80 %" in text
@@ -188,7 +196,7 @@ def test_few_runs(clean):
     assert "t-test" not in " ".join(limitations(one))
 
 
-def test_optima(study, clean):  # noqa: F811
+def test_optima(study, clean):
     assert not {"No optimum", "Optimum not proven"} & set(said(clean))
     own = load_task("ascending").model_copy(update={"radius": 0.2})
     assert "known of ascending: no gaps" in said(of_tasks(study, own))["No optimum"]

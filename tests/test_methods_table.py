@@ -11,19 +11,8 @@ from analysis.results.folder import Results
 from analysis.results.optima import optima
 from coartic import load_task
 from coartic.method import Information
-
-from .strategies import changed
-
-
-def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
-    return {
-        "task": task, "method": method, "variant": "", "run": run, "status": status,
-        "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
-        "told": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
-        "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
-        "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "warm": run > 0,
-        "solution_corrections": 0, "other_arm_travel": travel, "proven_bound": None, **more,
-    }  # fmt: skip
+from tests.support.made_up import row
+from tests.support.strategies import changed
 
 
 def results(rows, tmp_path, task=None):

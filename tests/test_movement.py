@@ -11,8 +11,7 @@ from coartic import PAPER, MotionModel, Robot, move, reference
 from coartic.compiled import entry, joint_chain
 from coartic.movement import _clear_steps, follow
 from coartic.robot import HANDS
-
-from .strategies import UNEVEN, configurations
+from tests.support.strategies import UNEVEN, configurations
 
 ROBOT = Robot()
 

@@ -24,8 +24,7 @@ from baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
 from benchmarks import qp_solvers
 from coartic import PAPER, Robot, execute, load_task
 from coartic.method import MethodError, Session
-
-from .strategies import configurations, tiny_task
+from tests.support.strategies import configurations, tiny_task
 
 ROBOT = Robot()
 NOTHING = np.zeros(ROBOT.dof)

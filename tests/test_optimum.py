@@ -14,8 +14,7 @@ from coartic import builtin_tasks, execute, load_task
 from coartic.frames import movement_rows, movements_from
 from coartic.method import MethodError, Session
 from coartic.solution import other_arm_travel
-
-from .strategies import changed
+from tests.support.strategies import changed
 
 SOLVED = [entry for entry in entries() if "reward" in entry]
 

@@ -18,9 +18,8 @@ from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import load_task
-
-from .test_harness import run_and_write
-from .test_methods_table import row
+from tests.support.made_up import row
+from tests.support.suites import run_and_write
 
 T1, T2 = "two-armed-1", "two-armed-2"
 EC4 = [-484, -482, -486, -483, -485, -487, -481, -484]

@@ -19,8 +19,7 @@ from analysis.signatures.cell import Cell
 from analysis.study import Study
 from coartic import Movement, Robot, corrective_trial, load_task, trajectory
 from coartic.robot import HANDS
-
-from .test_harness import run_and_write
+from tests.support.suites import run_and_write
 
 # Reads tasks as the page does and says where everything is at every tick.
 DRIVER = """

@@ -12,8 +12,7 @@ from scipy.optimize import minimize
 from baselines.posture_based import OneGoal, TwoGoals
 from coartic import Robot, execute, load_task
 from coartic.method import MethodError, Session
-
-from .strategies import UNEVEN, tiny_task
+from tests.support.strategies import UNEVEN, tiny_task
 
 ACCURACY = 0.09  # θ^g − θ^a
 STEP = 0.01  # m

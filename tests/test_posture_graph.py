@@ -7,8 +7,7 @@ import pytest
 
 from baselines.posture_graph import PostureGraph, Spent, sample_postures, spread_out
 from coartic import load_task
-
-from .strategies import changed
+from tests.support.strategies import changed
 
 TASKS = {
     "two-armed-2": load_task("two-armed-2"),

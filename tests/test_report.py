@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from html.parser import HTMLParser
 from importlib.resources import files
 
 import numpy as np
@@ -39,6 +38,7 @@ from analysis.report.text import number_text, parts, typographic
 from analysis.report.write import write_report
 from coartic import CoarticError
 from coartic.files import LISTING
+from tests.support.reports import Page
 
 LEARNER, OPTIMUM = ("shelf", "dual-process/EC4 noise_sd=0.1"), ("shelf", "optimum/multistart")
 NASTY = 'a_b & <i>50 %</i> #1 {x} ~ ^ $ \\ "q" -- − – — ± † ΔV ε ≤ [z] *s* `c` | 10⁻³ é 漢'
@@ -148,37 +148,6 @@ def test_numbers(value, kind, digits, ascii_text, shown):
     found = number_text(value, Column("a", "a", kind, digits=digits))
     assert found == ascii_text
     assert typographic(found) == shown
-
-
-class Page(HTMLParser):
-    """A strict reader of the page: elements must nest, and nothing may be asked for."""
-
-    EMPTY = frozenset(("meta", "link", "wbr", "path", "use", "input"))
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.elements, self.texts = [], [], []
-        self.feed(text)
-        assert not self.open
-
-    def handle_starttag(self, tag, attributes):
-        assert len(dict(attributes)) == len(attributes), "an attribute given twice"
-        self.elements.append((tag, dict(attributes)))
-        if tag not in self.EMPTY:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-
-    def handle_endtag(self, tag):
-        if tag not in self.EMPTY:
-            assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.texts.append((self.open[-1] if self.open else "", data))
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.elements if name == tag]
 
 
 def test_html_is_one_accessible_page():

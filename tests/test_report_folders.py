@@ -16,22 +16,10 @@ from analysis.study import Study
 from benchmarks.suites import Cell, load_suite, select_cells
 from coartic import CoarticError, builtin_tasks
 from coartic.cli import _labels
-
-from .strategies import tiny_task
-from .test_cli import call
-from .test_harness import KNOWN, run_and_write
-from .test_traces import SVG, compiled, report_of, with_environment
-from .test_versions import Failing
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Reports without figures, which take long and have tests of their own."""
-    monkeypatch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
-    monkeypatch.setattr(
-        analysis.report.build, "rendered",
-        lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
-    )  # fmt: skip
+from tests.support.commands import call
+from tests.support.reports import compiled, report_of
+from tests.support.strategies import tiny_task
+from tests.support.suites import KNOWN, Failing, run_and_write, with_environment
 
 
 def test_letters_alone():

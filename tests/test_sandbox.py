@@ -21,6 +21,7 @@ from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import Cell, run_specs
 from coartic import CoarticError, load_task
+from tests.support.suites import spec_of
 
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
@@ -29,11 +30,6 @@ BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 @pytest.fixture(scope="module")
 def known():
     return registry([BROKEN])
-
-
-def spec_of(known, name, limits=Limits(60.0), runs=1):  # noqa: B008
-    cell = Cell(load_task("ascending"), known[name])
-    return [spec for _, spec in run_specs([cell], runs=runs, seed=0, trials=5, limits=limits)]
 
 
 def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path):

@@ -49,8 +49,7 @@ from analysis.signatures.subtasks import (
 from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
 from coartic.frames import movement_rows
 from coartic.solution import other_arm_travel
-
-from .strategies import changed, tiny_task
+from tests.support.strategies import changed, tiny_task
 
 
 def rng(seed=1):

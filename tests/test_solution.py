@@ -13,8 +13,7 @@ from coartic import (
     learn,
     load_task,
 )
-
-from .strategies import PAPER_CELLS, tiny_task
+from tests.support.strategies import PAPER_CELLS, tiny_task
 
 
 @pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)

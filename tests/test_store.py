@@ -14,8 +14,7 @@ from benchmarks.specification import Limits
 from benchmarks.store import Damage, RecordError, Store
 from benchmarks.suites import run_specs
 from coartic import CoarticError, files
-
-from .test_harness import InProcess, paper_cells
+from tests.support.suites import InProcess, paper_cells
 
 ROOT = Path(__file__).parent.parent
 

@@ -17,9 +17,9 @@ from coartic import (
     load_task,
 )
 from coartic.task import TASK_FOLDER, parse_task
+from tests.support.strategies import tiny_task
 
 from .attacks.inputs import GOOD, TASKS
-from .strategies import tiny_task
 
 
 def write(tmp_path, text):

@@ -15,8 +15,7 @@ from coartic import (
 )
 from coartic.errors import SolutionError
 from coartic.reference import move as reference_move
-
-from .strategies import PAPER_CELLS, UNEVEN, configurations, tiny_task
+from tests.support.strategies import PAPER_CELLS, UNEVEN, configurations, tiny_task
 
 
 def agrees(task, movements):

@@ -5,26 +5,33 @@ import random
 import re
 import shutil
 import statistics as plain
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import analysis.report.build
-from analysis.report.build import build, write
 from analysis.report.trace import FILE, trace, trace_text
 from analysis.results import optima as shipped
 from analysis.results.folder import load_results
-from analysis.results.laws import read_manifest
 from analysis.results.optimum_source import optimum_sources
 from analysis.statistics import estimates as statistics
 from analysis.study import Study
 from benchmarks.suites import Cell
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
+from tests.support.reports import compiled, report_of
+from tests.support.suites import KNOWN, run_and_write, with_environment
 
-from .test_harness import KNOWN, run_and_write
+
+@pytest.fixture(scope="module")
+def study(traced):
+    return traced
+
+
+@pytest.fixture(scope="module")
+def results(traced):
+    return traced.results
+
 
 TASKS = {"Ascending": "ascending", "Descending": "descending", "TwoArmedOne": "two-armed-1"}
 LABELS = {
@@ -54,87 +61,9 @@ SIGNATURES = {
 }
 
 
-def with_environment(folder):
-    """The folder as if somebody had asked for it by the command line, at home."""
-    manifest = read_manifest(folder)
-    command = ("coartic", "run", "paper", "--out", "/home/somebody/results/x")
-    environment = manifest.environment.model_copy(update={"command": command})
-    manifest = manifest.model_copy(update={"environment": environment})
-    (folder / "manifest.json").write_text(manifest.text(), encoding="utf-8")
-    return load_results(folder)
-
-
-def cells():
-    found = [
-        Cell(load_task(task), KNOWN[method])
-        for task, methods in (
-            ("ascending", ["dual-process/EC1", "trajectory-optimisation/path-length"]),
-            ("descending", ["dual-process/EC1", "corrective-alone/given"]),
-            ("two-armed-1", ["dual-process/EC3", "dual-process/EC4", "corrective-alone/given",
-                             "random-search/pure"]),
-        )
-        for method in methods
-    ]  # fmt: skip
-    return [*found, Cell(found[-1].task, KNOWN["dual-process/EC4"], (("noise_sd", 0.1),))]
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("traces") / "results"
-    run_and_write(folder, cells(), runs=4, trials=150)
-    return with_environment(folder)
-
-
-@pytest.fixture(scope="module")
-def study(results):
-    return Study(results)
-
-
-LATEX = r"""\documentclass{article}
-\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
-\usepackage{booktabs,siunitx,graphicx,longtable}
-\hfuzz=1pt
-\input{numbers.tex}
-\begin{document}
-%s
-\input{tables.tex}
-\end{document}
-"""
-
-
-SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
-
-
-def report_of(study, folder):
-    """A report whose figures are empty: drawing takes long, and has tests of its own."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
-        patch.setattr(
-            analysis.report.build, "rendered",
-            lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
-        )  # fmt: skip
-        write(build(study), study, folder)
-    return folder
-
-
 @pytest.fixture(scope="module")
 def home(study):
     return report_of(study, study.results.folder / "report")
-
-
-def compiled(folder, body=""):
-    """The log of a document with all macros and tables; skips where LaTeX is missing."""
-    if not shutil.which("pdflatex"):
-        pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty", "geometry.sty"]
-    if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip("booktabs, siunitx, graphicx or geometry is not installed")
-    (folder / "paper.tex").write_text(LATEX % body, encoding="utf-8")
-    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=120)
-    log = done.stdout.decode(errors="replace")
-    assert done.returncode == 0, log[-2000:]
-    return log
 
 
 def test_tables_are_legible(home, tmp_path):

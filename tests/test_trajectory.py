@@ -20,8 +20,7 @@ from baselines.trajectory_problem import (
 from baselines.whole_ticks import Rounding, movements
 from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.method import MethodError, Session
-
-from .strategies import changed
+from tests.support.strategies import changed
 
 ORDERS = {"acceleration": 2, "jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))

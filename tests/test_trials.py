@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from coartic import MotionModel, Movement, corrective_trial, execute, hand_sequences, load_task
 from coartic.task import builtin_tasks, hands_of
 from coartic.trials import make_trials
-
-from .strategies import UNEVEN, tiny_task
+from tests.support.strategies import UNEVEN, tiny_task
 
 TASKS = [
     *map(load_task, builtin_tasks()),

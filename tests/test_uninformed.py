@@ -10,8 +10,7 @@ from baselines import cma_es, random_search
 from baselines.uninformed import TOLD, Attempt, Practice, UninformedParameters
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.method import MethodError, Session
-
-from .strategies import tiny_task
+from tests.support.strategies import tiny_task
 
 METHODS = (*random_search.METHODS, *cma_es.METHODS)
 ONE_GOAL = tiny_task(

@@ -16,13 +16,11 @@ from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
 from analysis.statistics.equivalence import MARGIN
 from benchmarks.registry import registry
-from benchmarks.sandbox import failure
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
 from coartic.tables import FORMAT
-
-from .test_cli import call
-from .test_harness import InProcess, run_and_write
+from tests.support.commands import call
+from tests.support.suites import Failing, InProcess, run_and_write
 
 RUNS = 6
 OUTCOME = ["status", "reward", "hands"]
@@ -48,20 +46,6 @@ def planted(first, edit=lambda runs: runs, manifest=lambda content: None):
     other = (runs[OUTCOME].astype(str) != old).any(axis=1)
     runs.loc[other, "result"] += "-other"
     return replace(first, runs=runs, manifest=content)
-
-
-class Failing(InProcess):
-    """An executor that loses the workers of some runs, by their number in the plan."""
-
-    def __init__(self, *numbers):
-        self.numbers = numbers
-
-    def perform(self, jobs):
-        for number, job in enumerate(jobs):
-            if number in self.numbers:
-                yield failure(job["run_id"], "crashed", "exit code 9", 1.0)
-            else:
-                yield from super().perform([job])
 
 
 def of(runs, method=LEARNED):

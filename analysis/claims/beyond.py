@@ -27,8 +27,7 @@ from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.published import published_cell
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.equivalence import MARGIN, difference
-from analysis.statistics.estimates import LEVEL, Inference, difference_of_means, mean
-from analysis.study import SEED
+from analysis.statistics.estimates import LEVEL, SEED, Inference, difference_of_means, mean
 from analysis.table import NONE, Table, interval, short
 from coartic.method import Information
 
@@ -77,7 +76,7 @@ def _experience(data: Data) -> Finding:
     reached = {
         (row["task"], row["method"]): row
         for arm in ("free", "still")
-        for row in targets_frame(data.results, data.study.steps, other_arm=arm, shares=(NEAR,))
+        for row in targets_frame(data.results, data.study.progress, other_arm=arm, shares=(NEAR,))
         .query("spend == 'trials'")
         .to_dict("records")
     }

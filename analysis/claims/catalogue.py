@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from analysis.claims.beyond import BEYOND
 from analysis.claims.coarticulation import COARTICULATION
@@ -12,7 +13,9 @@ from analysis.claims.one_armed import ONE_ARMED
 from analysis.claims.register import Claim, Judged, judge_claims
 from analysis.claims.two_armed_1 import TWO_ARMED_1
 from analysis.claims.two_armed_2 import TWO_ARMED_2
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 CLAIMS: tuple[Claim, ...] = (
     *ONE_ARMED, *TWO_ARMED_1, *TWO_ARMED_2, *CONDITIONS, *COARTICULATION, *GENERAL, *BEYOND

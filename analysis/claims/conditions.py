@@ -10,12 +10,12 @@ from scipy import stats
 from analysis.claims.data import ONE, TWO, Data
 from analysis.claims.register import Claim, Finding
 from analysis.statistics.estimates import (
+    SEED,
     Inference,
     bootstrap_test,
     difference_of_means,
     probability_of_improvement,
 )
-from analysis.study import SEED
 from analysis.table import interval, tally
 from coartic.robot import Array
 

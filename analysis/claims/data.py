@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -14,11 +14,13 @@ from analysis.results.folder import Results
 from analysis.signatures.cell import Cell
 from analysis.signatures.recruitment import best_sequences
 from analysis.statistics.estimates import FEWEST
-from analysis.study import Study
 from coartic import Execution, Task, corrective_trial, initial_hands
 from coartic.errors import NotApplicableError
 from coartic.method import Information
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 ASCENDING, DESCENDING = "ascending", "descending"
 ONE, TWO = "two-armed-1", "two-armed-2"

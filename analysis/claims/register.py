@@ -15,12 +15,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from analysis.claims.data import Data, MissingError
 from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference, holm
-from analysis.study import Study
 from analysis.table import Table
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
 Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]

@@ -21,8 +21,7 @@ from analysis.claims.judges.shares import (
 from analysis.claims.register import Claim, Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
-from analysis.statistics.estimates import FEWEST, bootstrap_test, mean
-from analysis.study import SEED
+from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean
 from analysis.table import interval, tally
 from coartic.robot import Array
 

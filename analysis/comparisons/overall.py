@@ -17,8 +17,7 @@ import pandas as pd
 from analysis.comparisons.methods import LEARNER
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.across_tasks import by_task, interquartile_mean, profile, task_mean
-from analysis.statistics.estimates import FEWEST, Inference
-from analysis.study import SEED
+from analysis.statistics.estimates import FEWEST, SEED, Inference
 from coartic.robot import Array
 
 NEAR = (0.01, 0.02, 0.05, 0.1)

@@ -20,7 +20,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -30,6 +30,7 @@ from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.results.folder import CellRuns
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import (
+    SEED,
     Inference,
     bootstrap_test,
     cliffs_delta,
@@ -43,9 +44,11 @@ from analysis.statistics.estimates import (
 )
 from analysis.statistics.power import runs_needed, smallest_difference
 from analysis.statistics.spread import sd
-from analysis.study import SEED, Study
 from coartic.exploration import CONDITIONS
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 SPENDS = {
     "trials": ("trials",),

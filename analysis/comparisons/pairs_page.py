@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -13,9 +13,11 @@ from analysis.comparisons.overall import NEAR, everywhere
 from analysis.markup import code, escaped
 from analysis.page import Heading, Part, page
 from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
-from analysis.study import Study
 from analysis.table import NONE, Table, interval, short
 from coartic.record import SEARCH
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 _KINDS = {"conditions": 0, "method": 1, "variant": 2}
 

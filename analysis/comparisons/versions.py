@@ -23,13 +23,13 @@ from analysis.results.folder import CellRuns, Results, load_results
 from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
 from analysis.statistics.estimates import (
     FEWEST,
+    SEED,
     bootstrap_test,
     difference_of_means,
     holm,
     paired_by_seed,
     paired_difference,
 )
-from analysis.study import SEED
 from analysis.table import NONE, Table
 from coartic import CoarticError
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from analysis.figures.bars import bars
 from analysis.figures.configurations import paper_configurations
@@ -17,8 +18,10 @@ from analysis.figures.recruitment import recruitment
 from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_plot
-from analysis.study import Study
 from coartic import CoarticError
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -30,8 +30,10 @@ from analysis.figures.style import (
     styled,
 )
 from analysis.published import Summary, published_cell, published_initial
-from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, bootstrap_test, holm, mean
-from analysis.study import SEED, Study
+from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, bootstrap_test, holm, mean
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -15,11 +16,13 @@ from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.figures.selection import missing, solved
 from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, short, styled
 from analysis.signatures.cell import Cell
-from analysis.study import Study
 from coartic import CoarticError, Execution, Task, execute
 from coartic.frames import movements_from
 from coartic.robot import Array
 from coartic.task import hands_of
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 Rows = Sequence[tuple[str, Sequence[str]]]
 PAPER: dict[str, tuple[str, Rows]] = {

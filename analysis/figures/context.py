@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -30,7 +31,9 @@ from analysis.figures.style import (
 )
 from analysis.signatures.register import CONTEXT
 from analysis.statistics.estimates import holm
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 MOST = 6
 _PARTS = {CONTEXT[2]: "equivalent", CONTEXT[3]: "other"}

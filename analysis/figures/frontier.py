@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -30,8 +31,10 @@ from analysis.figures.style import (
 )
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import CONFIDENCE
-from analysis.study import Study
 from coartic import Task
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 NAMES = {
     "trials": "physical trials",
@@ -62,7 +65,7 @@ def frontier(
     labels = [
         label for label in chosen(study, list(found), methods) if not label.startswith(OPTIMUM)
     ]
-    frame = anytime_frame(study.results, study.steps)
+    frame = anytime_frame(study.results, study.progress)
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
     pareto = study.pareto
     front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]

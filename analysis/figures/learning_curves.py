@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -27,9 +28,11 @@ from analysis.figures.style import (
     short,
     styled,
 )
-from analysis.study import Study
 from coartic import CoarticError, Task
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 WINDOW = 100
 """Trials over which the reward of trials is averaged."""

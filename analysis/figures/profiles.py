@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -13,10 +14,12 @@ from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
 from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, short, styled
 from analysis.statistics.across_tasks import by_task, profile, scores_frame
-from analysis.statistics.estimates import CONFIDENCE
-from analysis.study import SEED, Study
+from analysis.statistics.estimates import CONFIDENCE, SEED
 from coartic import CoarticError
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 LEARNER = "learner"
 """The paper's learner on all tasks: EC1 where there is one hand, EC4 where there are two."""

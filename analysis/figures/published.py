@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -29,7 +29,9 @@ from analysis.figures.style import (
 from analysis.published import TRIALS, Summary, published_cell
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import CONFIDENCE
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 _MARKS = {
     "equivalent": (BLUE, "o", BLUE),

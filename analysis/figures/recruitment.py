@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -25,8 +26,10 @@ from analysis.figures.style import (
     styled,
 )
 from analysis.published import RUNS, published_cell
-from analysis.study import Study
 from coartic import Task
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 MOST = len(PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""

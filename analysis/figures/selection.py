@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from analysis.results.folder import CellRuns
-from analysis.study import Study
 from coartic import CoarticError, Task
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 CONDITIONS = tuple(f"dual-process/EC{number}" for number in range(1, 5))
 HEADLINES = (

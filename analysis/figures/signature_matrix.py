@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,8 +17,10 @@ from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, has, known_tasks, missing
 from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, short, styled
 from analysis.slugs import slugs
-from analysis.study import Study
 from coartic import Task
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 SIGNATURES = {
     "first subtask against initial": "first subtask (ticks)",

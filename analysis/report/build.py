@@ -6,15 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.claims import judge
 from analysis.claims.page import FITTED
 from analysis.claims.register import Judged
-from analysis.comparisons.frontier import area_frame, for_both_arms, targets_frame
-from analysis.comparisons.overall import combined, overall_frame
-from analysis.comparisons.pairs import pairwise_frame
 from analysis.figures import Figures, Plot, all_figures
 from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.markup import escaped, words
@@ -39,10 +36,11 @@ from analysis.report.summary import tasks_table, unlike_printed, verdicts, witho
 from analysis.report.trace import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
-from analysis.statistics.across_tasks import scores_frame
-from analysis.study import Study
 from analysis.table import Table
 from coartic import CoarticError
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 MOST_TASKS = 8
 """More would make a report that nobody reads."""
@@ -87,9 +85,7 @@ def build(
     figures = all_figures(study, MOST_TASKS, methods)
     numbers = tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
-    judged = judge(study)
-    pairs = pairwise_frame(study)
-    scores = combined(scores_frame(study.results))
+    judged, pairs, scores = study.judged, study.pairs, study.scores
     used: set[str] = set()
 
     def shown(*starts: str) -> list[Block]:
@@ -188,7 +184,7 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         counted = Bullets((*counted.items, note))
     blocks.append(counted)
-    overall = tables.overall_table(study, overall_frame(scores), scores)
+    overall = tables.overall_table(study, study.overall, scores)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)
@@ -214,10 +210,7 @@ def _methods(
 def _cost(study: Study, frontier: list[Block]) -> Section:
     if _many(study):
         return _section("cost", "Reward and what it costs", frontier)
-    results, steps = study.results, study.steps
-    targets = for_both_arms(targets_frame, results, steps)
-    areas = for_both_arms(area_frame, results, steps)
-    pareto = study.pareto
+    targets, areas, pareto = study.targets, study.areas, study.pareto
     below = []
     for task, slug in tables.table_ids(study).items():
         blocks = _tables(

@@ -17,6 +17,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+RestsOn = Literal["runs", "optimum", "paper", "text", "simulation"]
+"""What a value comes from: runs of the folder, the optimum of their tasks, the paper, words of
+ours, or a simulation that needs no runs."""
 CellKey = tuple[str, str]
 """Name of a task and label of a method with its variant, as the keys of a Study."""
 
@@ -73,6 +76,10 @@ class Column:
     with three figures."""
     interval: str = "95 % interval"
     """Header of the intervals, where values have them."""
+    rests_on: tuple[RestsOn, ...] = ()
+    """What its values were computed from; of numbers there is always something."""
+    other_arm: Literal["free", "still"] = "free"
+    """Of the optimum that it rests on, if it does."""
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper."""
 

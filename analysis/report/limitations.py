@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from analysis.report.text import typographic
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.power import POWER, smallest_difference
 from analysis.statistics.spread import sd
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def limitations(study: Study) -> tuple[str, ...]:

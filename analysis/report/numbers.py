@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,14 +22,17 @@ from analysis.published import published_cell, published_initial
 from analysis.results.folder import CellRuns
 from analysis.results.optimum_source import SHIPPED, OptimumSource, optimum_sources
 from analysis.statistics.estimates import (
+    SEED,
     Inference,
     difference_of_means,
     mean,
     probability_of_improvement,
 )
 from analysis.statistics.spread import sd
-from analysis.study import SEED, Study
 from coartic.text import one_line
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 PREFIX = "coartic"
 Cell = tuple[str, str]

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +19,10 @@ from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
 from analysis.report.text import typographic
 from analysis.results.optimum_source import optimum_sources
 from analysis.statistics.equivalence import difference
-from analysis.statistics.estimates import mean
-from analysis.study import SEED, Study
+from analysis.statistics.estimates import SEED, mean
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 _CONDITION = re.compile(r"dual-process/EC[1-4]")
 _VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell")

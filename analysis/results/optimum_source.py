@@ -12,7 +12,7 @@ from analysis.results.laws import BASE
 from analysis.results.optima import DATA, METHODS, entries, essence, optima
 from analysis.results.folder import CellRuns, Results
 
-SHIPPED = f"shipped data (analysis/{DATA.name})"
+SHIPPED = f"shipped data (analysis/results/{DATA.name})"
 
 
 @dataclass(frozen=True)

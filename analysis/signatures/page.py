@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -14,9 +14,11 @@ from analysis.markup import escaped
 from analysis.page import Heading, Part, page
 from analysis.signatures.register import NO_RUN
 from analysis.statistics.estimates import holm
-from analysis.study import Study
 from analysis.table import NONE, Table
 from coartic import Task
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 Row = dict[Any, Any]
 _GOAL = re.compile(r"goal \d+")

@@ -39,6 +39,8 @@ LEVEL = 0.05
 """Of a test."""
 RESAMPLES = 9_999
 """With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
+SEED = 0
+"""Of every resampling; it has nothing to do with the seeds of the runs."""
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from analysis.claims.data import Data
 from analysis.claims.register import Finding
 from analysis.published import published_cell
-from analysis.statistics.estimates import bootstrap_test, difference_of_means, mean
-from analysis.study import SEED
+from analysis.statistics.estimates import SEED, bootstrap_test, difference_of_means, mean
 from analysis.table import interval
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from analysis.claims.data import Data, MissingError
 from analysis.claims.register import Finding
 from analysis.comparisons.methods import LEARNER
-from analysis.statistics.estimates import bootstrap_test, mean
-from analysis.study import SEED
+from analysis.statistics.estimates import SEED, bootstrap_test, mean
 from analysis.table import interval
 from coartic.robot import Array
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from analysis.claims.register import Judged
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import finite, table
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def claims_table(study: Study, judged: Sequence[Judged]) -> DataTable | None:

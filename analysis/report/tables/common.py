@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.slugs import slugs
-from analysis.statistics.estimates import mean
+from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
-from analysis.study import SEED, Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def table_ids(study: Study) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -10,7 +11,9 @@ from analysis.comparisons.frontier import LABELS
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def targets_table(study: Study, targets: pd.DataFrame, task: str) -> DataTable | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,9 @@ from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
 from analysis.report.text import typographic
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def methods_table(study: Study, task: str) -> DataTable | None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import table, table_ids, value_of
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def pairwise_table(study: Study, pairs: pd.DataFrame, task: str) -> DataTable | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from analysis.comparisons.paper import published_of
@@ -10,7 +12,9 @@ from analysis.report.document import Column, DataTable, Estimate, Row
 from analysis.report.tables.common import counts, marked, mean_of, table, with_interval
 from analysis.report.text import typographic
 from analysis.statistics.equivalence import MARGIN, difference
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 
 def published_table(study: Study) -> DataTable | None:

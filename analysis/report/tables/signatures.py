@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
 from analysis.signatures.page import CONTEXTS, OTHER, main_columns, other_arm_columns, place
 from analysis.signatures.page import Column as SignatureColumn
-from analysis.study import Study
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 MOST_CONTEXTS = 120
 _UNITS = ("ticks", "share", "bit", "count", "rad", "1")

@@ -1,0 +1,1 @@
+"""What test modules share: suites run into folders, commands, reports read back, made-up rows."""

@@ -1,0 +1,82 @@
+"""Reports without their figures, and what reads them back."""
+
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import pytest
+
+import analysis.report.build
+from analysis.report.build import build, write
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
+
+
+LATEX = r"""\documentclass{article}
+\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
+\usepackage{booktabs,siunitx,graphicx,longtable}
+\hfuzz=1pt
+\input{numbers.tex}
+\begin{document}
+%s
+\input{tables.tex}
+\end{document}
+"""
+
+
+def report_of(study, folder):
+    """A report whose figures are empty: drawing takes long, and has tests of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
+        patch.setattr(
+            analysis.report.build, "rendered",
+            lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
+        )  # fmt: skip
+        write(build(study), study, folder)
+    return folder
+
+
+def compiled(folder, body=""):
+    """The log of a document with all macros and tables; skips where LaTeX is missing."""
+    if not shutil.which("pdflatex"):
+        pytest.skip("pdflatex is not installed")
+    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty", "geometry.sty"]
+    if subprocess.run(styles, capture_output=True, check=False).returncode:
+        pytest.skip("booktabs, siunitx, graphicx or geometry is not installed")
+    (folder / "paper.tex").write_text(LATEX % body, encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=120)
+    log = done.stdout.decode(errors="replace")
+    assert done.returncode == 0, log[-2000:]
+    return log
+
+
+class Page(HTMLParser):
+    """A strict reader of the page: elements must nest, and nothing may be asked for."""
+
+    EMPTY = frozenset(("meta", "link", "wbr", "path", "use", "input"))
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.elements, self.texts = [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        assert len(dict(attributes)) == len(attributes), "an attribute given twice"
+        self.elements.append((tag, dict(attributes)))
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        if tag not in self.EMPTY:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append((self.open[-1] if self.open else "", data))
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
