@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-from analysis.slugs import slugs
+from analysis.words import slugs
 from coartic import CoarticError, __version__
 from coartic.text import one_line
 

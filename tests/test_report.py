@@ -13,6 +13,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from analysis.markup import Span, inline
 from analysis.report.document import (
@@ -32,10 +33,12 @@ from analysis.report.formats.html import MOST_ROWS, html
 from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
 from analysis.report.formats.latex import PACKAGES, latex_table, latex_tables, latex_text
 from analysis.report.formats.markdown import markdown
+from analysis.report.formats.terminal import terminal_table
 from analysis.report.legends import with_legends
 from analysis.report.summary import without_variants
-from analysis.report.text import number_text, parts, typographic
+from analysis.report.text import number_text, parts
 from analysis.report.write import write_report
+from analysis.words import typographic
 from coartic import CoarticError
 from coartic.files import LISTING
 from tests.support.reports import Page
@@ -318,6 +321,28 @@ def test_markdown():
         "## All & more",
         "### Below",
     ]
+
+
+def printed(table, width):
+    console = Console(width=width, file=io.StringIO(), emoji=False)
+    console.print(terminal_table(table, width))
+    return console.file.getvalue()
+
+
+def test_a_terminal_has_the_columns_that_fit():
+    wide = printed(TABLE, 240)
+    assert "dual-process/EC4" in wide
+    assert "−483.2 ± 5.0 [−490.1, −477.0]" in wide
+    assert "1\u202f234\u202f567" in wide
+    assert "[optimum]" in wide
+    assert "*none*" in wide
+    assert NASTY[:20] in wide
+    assert "more column" not in wide
+    for width in (100, 60):
+        lines = printed(TABLE, width).splitlines()
+        assert max(map(len, lines)) <= width
+        assert any("dual-process/EC4" in line for line in lines)  # never broken
+    assert "(1 more column, for which there is no room here)" in printed(TABLE, 120)
 
 
 def test_csv_reads_back_as_the_raw_values():

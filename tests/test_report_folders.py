@@ -11,8 +11,8 @@ import analysis.report.numbers
 from analysis.report.build import build, write
 from analysis.report.numbers import Names, headline_numbers, macro_names, words
 from analysis.report.trace import find_report, trace
-from analysis.slugs import slugs
 from analysis.study import Study
+from analysis.words import slugs
 from benchmarks.suites import Cell, load_suite, select_cells
 from coartic import CoarticError, builtin_tasks
 from coartic.cli import _labels

@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, has, known_tasks, missing
 from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, short, styled
-from analysis.slugs import slugs
+from analysis.words import slugs
 from coartic import Task
 
 if TYPE_CHECKING:

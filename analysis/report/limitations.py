@@ -11,10 +11,10 @@ from analysis.comparisons.methods import LEARNER
 from analysis.markup import code, escaped
 from analysis.published import RUNS, TRIALS
 from analysis.report.summary import unlike_printed
-from analysis.report.text import typographic
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.power import POWER, smallest_difference
 from analysis.statistics.spread import sd
+from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -16,10 +16,10 @@ from analysis.comparisons.methods import LEARNER
 from analysis.comparisons.paper import published_of
 from analysis.published import TRIALS, published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.report.text import typographic
 from analysis.results.optimum_source import optimum_sources
 from analysis.statistics.equivalence import difference
 from analysis.statistics.estimates import SEED, mean
+from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from typing import Literal
 
-from analysis.report.document import Column, DataTable, Estimate, Value
-from analysis.table import NONE
-
-NO_SPREAD = "no spread"
-MINUS, NARROW_SPACE, TIMES = "−", "\N{NARROW NO-BREAK SPACE}", "×"
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.words import NO_SPREAD, NONE, true_minus, typographic
 
 
 @dataclass(frozen=True)
@@ -71,11 +66,6 @@ class Part:
         return f"[{', '.join(numbers)}]" if self.kind == "interval" else numbers[0]
 
 
-def true_minus(text: str) -> str:
-    """Text with a minus where a hyphen before a digit begins a word, in brackets or not."""
-    return re.sub(r"(?<![^\s(\[])-(?=\d)", MINUS, text)
-
-
 def parts(table: DataTable) -> list[Part]:
     """The columns to show: SDs and intervals beside the values that have them."""
     found = []
@@ -89,6 +79,24 @@ def parts(table: DataTable) -> list[Part]:
         if any(isinstance(e, Estimate) and e.low is not None for e in estimates):
             found.append(Part(index, column, "interval"))
     return found
+
+
+def heads(table: DataTable) -> list[str]:
+    """What each column shows, with its unit: value, SD and interval together."""
+    shown: list[list[str]] = [[] for _ in table.columns]
+    for part in parts(table):
+        shown[part.index].append(part.header)
+    return [", ".join(headers) for headers in shown]
+
+
+def texts(table: DataTable, row: Row) -> list[str]:
+    """What each column shows in a row: value, SD and interval together."""
+    shown: list[list[str]] = [[] for _ in table.columns]
+    for part in parts(table):
+        text = part.text(row.values[part.index])
+        if part.kind == "value" or text != NONE:
+            shown[part.index].append(f"± {text}" if part.kind == "sd" else text)
+    return [" ".join(words) for words in shown]
 
 
 def number_text(value: float, column: Column) -> str:
@@ -113,22 +121,6 @@ def number_text(value: float, column: Column) -> str:
             return f"<{10.0**-digits:.{digits}f}"
         return shown.removeprefix("-")
     return shown
-
-
-def typographic(number: str) -> str:
-    """A number of :func:`number_text` with a true minus and its thousands apart."""
-    comparison = "<" if number.startswith("<") else ""
-    number = number.removeprefix("<")
-    sign = MINUS if number.startswith("-") else ""
-    number = number.removeprefix("-")
-    if number == "inf":
-        return f"{sign}∞"
-    mantissa, _, power = number.partition("e")
-    whole, dot, decimals = mantissa.partition(".")
-    if len(whole) > 4:
-        whole = f"{int(whole):,}".replace(",", NARROW_SPACE)
-    shown = f"{comparison}{sign}{whole}{dot}{decimals}"
-    return f"{shown} {TIMES} 10{power.translate(_SUPERSCRIPTS)}" if power else shown
 
 
 def _number(value: float | str | None) -> float:

@@ -13,12 +13,11 @@ from typing import Any
 
 from analysis.comparisons.methods import methods_notes
 from analysis.markup import words
-from analysis.report.document import DataTable, Document, Row
+from analysis.report.document import DataTable, Document
 from analysis.report.numbers import Number
-from analysis.report.text import parts
+from analysis.report.text import heads, texts
 from analysis.results.folder import Results
 from analysis.results.optimum_source import SHIPPED, optimum_sources
-from analysis.table import NONE
 from coartic import CoarticError, builtin_tasks
 from coartic.text import json_text, one_line, shell_line
 
@@ -119,11 +118,11 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
                 "caption": table.caption,
                 "notes": _notes(results, table),
                 "columns": [column.name for column in table.columns],
-                "heads": _heads(table),
+                "heads": heads(table),
                 "text": [column.name for column in table.columns if column.kind == "text"],
                 "rows": {
                     row.key: {
-                        "texts": _texts(table, row),
+                        "texts": texts(table, row),
                         "cells": [places[key] for key in row.cells],
                         "cells_by_column": {
                             name: [places[key] for key in keys]
@@ -360,28 +359,10 @@ def _suite(results: Results) -> dict[str, Any]:
     }
 
 
-def _heads(table: DataTable) -> list[str]:
-    """What each column shows, with its unit: value, SD and interval together."""
-    shown: list[list[str]] = [[] for _ in table.columns]
-    for part in parts(table):
-        shown[part.index].append(part.header)
-    return [", ".join(headers) for headers in shown]
-
-
 def _notes(results: Results, table: DataTable) -> list[str]:
     """A table's notes as plain text; those of methods share what stands above them all."""
     above = methods_notes(results) if table.id.startswith("methods-") else []
     return list(dict.fromkeys(words(note) for note in (*above, *table.notes)))
-
-
-def _texts(table: DataTable, row: Row) -> list[str]:
-    """What each column shows: value, SD and interval together."""
-    shown: list[list[str]] = [[] for _ in table.columns]
-    for part in parts(table):
-        text = part.text(row.values[part.index])
-        if part.kind == "value" or text != NONE:
-            shown[part.index].append(f"± {text}" if part.kind == "sd" else text)
-    return [" ".join(texts) for texts in shown]
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:

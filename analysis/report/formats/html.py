@@ -20,8 +20,8 @@ from analysis.report.document import (
     Row,
     Section,
 )
-from analysis.report.text import Part, parts, true_minus
-from analysis.table import NONE
+from analysis.report.text import Part, parts
+from analysis.words import NONE, true_minus
 from coartic.text import one_line
 
 _MAGNIFIED = 1.5

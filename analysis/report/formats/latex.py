@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from analysis.figures.style import short
 from analysis.markup import inline
 from analysis.report.document import DataTable, Document, Value
-from analysis.report.text import MINUS, NO_SPREAD, Part, parts
-from analysis.table import NONE
+from analysis.report.text import Part, parts
+from analysis.words import MINUS, NO_SPREAD, NONE
 from coartic.text import one_line
 
 _ESCAPES = {

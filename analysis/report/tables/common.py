@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.slugs import slugs
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
+from analysis.words import slugs
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -13,7 +13,7 @@ from analysis.comparisons.overall import NEAR
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
-from analysis.report.text import typographic
+from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study

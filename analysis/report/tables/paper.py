@@ -10,8 +10,8 @@ from analysis.comparisons.paper import published_of
 from analysis.published import TRIALS, Summary, published_exhaustive, published_initial
 from analysis.report.document import Column, DataTable, Estimate, Row
 from analysis.report.tables.common import counts, marked, mean_of, table, with_interval
-from analysis.report.text import typographic
 from analysis.statistics.equivalence import MARGIN, difference
+from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study
