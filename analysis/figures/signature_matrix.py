@@ -15,7 +15,8 @@ from matplotlib.patches import Rectangle
 
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, has, known_tasks, missing
-from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, short, styled
+from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, styled
+from analysis.methods import short_name
 from analysis.words import slugs
 from coartic import Task
 
@@ -106,7 +107,7 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     columns = [name for name in SIGNATURES if values[name].notna().any()]
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
-    left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
+    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), TWO / 2)
     above, right, tall = 1.38, 0.7, 0.19  # inches
     side = min((TWO - left - right) / len(columns), 0.6)
     width = column_width(left + side * len(columns) + right)
@@ -144,7 +145,7 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
             )  # fmt: skip
     axes.set_xlim(0, len(columns))
     axes.set_ylim(len(labels), 0)
-    axes.set_yticks(np.arange(len(labels)) + 0.5, [short(label) for label in labels])
+    axes.set_yticks(np.arange(len(labels)) + 0.5, [short_name(label) for label in labels])
     axes.xaxis.tick_top()
     axes.set_xticks(
         np.arange(len(columns)) + 0.5, [SIGNATURES[name] for name in columns],
@@ -164,7 +165,7 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
             f"apply, or there are too few runs.{dagger([task])}"
         ),
         alt=(
-            f"Matrix of {len(labels)} methods ({', '.join(map(short, labels))}) by "
+            f"Matrix of {len(labels)} methods ({', '.join(map(short_name, labels))}) by "
             f"{len(columns)} signatures on {task.label}; its numbers are in the table."
         ),
         figure=figure,
