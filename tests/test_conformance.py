@@ -18,9 +18,9 @@ BROKEN = Path(__file__).parent / "plugins" / "broken.py"
 KNOWN = registry([BROKEN])
 BUILT_IN = registry()
 OPTIMUM = {
-    entry["task"]: entry["reward"]
+    entry.task: entry.reward
     for entry in entries()
-    if (entry["other_arm"], entry["base"]) == ("free", "task")
+    if (entry.other_arm, entry.base) == ("free", "task")
 }
 LAWS = [
     "declaration",

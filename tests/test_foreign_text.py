@@ -528,7 +528,9 @@ def test_report_in_latex(report):
         text = path.read_text(encoding="utf-8")
         found = set(COMMANDS.findall(text))
         assert found <= ours, (path.name, found - ours)
-        assert set(re.findall(r"\\begin\{(\w+)\}", text)) <= {"table", "tabular", "longtable"}
+        assert set(re.findall(r"\\begin\{(\w+)\}", text)) <= {
+            *("table", "tabular", "tabularx", "xltabular"),
+        }
         assert balanced(text)
         assert "{evil}" not in text
         assert all(

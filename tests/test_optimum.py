@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.results import optima
 from analysis.results.folder import Results
-from analysis.results.optima import collect, entries, essence
+from analysis.results.optima import Entry, collect, entries, essence
 from baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic import builtin_tasks, execute, load_task
 from coartic.frames import movement_rows, movements_from
@@ -17,15 +18,15 @@ from coartic.solution import other_arm_travel
 from tests.support.made_up import manifest_for
 from tests.support.strategies import changed
 
-SOLVED = [entry for entry in entries() if "reward" in entry]
+SOLVED = [entry for entry in entries() if entry.reward is not None]
 
 
 def name_of(entry):
-    return f"{entry['task']}-{entry['other_arm']}-{entry['base']}"
+    return f"{entry.task}-{entry.other_arm}-{entry.base}"
 
 
 def test_every_task_and_restriction_is_there():
-    known = {(entry["task"], entry["other_arm"], entry["base"]) for entry in entries()}
+    known = {(entry.task, entry.other_arm, entry.base) for entry in entries()}
     for name in builtin_tasks():
         for arm in ("free", "still"):
             assert {(name, arm, "task"), (name, arm, "xy")} <= known
@@ -39,34 +40,34 @@ def test_every_task_and_restriction_is_there():
 @pytest.mark.parametrize("entry", SOLVED, ids=name_of)
 def test_what_is_shipped_holds(entry):
     """The solution gives its reward; the searches agree; the bound is not above it."""
-    task = load_task(entry["task"])
-    assert entry["essence"] == essence(task)
-    solution = movements_from(task, pd.DataFrame(entry["solution"]))
+    task = load_task(entry.task)
+    assert entry.essence == essence(task)
+    solution = movements_from(task, pd.DataFrame(list(entry.solution)))
     execution = execute(task, solution)
-    assert execution.reward == entry["reward"]
-    assert execution.hands == entry["hands"]
+    assert execution.reward == entry.reward
+    assert execution.hands == entry.hands
     assert execution.corrections == 0
-    if entry["other_arm"] == "still":
+    if entry.other_arm == "still":
         assert other_arm_travel(task, execution) == 0.0
-    locked = {"task": "", "y": "y", "xy": "xy"}[entry["base"]]
+    locked = {"task": "", "y": "y", "xy": "xy"}[entry.base]
     for axis in (*locked, *task.locked_base):
         column = "xy".index(axis)
         assert np.all(execution.configurations[:, column] == task.q0[column])
-    assert set(entry["searches"]) == {method.name for method in METHODS}
-    assert max(entry["searches"].values()) == entry["reward"]
-    assert entry["reward"] - min(entry["searches"].values()) <= 1
-    assert entry["bound"] >= entry["reward"]
+    assert set(entry.searches) == {method.name for method in METHODS}
+    assert max(entry.searches.values()) == entry.reward
+    assert entry.reward - min(entry.searches.values()) <= 1
+    assert entry.bound >= entry.reward
 
 
 @pytest.mark.parametrize("name", builtin_tasks())
 @pytest.mark.parametrize("arm", ["free", "still"])
 def test_the_optimum_of_every_task_is_proven(name, arm):
     (entry,) = (e for e in SOLVED if name_of(e) == f"{name}-{arm}-task")
-    assert entry["bound"] == entry["reward"]
+    assert entry.bound == entry.reward
 
 
 def test_restrictions_only_cost():
-    rewards = {name_of(entry): entry["reward"] for entry in SOLVED}
+    rewards = {name_of(entry): entry.reward for entry in SOLVED}
     for name in builtin_tasks():
         assert rewards[f"{name}-still-task"] <= rewards[f"{name}-free-task"]
     assert rewards["two-armed-2-free-y"] < rewards["two-armed-2-free-task"]
@@ -74,8 +75,8 @@ def test_restrictions_only_cost():
 
 def test_a_wholly_locked_base_is_infeasible():
     for entry in entries():
-        if entry["base"] == "xy":
-            assert "out of reach with the base locked in x and y" in entry["infeasible"]
+        if entry.base == "xy":
+            assert "out of reach with the base locked in x and y" in entry.infeasible
 
 
 @pytest.mark.parametrize(
@@ -136,6 +137,19 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     rows = pd.DataFrame(movement_rows(task, execution.movements)).assign(run_id="r1")
     rows.to_parquet(tmp_path / "solutions.parquet")
     (entry,) = collect(Results(Path(tmp_path), manifest_for([task]), runs, pd.DataFrame()))
-    assert (entry["reward"], entry["bound"], entry["run_ids"]) == (-292, -280, ["r1"])
-    again = json.loads(json.dumps(entry))["solution"]
-    assert execute(task, movements_from(task, pd.DataFrame(again))).reward == -292
+    assert (entry.reward, entry.bound, entry.run_ids) == (-292, -280, ("r1",))
+    again = Entry.model_validate_json(entry.model_dump_json()).solution
+    assert execute(task, movements_from(task, pd.DataFrame(list(again)))).reward == -292
+
+
+def test_renewing_with_what_is_there_changes_nothing(tmp_path, monkeypatch):
+    copy = tmp_path / "optima.json"
+    copy.write_bytes(optima.DATA.read_bytes())
+    monkeypatch.setattr(optima, "DATA", copy)
+    before = copy.read_bytes()
+    known = entries()
+    assert optima.renew(known[:3]) == len(known) - 3
+    assert copy.read_bytes() == before
+    better = known[0].model_copy(update={"reward": -1})
+    optima.renew([better])
+    assert entries() == [better, *known[1:]]

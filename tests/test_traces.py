@@ -14,7 +14,6 @@ import pytest
 from analysis.report.trace import FILE, trace, trace_text
 from analysis.results import optima as shipped
 from analysis.results.folder import load_results
-from analysis.results.optimum_source import optimum_sources
 from analysis.statistics import estimates as statistics
 from analysis.study import Study
 from benchmarks.suites import Cell
@@ -573,7 +572,7 @@ def test_a_search_that_falls_short_is_not_the_optimums(searched):
     runs = searched.runs.copy()
     runs.loc[runs.method.str.startswith("optimum/"), "reward"] = -300
     runs["proven_bound"] = None
-    found = optimum_sources(replace(searched, runs=runs))
+    found = Study(replace(searched, runs=runs)).optima
     assert found["ascending", "free"].reward == -292
     assert found["ascending", "free"].cells == ()
     assert "searches of this folder" not in found["ascending", "free"].how

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ import numpy as np
 from analysis.comparisons.methods import LEARNER, solve_times
 from analysis.published import published_cell, published_initial
 from analysis.results.folder import CellRuns
-from analysis.results.optimum_source import SHIPPED, OptimumSource, optimum_sources
+from analysis.results.optima import SHIPPED
 from analysis.statistics.estimates import (
     SEED,
     Inference,
@@ -142,11 +142,11 @@ def macro_names(study: Study) -> Names:
 
 def headline_numbers(study: Study) -> list[Number]:
     """Every headline value of a results folder, no two with a macro of the same name."""
-    names, sources = macro_names(study), optimum_sources(study.results)
+    names = macro_names(study)
     found = [
-        *_tasks(study, names, sources),
+        *_tasks(study, names),
         *itertools.chain.from_iterable(
-            _cell(study, names, sources, cell) for cell in study.cells.values() if len(cell.good)
+            _cell(study, names, cell) for cell in study.cells.values() if len(cell.good)
         ),
         *_conditions(study, names),
         *_hands(study, names),
@@ -221,19 +221,17 @@ def _number(
     )  # fmt: skip
 
 
-def _tasks(
-    study: Study, names: Names, sources: Mapping[tuple[str, str], OptimumSource]
-) -> Iterator[Number]:
+def _tasks(study: Study, names: Names) -> Iterator[Number]:
     for task in study.results.tasks:
         for arm in ("free", "still"):
-            source = sources.get((task, arm))
-            if source is None:
+            best = study.optima.get((task, arm))
+            if best is None:
                 continue
             yield Number(
                 f"{PREFIX}{names.tasks[task]}Optimum{'' if arm == 'free' else 'Still'}",
-                f"best reward known, other arm {arm}", source.reward, 0, "ticks",
-                how=source.how, cells=source.cells, of=task,
-                origin="" if source.cells else f"the optimum of the {SHIPPED}",
+                f"best reward known, other arm {arm}", best.reward, 0, "ticks",
+                how=best.how, cells=best.cells, of=task,
+                origin="" if best.cells else f"the optimum of the {SHIPPED}",
             )  # fmt: skip
         printed = published_initial(task)
         if printed is not None:
@@ -252,12 +250,7 @@ def _published(condition: int, *, derived: bool) -> tuple[str, str]:
     return f"{how}; {place}", f"published in the paper (Shah, Barto & Fagg, 2013; {place})"
 
 
-def _cell(
-    study: Study,
-    names: Names,
-    sources: Mapping[tuple[str, str], OptimumSource],
-    cell: CellRuns,
-) -> Iterator[Number]:
+def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
     task, label = key = cell.task, cell.label
     name = names.tasks[task] + names.labels[label]
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
@@ -275,7 +268,7 @@ def _cell(
     for column, macro, arm in (("gap", "Gap", "free"), ("gap_still", "GapStill", "still")):
         if math.isnan(row[column]):
             continue
-        source = sources[task, arm]
+        source = study.optima[task, arm]
         best = source.reward
         if arm == "still" and free is not None and best == free.reward:
             continue

@@ -16,7 +16,6 @@ from analysis.comparisons.methods import LEARNER
 from analysis.comparisons.paper import published_of
 from analysis.published import TRIALS, published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.results.optimum_source import optimum_sources
 from analysis.statistics.equivalence import difference
 from analysis.statistics.estimates import SEED, mean
 from analysis.words import typographic
@@ -40,7 +39,7 @@ def best_condition(study: Study, task: str) -> str | None:
 
 def tasks_table(study: Study) -> DataTable | None:
     """One row a task: initial, learned, published and best possible reward."""
-    rows, sources = [], optimum_sources(study.results)
+    rows = []
     for name, task in study.results.tasks.items():
         label = best_condition(study, name)
         if label is None:
@@ -67,9 +66,7 @@ def tasks_table(study: Study) -> DataTable | None:
                     share,
                 ),
                 ((name, label),),
-                {}
-                if best is None
-                else dict.fromkeys(("optimum", "proof"), sources[name, "free"].cells),
+                dict.fromkeys(("optimum", "proof"), best.cells) if best else {},
             )
         )
     if not rows:

@@ -16,7 +16,7 @@ from analysis.report.document import DataTable, Document
 from analysis.report.numbers import Number
 from analysis.report.text import heads, texts
 from analysis.results.folder import Results
-from analysis.results.optimum_source import SHIPPED, optimum_sources
+from analysis.results.optima import SHIPPED, optima
 from coartic import CoarticError, builtin_tasks
 from coartic.record import content_hash
 from coartic.text import json_text, one_line, shell_line
@@ -111,7 +111,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
                 "how": source.how,
                 "cells": [places[key] for key in source.cells],
             }
-            for (task, arm), source in optimum_sources(results).items()
+            for (task, arm), source in optima(results).items()
         ],
         "tables": {
             table.id: {

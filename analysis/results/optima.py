@@ -1,9 +1,9 @@
-"""The optimum of each task: the best reward known, and what is proven about it.
+"""The optimum of each task: the best reward known, what is proven about it, and by which runs.
 
-``optimum.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids
+``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids
 and the solutions; ``python -m analysis.results.optima FOLDER`` makes it from the results folder of
-that suite. Optimum runs in a results folder of the user's own count as well, so a table for
-the user's own task has gaps as soon as the task's optimum is among its runs.
+that suite. Searches for the optimum in a results folder of the user's own count as well, so a
+table for the user's own task has gaps as soon as the task's optimum is among its runs.
 """
 
 from __future__ import annotations
@@ -11,26 +11,64 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
+from pydantic import BaseModel, ConfigDict
 
-from analysis.results.laws import BASE
 from analysis.results.folder import Results, load_results
+from analysis.results.laws import BASE
 from coartic import CoarticError, Task
+from coartic.files import write_atomically
 from coartic.record import SEARCH
 from coartic.text import one_line
 
 METHODS = SEARCH  # methods that search for it
 DATA = Path(__file__).with_name("optima.json")
+SHIPPED = f"shipped data (analysis/results/{DATA.name})"
+
+OtherArm = Literal["free", "still"]
+"""Whether the arm that is not chosen may move."""
+ARMS: tuple[OtherArm, ...] = ("free", "still")
+
+
+class Entry(BaseModel):
+    """What is shipped of one task under one restriction: a reward, or why there is none."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    task: str
+    essence: str
+    """Of the task, as :func:`essence` has it."""
+    base: str
+    """Directions in which the base is locked; ``task``: as the task locks it."""
+    other_arm: OtherArm
+    run_ids: tuple[str, ...]
+    made_by: dict[str, Any]
+    reward: int | None = None
+    hands: str = ""
+    bound: int | None = None
+    """Reward that no solution exceeds; None where nothing is proven."""
+    searches: dict[str, int] = {}
+    """Reward that each search found, by method."""
+    solution: tuple[dict[str, Any], ...] = ()
+    """Movements as :func:`coartic.frames.movements_from` reads them, in full precision."""
+    infeasible: str = ""
+    """Why no search has a solution."""
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What it is about: task, lock of the base, other arm."""
+        return self.task, self.base, self.other_arm
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best reward known for one task under one restriction."""
+    """The best reward known for one task under one restriction, and what it rests on."""
 
     reward: int
     hands: str
@@ -38,34 +76,41 @@ class Optimum:
     """Reward that no solution exceeds; None where nothing is proven."""
     searches: tuple[tuple[str, int], ...] = ()
     """Reward that each search found, by method."""
+    source: str = ""
+    """The runs that give the reward and its bound, in words."""
+    cells: tuple[tuple[str, str], ...] = ()
+    """Task and label of the folder's own searches among them."""
 
     @property
     def proven(self) -> bool:
         """Whether no solution can be better."""
         return self.bound == self.reward
 
+    @property
+    def how(self) -> str:
+        """Whether it is proven, and by which runs."""
+        return f"{'proven' if self.proven else 'not proven'}; {self.source}"
+
 
 def optima(results: Results) -> dict[tuple[str, str], Optimum]:
     """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
 
     What the shipped data say where the task is the same in all that matters, bettered by
-    what the folder's own optimum runs found.
+    what the folder's own searches found; these are named as its source wherever they give it.
     """
     found: dict[tuple[str, str], Optimum] = {}
-    shipped = _shipped()
-    own = results.runs[results.runs.method.str.startswith(METHODS) & (results.runs.status == "ok")]
-    restriction = own.parameters.map(json.loads)
-    base = restriction.map(lambda parameters: parameters.get("base", BASE))
-    arm = restriction.map(lambda parameters: parameters.get("other_arm", "free"))
     for name, task in results.tasks.items():
-        for other_arm in ("free", "still"):
-            runs = own[(own.task == name) & (base == BASE) & (arm == other_arm)]
-            candidates = [_from_runs(runs)] if len(runs) else []
-            known = shipped.get((essence(task), other_arm, BASE))
-            if known is not None:
-                candidates.append(_from_entry(known))
+        own = results.runs[results.runs.task == name]
+        for arm in ARMS:
+            searches = dict(_searches(own, arm))
+            candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
+            entry = _shipped().get((essence(task), arm))
+            if entry is not None and entry.reward is not None:
+                best = tuple(entry.searches.items())
+                candidates.append(Optimum(entry.reward, entry.hands, entry.bound, best))
             if candidates:
-                found[name, other_arm] = _best(candidates)
+                stored = f"{SHIPPED}, runs {', '.join(entry.run_ids if entry else ())}"
+                found[name, arm] = _best(name, candidates, searches, stored)
     return found
 
 
@@ -83,21 +128,20 @@ def essence(task: Task) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def entries() -> list[dict[str, Any]]:
+def entries() -> list[Entry]:
     """The shipped data, one entry per task and restriction."""
-    content: dict[str, Any] = json.loads(DATA.read_text(encoding="utf-8"))
-    rows: list[dict[str, Any]] = content["optima"]
-    return rows
+    content = json.loads(DATA.read_text(encoding="utf-8"))
+    return [Entry.model_validate(entry) for entry in content["optima"]]
 
 
-def collect(results: Results) -> list[dict[str, Any]]:
-    """Entries of ``optimum.json`` from a results folder of suite ``optimum``.
+def collect(results: Results) -> list[Entry]:
+    """Entries of ``optima.json`` from a results folder of suite ``optimum``.
 
-    Raises CoarticError where the folder has no optimum runs.
+    Raises CoarticError where the folder has no searches for the optimum.
     """
-    runs = results.runs[results.runs.method.str.startswith(METHODS)].copy()
+    runs = results.runs[results.runs.method.str.startswith(SEARCH)].copy()
     if not len(runs):
-        raise CoarticError(f"{results.folder}: has no runs of methods {METHODS}*")
+        raise CoarticError(f"{results.folder}: has no runs of methods {SEARCH}*")
     parameters = runs.parameters.map(json.loads)
     runs["other_arm"] = parameters.map(lambda values: values["other_arm"])
     runs["base"] = parameters.map(lambda values: values["base"])
@@ -105,41 +149,62 @@ def collect(results: Results) -> list[dict[str, Any]]:
     environment = results.manifest.environment.model_dump(mode="json")
     keys = ("coartic", "commit", "model_code", "python", "date")
     made_by = {key: environment[key] for key in keys}
-    rows = []
+    found = []
     for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
         name, base, arm = map(str, key)
-        task = results.tasks[name]
         good = group[group.status == "ok"]
-        entry: dict[str, Any] = {
+        content: dict[str, Any] = {
             "task": name,
-            "essence": essence(task),
+            "essence": essence(results.tasks[name]),
             "base": base,
             "other_arm": arm,
             "run_ids": sorted(group.run_id),
             "made_by": made_by,
         }
         if len(good):
-            best = good.iloc[int(good.reward.astype(int).argmax())]
-            optimum = _from_runs(good)
-            entry |= {
-                "reward": optimum.reward,
-                "hands": optimum.hands,
-                "bound": optimum.bound,
-                "searches": dict(optimum.searches),
-                "solution": _movements(movements[movements.run_id == best.run_id]),
+            best = _from_runs(good)
+            first = good.iloc[int(good.reward.astype(int).argmax())].run_id
+            content |= {
+                "reward": best.reward,
+                "hands": best.hands,
+                "bound": best.bound,
+                "searches": dict(best.searches),
+                "solution": _movements(movements[movements.run_id == first]),
             }
         else:
-            entry["infeasible"] = group.reason.iloc[0]
-        rows.append(entry)
-    return rows
+            content["infeasible"] = group.reason.iloc[0]
+        found.append(Entry.model_validate(content))
+    return found
+
+
+def renew(new: Iterable[Entry]) -> int:
+    """Put entries into ``optima.json`` in the place of those about the same; how many stay."""
+    kept = {entry.key: entry for entry in entries()}
+    renewed = {entry.key: entry for entry in new}
+    content = [
+        entry.model_dump(exclude_unset=True) for _, entry in sorted((kept | renewed).items())
+    ]
+    text = json.dumps({"optima": content}, indent=1, ensure_ascii=False)
+    write_atomically(DATA, f"{text}\n".encode())
+    return len(kept.keys() - renewed.keys())
 
 
 def _movements(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """Movements as ``coartic.frames.movements_from`` reads them, in full precision."""
     return [
         {str(key): value for key, value in row.items()}
         for row in rows.drop(columns="run_id").to_dict("records")
     ]
+
+
+def _searches(runs: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], pd.DataFrame]]:
+    """Solved searches of one task with this other arm and the task's own base, by cell."""
+    good = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
+    asked = good.parameters.map(json.loads)
+    base = asked.map(lambda parameters: parameters.get("base", BASE))
+    other_arm = asked.map(lambda parameters: parameters.get("other_arm", "free"))
+    kept = good[(base == BASE) & (other_arm == arm)]
+    for (task, method, variant), own in kept.groupby(["task", "method", "variant"], sort=False):
+        yield (str(task), f"{method} {variant}".strip()), own
 
 
 def _from_runs(runs: pd.DataFrame) -> Optimum:
@@ -154,28 +219,42 @@ def _from_runs(runs: pd.DataFrame) -> Optimum:
     )
 
 
-def _from_entry(entry: dict[str, Any]) -> Optimum:
-    searches = tuple(entry["searches"].items())
-    return Optimum(entry["reward"], entry["hands"], entry["bound"], searches)
-
-
-def _best(candidates: list[Optimum]) -> Optimum:
+def _best(
+    task: str,
+    candidates: list[Optimum],
+    searches: Mapping[tuple[str, str], pd.DataFrame],
+    stored: str,
+) -> Optimum:
+    """The best reward with the lowest bound of all, and where the two are from."""
     best = max(candidates, key=lambda optimum: optimum.reward)
-    bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
-    return Optimum(best.reward, best.hands, min(bounds, default=None), best.searches)
+    bound = min(
+        (optimum.bound for optimum in candidates if optimum.bound is not None), default=None
+    )
+    rewarding = [key for key, runs in searches.items() if (runs.reward == best.reward).any()]
+    bounding = [
+        key
+        for key, runs in searches.items()
+        if bound is not None and (runs.proven_bound == bound).any()
+    ]
+    reward, proof = ("searches of this folder" if k else stored for k in (rewarding, bounding))
+    return Optimum(
+        best.reward,
+        best.hands,
+        bound,
+        best.searches,
+        reward if bound is None or reward == proof else f"reward: {reward}; bound: {proof}",
+        tuple(dict.fromkeys([*rewarding, *bounding])),
+    )
 
 
 @cache
-def _shipped() -> dict[tuple[str, str, str], dict[str, Any]]:
-    return {
-        (entry["essence"], entry["other_arm"], entry["base"]): entry
-        for entry in entries()
-        if "reward" in entry
-    }
+def _shipped() -> dict[tuple[str, str], Entry]:
+    """Entries with the task's own base, by the task's essence and the other arm."""
+    return {(entry.essence, entry.other_arm): entry for entry in entries() if entry.base == BASE}
 
 
 def main() -> None:
-    """``python -m analysis.results.optima FOLDER``: renew entries of ``optimum.json``."""
+    """``python -m analysis.results.optima FOLDER``: renew entries of ``optima.json``."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(
             "usage: python -m analysis.results.optima RESULTS_FOLDER\n"
@@ -185,15 +264,8 @@ def main() -> None:
         new = collect(load_results(Path(sys.argv[1])))
     except CoarticError as error:
         sys.exit(one_line(str(error)))
-
-    def key(entry: dict[str, Any]) -> tuple[str, str, str]:
-        return entry["task"], entry["base"], entry["other_arm"]
-
-    renewed = {key(entry) for entry in new}
-    kept = [entry for entry in entries() if key(entry) not in renewed]
-    content = {"optima": sorted([*kept, *new], key=key)}
-    DATA.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    print(f"{DATA}: {len(new)} optima renewed, {len(kept)} kept")
+    kept = renew(new)
+    print(f"{DATA}: {len(new)} optima renewed, {kept} kept")
 
 
 if __name__ == "__main__":
