@@ -51,7 +51,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     code, text, error = call(monkeypatch, capsys, *command)
     assert code == 0
     assert "14 runs: 14 were there, 0 done in" in text
-    assert "14 of 14 runs are already there" in error
+    assert "already there: 14 of 14 runs" in error
     assert tables == {path: path.read_bytes() for path in out.glob("*.parquet")}
     # A larger one does what is missing; a damaged record is reported and done again.
     record = next(iter(out.glob("records/*.json")))
