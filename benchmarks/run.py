@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.executors import Executor, Local
-from benchmarks.harness import Progress, Watcher, perform_plan
+from benchmarks.harness import Progress, Watcher, perform_missing
 from benchmarks.registry import registry
 from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import Store
@@ -102,7 +102,7 @@ class SuitePlan:
         check_results_folder(folder)
         store = Store(folder)
         with store.locked():
-            progress = perform_plan(
+            progress = perform_missing(
                 [spec for _, spec in self.planned],
                 store,
                 executor or Local(),

@@ -102,29 +102,26 @@ for module, names in (
 everything()
 
 import json, psutil
-from benchmarks.harness import record_of
 from benchmarks.registry import registry
-from benchmarks.store import Store
-from benchmarks.suites import load_suite, manifest_of, run_specs, select_cells
-from benchmarks.tables import write_tables
+from benchmarks.run import plan_cells, plan_suite
+from benchmarks.suites import load_suite, select_cells
 from benchmarks.worker import perform
 from analysis.results.folder import load_results
+
+class Here:
+    def perform(self, jobs):
+        for job in jobs:
+            said = {"error": None, "answer": perform(job)}
+            yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
 
 psutil.Process.memory_info = lambda process: SimpleNamespace(peak_wset=2**20)
 suite = load_suite("quick")
 cells = select_cells(suite, registry())
-assert len(run_specs(cells, runs=2, seed=0, trials=5)) > len(cells)
-planned = run_specs(cells[:1], runs=1, seed=0, trials=5)
-((_, spec),) = planned
-said = {"error": None, "answer": perform(spec.job())}
-record = record_of({"run_id": spec.run_id, "outcome": json.dumps(said)}, spec)
+assert len(plan_suite(suite, runs=2, trials=5).planned) > len(cells)
+report = plan_cells(suite, cells[:1], runs=1, trials=5).perform(sys.argv[1], executor=Here())
+(record,) = report.records.values()
 assert record.timing.process_peak_mb == 1.0
-store = Store(Path(sys.argv[1]))
-with store.locked():
-    store.write(record)
-    write_tables(store, manifest_of(suite, 1, 0, planned))
-assert store.read(spec.run_id) == record
-assert load_results(store.folder).runs.reward.tolist() == [record.solution.reward]
+assert load_results(report.folder).runs.reward.tolist() == [record.solution.reward]
 """
 
 

@@ -89,9 +89,11 @@ def performing(suite: str, folder: Path) -> Iterator[Display]:
             yield display
         except KeyboardInterrupt:
             display.close()
+            done = (
+                f"{counted(display.done, 'run')} done now {'is' if display.done == 1 else 'are'}"
+            )
             say(
-                f"interrupted; {counted(display.done, 'run')} done now and kept in {folder}, "
-                "and the same command goes on from there",
+                f"interrupted; {done} kept in {folder}, and the same command goes on from there",
                 stream=sys.stderr,
             )
             sys.exit(130)
