@@ -52,6 +52,33 @@ def test_the_command_line_uses_all_it_sits_on():
     assert {"coartic", "benchmarks", "analysis"} <= roots
 
 
+PUBLIC = """
+import sys
+import coartic
+assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
+from coartic import *
+from pkgutil import iter_modules
+modules = {module.name for module in iter_modules(coartic.__path__)}
+assert not modules & set(coartic.__all__), "a module would hide what has its name"
+"""
+
+
+def test_the_package_imports_what_is_asked_for():
+    """Every public name is there, under its own name whatever is imported first."""
+    done = subprocess.run(
+        [sys.executable, "-c", PUBLIC], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_help_needs_no_compiler():
+    command = [sys.executable, "-X", "importtime", "-m", "coartic", "--help"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "reproduce" in done.stdout
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert not imported & {"numba", "numpy", "pandas", "matplotlib", "baselines", "analysis"}
+
+
 def test_one_kinematic_module():
     """No cosine or sine is taken outside the robot and the functions handed to it."""
     home = {"coartic/robot.py", "coartic/trigonometry.py"}
