@@ -26,19 +26,26 @@ def _tasks() -> Iterable[str]:
     return builtin_tasks()
 
 
-def _methods() -> Iterable[str]:
-    from benchmarks.registry import CLASSES
+def _conditions() -> Iterable[str]:
     from coartic import CONDITIONS, VARIANTS
 
-    return [*CONDITIONS, *VARIANTS, *CLASSES]
+    return [*CONDITIONS, *VARIANTS]
 
 
-def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Completes the last of some names that stand between commas."""
+def _methods() -> Iterable[str]:
+    from benchmarks.registry import CLASSES
+
+    return CLASSES
+
+
+def _completing(*sources: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Completes the last of some names that stand between commas, from the first source that
+    has one: those that take longer to import come later."""
 
     def complete(incomplete: str) -> list[str]:
         done, comma, begun = incomplete.rpartition(",")
-        return [f"{done}{comma}{name}" for name in names() if name.startswith(begun)]
+        found = ([name for name in names() if name.startswith(begun)] for names in sources)
+        return [f"{done}{comma}{name}" for name in next(filter(None, found), [])]
 
     return complete
 
@@ -65,7 +72,9 @@ TasksToDraw = Annotated[
 ]
 Methods = Annotated[
     str | None,
-    typer.Option(help="Only these methods, x,y.", autocompletion=_completing(_methods)),
+    typer.Option(
+        help="Only these methods, x,y.", autocompletion=_completing(_conditions, _methods)
+    ),
 ]
 TaskFiles = Annotated[
     list[Path] | None,
