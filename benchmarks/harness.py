@@ -58,7 +58,7 @@ class Progress:
 Watcher = Callable[[Progress, RunSpec | None], None]
 
 
-def perform_plan(
+def perform_missing(
     specs: Sequence[RunSpec],
     store: Store,
     executor: Executor,
@@ -67,7 +67,7 @@ def perform_plan(
     redo: bool = False,
     watch: Watcher = lambda progress, spec: None,
 ) -> Progress:
-    """Perform every run that the store has no good record of.
+    """Perform every run that the store, which the caller has locked, has no good record of.
 
     A record is good where it is as it was written and agrees with itself
     (:meth:`coartic.record.Record.check`). One that timed out under a shorter limit than now
@@ -75,18 +75,6 @@ def perform_plan(
     everything anew. ``watch`` is called before the first run and after each. Raises CoarticError
     where records cannot be written or runs keep getting lost.
     """
-    with store.locked():
-        return _perform(specs, store, executor, retry_failed, redo, watch)
-
-
-def _perform(
-    specs: Sequence[RunSpec],
-    store: Store,
-    executor: Executor,
-    retry_failed: bool,
-    redo: bool,
-    watch: Watcher,
-) -> Progress:
     by_id = {spec.run_id: spec for spec in specs}
     progress = Progress(total=len(by_id))
     progress.stale = store.stale(list(by_id))

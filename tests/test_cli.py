@@ -51,7 +51,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     code, text, error = call(monkeypatch, capsys, *command)
     assert code == 0
     assert "14 runs: 14 were there, 0 done in" in text
-    assert "14 of 14 runs are already there" in error
+    assert "already there: 14 of 14 runs" in error
     assert tables == {path: path.read_bytes() for path in out.glob("*.parquet")}
     # A larger one does what is missing; a damaged record is reported and done again.
     record = next(iter(out.glob("records/*.json")))
@@ -319,3 +319,35 @@ def test_analyse(monkeypatch, capsys, tmp_path):
     code, _, error = call(monkeypatch, capsys, "analyse", tmp_path)
     assert code == 2
     assert "not a results folder" in error
+
+
+def completed(monkeypatch, capsys, *words):
+    """What a shell offers for the last of these words."""
+    monkeypatch.setenv("_COARTIC_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", " ".join(["coartic", *words]))
+    monkeypatch.setenv("COMP_CWORD", str(len(words)))
+    code, text, _ = call(monkeypatch, capsys)
+    assert code == 0
+    return text.split()
+
+
+def test_completion(monkeypatch, capsys):
+    assert completed(monkeypatch, capsys, "r") == ["run", "reproduce", "report"]
+    assert completed(monkeypatch, capsys, "run", "p") == ["paper"]
+    assert completed(monkeypatch, capsys, "run", "paper", "--tr") == ["--trials", "--trial-budget"]
+    command = ("run", "paper", "--out", "x")
+    offered = completed(monkeypatch, capsys, *command, "--tasks", "ascending,d")
+    assert offered == ["ascending,descending"]
+    offered = completed(monkeypatch, capsys, *command, "--methods", "EC")
+    assert {"EC1", "EC4"} <= set(offered)
+    offered = completed(monkeypatch, capsys, *command, "--methods", "corr")
+    assert offered[0].startswith("corrective-alone/")
+
+
+def test_completion_is_offered_where_the_shell_is_not_known(monkeypatch, capsys):
+    code, text, _ = call(monkeypatch, capsys, "--show-completion")
+    assert code in (0, 1)  # by the shell around the tests
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    code, text, error = call(monkeypatch, capsys, "--show-completion", "zsh")
+    assert (code, error) == (0, "")
+    assert "_COARTIC_COMPLETE=complete_zsh" in text

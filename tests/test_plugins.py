@@ -101,7 +101,7 @@ def test_a_changed_file_makes_its_records_stale(coartic, tmp_path):
     method.write_text(method.read_text(encoding="utf-8") + "\nCHANGED = 1\n", encoding="utf-8")
     _, text, error = coartic(*command)
     assert "0 were there, 1 done" in text
-    assert "1 records were made by other code and are not used" in error
+    assert "not used, made by other code: 1 record" in error
 
 
 def test_a_changed_helper_makes_records_stale_too(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from analysis.study import Study
 from analysis.words import slugs
 from benchmarks.suites import Cell, load_suite, select_cells
 from coartic import CoarticError, builtin_tasks
-from coartic.cli import _labels
+from coartic.cli.arguments import labels_in
 from tests.support.commands import call
 from tests.support.reports import compiled, report_of
 from tests.support.strategies import tiny_task
@@ -173,7 +173,7 @@ def refused(monkeypatch, capsys, *arguments):
 
 def test_labels_with_commas_are_quoted():
     text = ' a/b , "a/b x=1, y=2",a/c,a/b'
-    assert _labels(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
+    assert labels_in(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
 
 
 def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):

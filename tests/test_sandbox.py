@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks import sandbox
 from benchmarks.executors import Local
-from benchmarks.harness import perform_plan, record_of
+from benchmarks.harness import record_of
 from benchmarks.registry import registry
 from benchmarks.reproduce import perform_once
 from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
@@ -21,7 +21,7 @@ from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import Cell, run_specs
 from coartic import CoarticError, load_task
-from tests.support.suites import spec_of
+from tests.support.suites import perform_plan, spec_of
 
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"

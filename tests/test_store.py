@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.harness import perform_plan, record_of
+from benchmarks.harness import record_of
 from benchmarks.specification import Limits
 from benchmarks.store import Damage, RecordError, Store
 from benchmarks.suites import run_specs
 from coartic import CoarticError, files
-from tests.support.suites import InProcess, paper_cells
+from tests.support.suites import InProcess, paper_cells, perform_plan
 
 ROOT = Path(__file__).parent.parent
 
