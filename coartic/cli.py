@@ -206,10 +206,10 @@ def run(
 
     Interrupted by whatever, the same command goes on where it stopped.
     """
-    from analysis.comparisons.methods import methods_frame
-    from analysis.comparisons.paper import compare
-    from analysis.markup import words
-    from analysis.results.folder import load_results
+    from analysis import load
+    from analysis.report.comparison import comparison_document, notes_of
+    from analysis.report.formats.markdown import markdown
+    from analysis.report.formats.terminal import terminal_table
     from benchmarks.cluster import Dask
     from benchmarks.executors import Local
     from benchmarks.harness import perform_plan
@@ -270,11 +270,11 @@ def run(
             sys.exit(130)
         wall = time.perf_counter() - clock
         records = write_tables(store, manifest)
-        results = load_results(out)
-        comparison = compare(results)
+        study = load(out)
+        comparison = comparison_document(study)
         pages = {
-            "comparison.md": comparison.to_markdown(),
-            "methods.csv": methods_frame(results).to_csv(index=False),
+            "comparison.md": markdown(comparison, tables=""),
+            "methods.csv": study.methods.to_csv(index=False),
         }
         publish(
             out,
@@ -284,14 +284,10 @@ def run(
         )
 
     console = _console()
-    hidden = sum(
-        _print(console, table.title, table.columns, table.rows, wrap=False)
-        for table in comparison.tables
-    )
-    if hidden:
-        console.print("(The terminal is too narrow for all columns; comparison.md has them.)\n")
-    for note in comparison.notes:
-        console.print(one_line(f"- {words(note)}"))
+    for table in comparison.tables():
+        console.print(terminal_table(table, console.width))
+    for note in notes_of(comparison):
+        console.print(one_line(f"- {note}"))
     _say(
         "",
         f"{progress.total} runs: {progress.present} were there, {progress.done} done in "
