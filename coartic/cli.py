@@ -285,7 +285,7 @@ def run(
 
     console = _console()
     for table in comparison.tables():
-        console.print(terminal_table(table, console.width))
+        console.print(terminal_table(table, console.width), "")
     for note in notes_of(comparison):
         console.print(one_line(f"- {note}"))
     _say(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.markup import code, escaped, words
@@ -23,27 +25,23 @@ if TYPE_CHECKING:
 
 def comparison_document(study: Study) -> Document:
     """Published and ours, methods by task, and what the folder cannot show."""
-    by_task = [
-        Section(f"on-{slug}", task, _tables(methods_table(study, task)))
+    said: set[str] = set()
+    against_paper = published_table(study), sequences_table(study), exhaustive_table(study)
+    paper = Section("paper", "Published and ours", _noted(against_paper, said))
+    by_task = (
+        Section(f"on-{slug}", task, _noted([methods_table(study, task)], said))
         for task, slug in table_ids(study).items()
-    ]
-    sections = (
-        Section(
-            "paper",
-            "Published and ours",
-            _tables(published_table(study), sequences_table(study), exhaustive_table(study)),
-        ),
-        Section(
-            "methods",
-            "Methods side by side",
-            (Bullets(reading_of_methods(study)),),
-            tuple(section for section in by_task if section.blocks),
-        ),
-        Section("limitations", "Limitations", (Bullets(limitations(study)),)),
     )
+    methods = Section(
+        "methods",
+        "Methods side by side",
+        (Bullets(reading_of_methods(study)),),
+        tuple(section for section in by_task if section.blocks),
+    )
+    limits = Section("limitations", "Limitations", (Bullets(limitations(study)),))
     return Document(
-        "Published and ours",
-        tuple(section for section in sections if section.blocks),
+        "Comparison",
+        tuple(section for section in (paper, methods, limits) if section.blocks),
         _made(study),
         {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
     )
@@ -78,5 +76,12 @@ def _made(study: Study) -> str:
     return f"Suite {code(specification.suite)}{escaped(made)}"
 
 
-def _tables(*tables: DataTable | None) -> tuple[Block, ...]:
-    return tuple(with_legends(table) for table in tables if table is not None)
+def _noted(tables: Iterable[DataTable | None], said: set[str]) -> tuple[Block, ...]:
+    """The tables that there are, each with the notes that were not ``said`` before."""
+    found: list[Block] = []
+    for table in tables:
+        if table is not None:
+            notes = with_legends(table).notes
+            found.append(replace(table, notes=tuple(note for note in notes if note not in said)))
+            said.update(notes)
+    return tuple(found)
