@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -22,7 +21,7 @@ from analysis.comparisons.frontier import (
     pareto_frame,
     targets_frame,
 )
-from analysis.comparisons.methods import methods_frame
+from analysis.comparisons.methods import MethodRow, method_rows
 from analysis.comparisons.overall import combined, overall_frame, profiles_frame
 from analysis.comparisons.pairs import pairwise_frame
 from analysis.comparisons.progress import Progress, progress
@@ -78,14 +77,14 @@ class Study:
         return optima(self.results)
 
     @cached_property
-    def methods(self) -> dict[CellKey, dict[str, Any]]:
-        """Rows of :func:`analysis.comparisons.methods.methods_frame`."""
-        return {
-            (row["task"], f"{row['method']} {row['variant']}".strip()): {
-                str(key): value for key, value in row.items()
-            }
-            for row in methods_frame(self.results).to_dict("records")
-        }
+    def method_rows(self) -> dict[CellKey, MethodRow]:
+        """Every method on every task: the optimum's searches, then the best mean first."""
+        return {(row.task, row.label): row for row in method_rows(self)}
+
+    @cached_property
+    def methods(self) -> pd.DataFrame:
+        """The same as ``methods.csv`` has them: a column per field."""
+        return pd.DataFrame(list(self.method_rows.values()))
 
     @cached_property
     def pairs(self) -> pd.DataFrame:
@@ -130,7 +129,7 @@ class Study:
     @cached_property
     def pareto(self) -> pd.DataFrame:
         """Methods on the front of reward and spend, a bootstrap."""
-        return pareto_frame(self.results)
+        return pareto_frame(self)
 
     @cached_property
     def signatures(self) -> pd.DataFrame:

@@ -44,7 +44,7 @@ def _labels(data: Data, wanted: Callable[[str], bool]) -> list[str]:
             for task, label in data.study.cells
             if task in _TASKS
             and not label.startswith(OPTIMUM)
-            and wanted(data.study.methods[task, label]["told"])
+            and wanted(data.study.method_rows[task, label].told)
         )
     )
 
@@ -61,7 +61,7 @@ def _by_task(data: Data, labels: list[str], what: str, cell: Callable[[str, str]
                 shown.append(NONE)
             else:
                 shown.append(cell(task, label))
-                told = data.study.methods[task, label]["told"]
+                told = data.study.method_rows[task, label].told
         if set(shown) != {NONE}:
             rows.append((label, told, *shown))
     return Table(what, ("method", "told", *_TASKS), tuple(rows))
@@ -86,7 +86,7 @@ def _experience(data: Data) -> Finding:
         if row is None:
             return NONE
         median = "never" if math.isinf(row["median"]) else f"{row['median']:.0f}"
-        reward = data.study.methods[task, label]["reward"]
+        reward = data.study.method_rows[task, label].reward
         return f"{row['reached']}/{row['runs']}, {median} ({reward:.1f})"
 
     for task, condition in BEST:
@@ -106,10 +106,10 @@ def _computation(data: Data) -> Finding:
         data.runs(task, LEARNER + condition)
 
     def cell(task: str, label: str) -> str:
-        row = data.study.methods[task, label]
-        spent = row["forward_kinematics"] + row["jacobians"]
-        each = f", {short(spent / row['trials'])} a trial" if row["trials"] > 1 else ""
-        return f"{short(spent)}{each} ({row['reward']:.1f})"
+        row = data.study.method_rows[task, label]
+        spent = row.evaluations
+        each = f", {short(spent / row.trials)} a trial" if row.trials > 1 else ""
+        return f"{short(spent)}{each} ({row.reward:.1f})"
 
     uninformed = _labels(data, _uninformed)
     informed = [

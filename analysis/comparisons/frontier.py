@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from analysis.comparisons.methods import STILL, methods_frame, solve_times
+from analysis.comparisons.methods import STILL, solve_times
 from analysis.comparisons.progress import SPENDS, Progress, progress
 from analysis.results.folder import CellRuns, Results
 from analysis.results.optima import METHODS as OPTIMUM
@@ -26,6 +26,9 @@ from analysis.statistics import spread
 from analysis.statistics.estimates import CONFIDENCE
 from analysis.statistics.survival import kaplan_meier_median
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 SHARES = (0.05, 0.02, 0.01)
 """Distances from the optimum that count as reached, as shares of it."""
@@ -232,7 +235,7 @@ def targets_frame(
     return pd.DataFrame(rows, columns=f"{columns} median low high horizon".split())
 
 
-def pareto_frame(results: Results, *, seed: int = 0) -> pd.DataFrame:
+def pareto_frame(study: Study, *, seed: int = 0) -> pd.DataFrame:
     """Mean reward against spend: one row per task, method and spend, best reward first.
 
     A method is on the front if no other has a mean reward as high for as little spend, with
@@ -252,12 +255,12 @@ def pareto_frame(results: Results, *, seed: int = 0) -> pd.DataFrame:
     left out: a mean of the others flatters them. So are the optimum's searches, which are
     references, and methods with a base that a parameter locks.
     """
-    methods = methods_frame(results)
+    methods = study.methods
     methods = methods[(methods.solved == methods.runs) & (methods.runs > 0)]
     methods = methods.assign(method=(methods.method + " " + methods.variant).str.strip())
     cells = {
         (cell.task, cell.label): cell
-        for cell in results.cells
+        for cell in study.results.cells
         if not cell.method.startswith(OPTIMUM) and not locks_base(cell.runs)
     }
     kept = [key in cells for key in zip(methods.task, methods.method, strict=True)]

@@ -56,7 +56,7 @@ SPENDS = {
     "evaluations": ("forward_kinematics", "jacobians"),
     "solve_s": ("solve_s",),
 }
-"""What a run spends: sums of columns of :func:`analysis.comparisons.methods.methods_frame`."""
+"""What a run spends: sums of columns of :class:`analysis.comparisons.methods.MethodRow`."""
 COLUMNS = (
     "task kind first second runs_first runs_second n_first n_second mean_first mean_second "
     "sd_first sd_second difference low high interval pairs correlation independent_low "
@@ -108,7 +108,7 @@ def pairs(study: Study) -> Iterator[Pair]:
             against = [most]
             if cell.method.startswith(LEARNER) and own in plain:
                 kind, against = "variant", [own]
-            elif still in plain and study.methods[task, label]["other_arm"] == "still":
+            elif still in plain and study.method_rows[task, label].other_arm == "still":
                 against.append(str(still))
             for name in against:
                 more_told = _told(study, cell) - _told(study, plain[name])
@@ -170,9 +170,11 @@ def _row(study: Study, pair: Pair) -> dict[str, Any]:
         "sd_second": 0.0 if pair.known and len(b) else sd(b),
     }
     row |= _inference(pair, a, b)
-    first, second = (study.methods[task, cell.label] for cell in (pair.first, pair.second))
+    first, second = (study.method_rows[task, cell.label] for cell in (pair.first, pair.second))
     for name, columns in SPENDS.items():
-        ours, theirs = (sum(spent[column] for column in columns) for spent in (first, second))
+        ours, theirs = (
+            sum(getattr(spent, column) for column in columns) for spent in (first, second)
+        )
         row[name] = theirs / ours if ours else math.nan
     row["told_more"] = _letters(_told(study, pair.second) - _told(study, pair.first))
     row["told_less"] = _letters(_told(study, pair.first) - _told(study, pair.second))
@@ -253,7 +255,7 @@ def _rewards(cell: CellRuns) -> Array:
 
 
 def _told(study: Study, cell: CellRuns) -> set[str]:
-    return set(study.methods[cell.task, cell.label]["told"])
+    return set(study.method_rows[cell.task, cell.label].told)
 
 
 def _letters(told: set[str]) -> str:

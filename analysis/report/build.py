@@ -100,7 +100,11 @@ def build(
         _section("tasks-drawn", "Tasks", shown("tasks")),
         _section("paper", "Published and ours", [
             *shown("published", "learned-reward"),
-            *_tables(tables.published_table(study), tables.exhaustive_table(study)),
+            *_tables(
+                tables.published_table(study),
+                tables.sequences_table(study),
+                tables.exhaustive_table(study),
+            ),
             *shown("recruitment"),
         ]),
         _claims(study, judged, set(by_id)),

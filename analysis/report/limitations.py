@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.comparisons.methods import LEARNER
 from analysis.markup import code, escaped
+from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
 from analysis.report.summary import unlike_printed
 from analysis.statistics.estimates import FEWEST

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.comparisons.methods import methods_notes
 from analysis.markup import words
 from analysis.report.document import DataTable, Document
 from analysis.report.numbers import Number
+from analysis.report.tables.methods import READING_OF_METHODS
 from analysis.report.text import heads, texts
 from analysis.results.folder import Results
 from analysis.results.optima import SHIPPED, optima
@@ -116,7 +116,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
         "tables": {
             table.id: {
                 "caption": table.caption,
-                "notes": _notes(results, table),
+                "notes": _notes(table),
                 "columns": [column.name for column in table.columns],
                 "heads": heads(table),
                 "text": [column.name for column in table.columns if column.kind == "text"],
@@ -356,9 +356,9 @@ def _suite(results: Results) -> dict[str, Any]:
     }
 
 
-def _notes(results: Results, table: DataTable) -> list[str]:
+def _notes(table: DataTable) -> list[str]:
     """A table's notes as plain text; those of methods share what stands above them all."""
-    above = methods_notes(results) if table.id.startswith("methods-") else []
+    above = READING_OF_METHODS if table.id.startswith("methods-") else ()
     return list(dict.fromkeys(words(note) for note in (*above, *table.notes)))
 
 

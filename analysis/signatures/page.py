@@ -97,7 +97,7 @@ def signatures_page(study: Study) -> str:
     """Tables by task, between contexts and of locus slopes, from ``study.signatures``."""
     frame = study.signatures
     labels: dict[str, list[str]] = {name: [] for name in study.results.tasks}
-    for name, label in study.methods:  # best reward first within a task
+    for name, label in study.method_rows:  # best reward first within a task
         labels[name].append(label)
     parts: list[Part] = [Heading(1, "Signatures of coarticulation"), *_NOTES]
     for name, task in study.results.tasks.items():

@@ -10,7 +10,7 @@ import typer
 
 from coartic.cli import arguments as given
 from coartic.cli.arguments import check_numbers, names_in
-from coartic.cli.terminal import Display, performing, say, show_lines, show_table
+from coartic.cli.terminal import Display, performing, say, show_data, show_lines, show_table
 from coartic.errors import CoarticError
 from coartic.text import counted, json_text
 
@@ -81,28 +81,23 @@ class _Comparison:
     def pages(self, folder: Path) -> dict[str, bytes]:
         """What is written beside the tables."""
         self._display.end_runs()
-        from analysis.comparisons.methods import methods_frame
-        from analysis.comparisons.paper import compare
-        from analysis.results.folder import load_results
+        from analysis import load
+        from analysis.report.comparison import comparison_document
+        from analysis.report.formats.markdown import markdown
 
-        results = load_results(folder)
-        self._made = compare(results)
+        study = load(folder)
+        self._made = comparison_document(study)
         return {
-            "comparison.md": self._made.to_markdown().encode(),
-            "methods.csv": methods_frame(results).to_csv(index=False).encode(),
+            "comparison.md": markdown(self._made, tables="").encode(),
+            "methods.csv": study.methods.to_csv(index=False).encode(),
         }
 
     def show(self) -> None:
         """Print what fits the terminal."""
-        from analysis.markup import words
+        from analysis.report.comparison import notes_of
 
-        hidden = sum(
-            show_table(table.title, table.columns, table.rows, wrap=False)
-            for table in self._made.tables
-        )
-        if hidden:
-            say("(The terminal is too narrow for all columns; comparison.md has them.)", "")
-        show_lines(f"- {words(note)}" for note in self._made.notes)
+        show_data(self._made.tables())
+        show_lines(f"- {note}" for note in notes_of(self._made))
 
 
 def list_(method_file: given.MethodFiles = None) -> None:

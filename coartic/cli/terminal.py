@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
+    from analysis.report.document import DataTable
     from benchmarks.harness import Progress
     from benchmarks.specification import RunSpec
 
@@ -72,6 +73,15 @@ def show_table(
         table.add_row(*row[:shown])
     out.print(table)
     return len(columns) - shown
+
+
+def show_data(tables: Iterable[DataTable]) -> None:
+    """Print tables of values, as many columns of each as fit."""
+    from analysis.report.formats.terminal import terminal_table
+
+    out = console()
+    for table in tables:
+        out.print(terminal_table(table, out.width), "")
 
 
 def show_lines(lines: Iterable[str]) -> None:

@@ -100,7 +100,7 @@ def _signatures(
         (row["label"], row["signature"], place(row)): row for row in frame.to_dict("records")
     }
     rows = []
-    for own, label in study.methods:
+    for own, label in study.method_rows:
         if own != task:
             continue
         entries = [values.get((label, column.signature, column.place)) for column in columns]
