@@ -367,8 +367,9 @@ def analyse(
 ) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
     from analysis.claims import claims_page
-    from analysis.comparisons.frontier_page import frontier_page
-    from analysis.comparisons.pairs_page import comparisons_page
+    from analysis.report.formats.markdown import markdown
+    from analysis.report.pages.comparisons import comparisons_document
+    from analysis.report.pages.frontier import frontier_document
     from analysis.signatures.page import signatures_page
     from analysis.study import load
     from coartic.files import publish
@@ -377,8 +378,8 @@ def analyse(
     results = study.results
     pages = {
         "claims.md": claims_page(results, study.judged),
-        "comparisons.md": comparisons_page(study, study.pairs, study.overall, study.scores),
-        "frontier.md": frontier_page(results, study.targets, study.areas, study.pareto),
+        "comparisons.md": markdown(comparisons_document(study), tables=""),
+        "frontier.md": markdown(frontier_document(study), tables=""),
         "signatures.md": signatures_page(study),
     }
     frames = {
