@@ -575,6 +575,9 @@ def compare(
 ) -> None:
     """Compare two results folders cell by cell: versions, machines, parameters."""
     from analysis.comparisons.versions import compare_versions, load_pair
+    from analysis.report.formats.markdown import markdown
+    from analysis.report.formats.terminal import terminal_table
+    from analysis.report.pages.versions import versions_document
     from coartic.files import check_outputs, write_outputs
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
@@ -584,12 +587,13 @@ def compare(
         csv = out.with_suffix(".csv")
     check_outputs(filter(None, (out, csv)), replace=replace)
     found = compare_versions(*load_pair(first, second))
-    texts = {out: found.to_markdown(), csv: found.cells.to_csv(index=False)}
+    document = versions_document(found)
+    texts = {out: markdown(document, tables=""), csv: found.cells.to_csv(index=False)}
     written = {path: text.encode() for path, text in texts.items() if path is not None}
     write_outputs(written, replace=replace)
     console = _console()
-    for table in (found.differing, found.table):
-        _print(console, table.title, table.columns, table.rows, wrap=table is found.differing)
+    for table in document.tables():
+        console.print(terminal_table(table, console.width))
     _say(*found.summary)
     if written:
         _say(f"In {' and '.join(map(str, written))}.")

@@ -219,8 +219,8 @@ def _cost(study: Study, frontier: list[Block]) -> Section:
         found = list(cost_tables(study, task))
         if found:
             folded = [replace(table, folded=True) for table in found[1:]]
-            blocks = [optima_known(study, task), found[0], *folded]
-            below.append(_section(f"on-{slug}-cost", task, blocks))
+            every: list[Block] = [optima_known(study, task), found[0], *folded]
+            below.append(_section(f"on-{slug}-cost", task, every))
     reading = Bullets(tables.READING_OF_COST)
     return _section("cost", "Reward and what it costs", [*frontier, reading], below)
 

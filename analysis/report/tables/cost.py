@@ -63,8 +63,9 @@ def targets_table(
     frame = _of_methods(study.targets, task)
     frame = frame[(frame.spend == spend) & (frame.other_arm == other_arm)]
     methods: dict[str, list[Target]] = {}
-    for row in frame.itertuples(index=False):
-        methods.setdefault(row.method, []).append(Target(*row))
+    for row in frame.itertuples(index=False, name=None):
+        target = Target(*row)
+        methods.setdefault(target.method, []).append(target)
     near = [rows for rows in methods.values() if any(row.reached for row in rows)]
     if not near:
         return None
@@ -136,7 +137,7 @@ def areas_table(study: Study, task: str) -> DataTable | None:
     spends = [spend for spend in SPENDS if (frame.spend == spend).any()]
     known = {
         (area.method, area.other_arm, area.spend): area
-        for area in (Area(*row) for row in frame.itertuples(index=False))
+        for area in (Area(*row) for row in frame.itertuples(index=False, name=None))
     }
     rows = [
         Row(

@@ -12,6 +12,7 @@ from analysis.comparisons.targets import SHARES
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, RestsOn, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
+from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -96,10 +97,11 @@ def _pairing(study: Study) -> str:
                 np.array([getattr(row, f"{of}high") - getattr(row, f"{of}low") for row in rows])
                 for of in ("", "independent_")
             )
-            correlation = np.median([row.correlation for row in rows])
+            median = np.median([row.correlation for row in rows])
+            correlation = typographic(f"{median:.2f}")
             parts.append(
-                f"{text} correlate by {correlation:.2f} (median of {len(rows)}) and their intervals "
-                f"are {np.nanmedian(paired / alone):.2f} times as wide as without pairing"
+                f"{text} correlate by {correlation} (median of {len(rows)}), their "
+                f"intervals are {np.nanmedian(paired / alone):.2f} times as wide as unpaired ones"
             )
     if not parts:
         return ""
