@@ -14,22 +14,18 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.claims import Judged, claims_frame, judge
-from analysis.comparisons.frontier import (
-    anytime_frame,
-    area_frame,
-    for_both_arms,
-    pareto_frame,
-    targets_frame,
-)
+from analysis.comparisons.anytime import anytime_curves
+from analysis.comparisons.areas import areas
 from analysis.comparisons.methods import MethodRow, method_rows
-from analysis.comparisons.overall import combined, overall_frame, profiles_frame
-from analysis.comparisons.pairs import pairwise_frame
-from analysis.comparisons.progress import Progress, progress
+from analysis.comparisons.overall import combined, normalised_scores, over_tasks, profiles
+from analysis.comparisons.pairs import PairRow, compared, pairs_table
+from analysis.comparisons.pareto import pareto_sets
+from analysis.comparisons.progress import BestSoFar, best_so_far
+from analysis.comparisons.targets import targets
 from analysis.results.folder import CellRuns, Results, load_results
 from analysis.results.optima import Optimum, optima
 from analysis.signatures import signatures_frame
 from analysis.signatures.cell import Cell, cells_of
-from analysis.statistics.across_tasks import scores_frame
 from analysis.statistics.estimates import SEED
 from coartic import Task
 
@@ -87,49 +83,55 @@ class Study:
         return pd.DataFrame(list(self.method_rows.values()))
 
     @cached_property
+    def pair_rows(self) -> tuple[PairRow, ...]:
+        """Methods against each other, one a pair."""
+        return compared(self)
+
+    @cached_property
     def pairs(self) -> pd.DataFrame:
-        """:func:`analysis.comparisons.pairs.pairwise_frame`: methods against each other."""
-        return pairwise_frame(self)
+        """The same as a table, its columns the fields of
+        :class:`~analysis.comparisons.pairs.PairRow`."""
+        return pairs_table(self.pair_rows)
 
     @cached_property
     def scores(self) -> pd.DataFrame:
         """Normalised rewards of every run, labels in place of methods and variants."""
-        return combined(scores_frame(self.results))
+        return combined(normalised_scores(self))
 
     @cached_property
     def overall(self) -> pd.DataFrame:
-        """:func:`analysis.comparisons.overall.overall_frame`: methods over all tasks."""
-        return overall_frame(self.scores)
+        """:func:`analysis.comparisons.overall.over_tasks`: methods over all tasks."""
+        return over_tasks(self.scores)
 
     @cached_property
     def profiles(self) -> pd.DataFrame:
-        """:func:`analysis.comparisons.overall.profiles_frame`."""
-        return profiles_frame(self.scores)
+        """:func:`analysis.comparisons.overall.profiles`."""
+        return profiles(self.scores)
 
     @cached_property
-    def progress(self) -> Mapping[str, Progress]:
+    def best_so_far(self) -> Mapping[str, BestSoFar]:
         """Best reward so far of every run, by run id."""
-        return progress(self.results)
+        return best_so_far(self)
 
     @cached_property
     def anytime(self) -> pd.DataFrame:
         """Mean best reward so far over what is spent."""
-        return anytime_frame(self.results, self.progress)
+        return anytime_curves(self)
 
     @cached_property
     def targets(self) -> pd.DataFrame:
         """What it takes to come near the optimum, of both other arms."""
-        return for_both_arms(targets_frame, self.results, self.progress)
+        return targets(self)
 
     @cached_property
     def areas(self) -> pd.DataFrame:
         """Area under the anytime curves, of both other arms."""
-        return for_both_arms(area_frame, self.results, self.progress)
+        return areas(self)
 
     @cached_property
     def pareto(self) -> pd.DataFrame:
         """Methods on the front of reward and spend, a bootstrap."""
-        return pareto_frame(self)
+        return pareto_sets(self)
 
     @cached_property
     def signatures(self) -> pd.DataFrame:

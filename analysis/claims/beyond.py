@@ -22,7 +22,6 @@ from analysis.claims.data import (
 from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.frontier import targets_frame
 from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.published import published_cell
 from analysis.results.optima import METHODS as OPTIMUM
@@ -75,10 +74,9 @@ def _experience(data: Data) -> Finding:
     # Methods that keep the other arm still, to the optimum with it still.
     reached = {
         (row["task"], row["method"]): row
-        for arm in ("free", "still")
-        for row in targets_frame(data.results, data.study.progress, other_arm=arm, shares=(NEAR,))
-        .query("spend == 'trials'")
-        .to_dict("records")
+        for row in data.study.targets.query("spend == 'trials' and share == @NEAR").to_dict(
+            "records"
+        )
     }
 
     def cell(task: str, label: str) -> str:

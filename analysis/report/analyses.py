@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from analysis.claims import claims_page
-from analysis.comparisons.frontier_page import frontier_page
-from analysis.comparisons.pairs_page import comparisons_page
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.comparisons import comparisons_document
+from analysis.report.pages.frontier import frontier_document
 from analysis.signatures.page import signatures_page
 from analysis.study import Study
 
@@ -13,8 +14,8 @@ def analyse(study: Study) -> dict[str, bytes]:
     """All pages and tables by file name."""
     pages = {
         "claims.md": claims_page(study.results, study.judged),
-        "comparisons.md": comparisons_page(study, study.pairs, study.overall, study.scores),
-        "frontier.md": frontier_page(study.results, study.targets, study.areas, study.pareto),
+        "comparisons.md": markdown(comparisons_document(study), tables=""),
+        "frontier.md": markdown(frontier_document(study), tables=""),
         "signatures.md": signatures_page(study),
     }
     tables = {

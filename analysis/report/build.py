@@ -31,6 +31,7 @@ from analysis.report.document import (
 from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
+from analysis.report.pages.frontier import cost_tables, optima_known
 from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
 from analysis.report.trace import FILE, trace_json
@@ -85,7 +86,7 @@ def build(
     figures = all_figures(study, MOST_TASKS, methods)
     numbers = tuple(headline_numbers(study))
     by_id = {plot.id: plot for plot in figures.plots}
-    judged, pairs, scores = study.judged, study.pairs, study.scores
+    judged, scores = study.judged, study.scores
     used: set[str] = set()
 
     def shown(*starts: str) -> list[Block]:
@@ -119,7 +120,7 @@ def build(
             *shown("configurations"),
         ]),
         _section("learning", "Learning", shown("learning-curves")),
-        _methods(study, pairs, scores, shown("profiles")),
+        _methods(study, shown("profiles")),
         _cost(study, shown("frontier")),
         _signatures(study, shown("context"), shown("signatures")),
         _section("more-figures", "More figures", shown("")),
@@ -194,37 +195,38 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
     return _section("summary", "Summary", blocks)
 
 
-def _methods(
-    study: Study, pairs: pd.DataFrame, scores: pd.DataFrame, profiles: list[Block]
-) -> Section:
+def _methods(study: Study, profiles: list[Block]) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
         blocks = _tables(tables.methods_table(study, task))
         if not _many(study):
             blocks += _tables(
-                _folded(tables.pairwise_table(study, pairs, task)),
-                _folded(tables.cost_table(study, pairs, task)),
+                _folded(tables.pairwise_table(study, task)),
+                _folded(tables.cost_table(study, task)),
             )
         if blocks:
             below.append(_section(f"on-{slug}-methods", task, blocks))
-    reading = Bullets(tables.reading_of_methods(study))
+    reading = Bullets(
+        (
+            *tables.reading_of_methods(study),
+            *(tables.reading_of_pairs(study) if study.pair_rows and not _many(study) else ()),
+        )
+    )
     return _section("methods", "Methods side by side", [*profiles, reading], below)
 
 
 def _cost(study: Study, frontier: list[Block]) -> Section:
     if _many(study):
         return _section("cost", "Reward and what it costs", frontier)
-    targets, areas, pareto = study.targets, study.areas, study.pareto
     below = []
     for task, slug in tables.table_ids(study).items():
-        blocks = _tables(
-            tables.targets_table(study, targets, task),
-            _folded(tables.areas_table(study, areas, task)),
-            _folded(tables.pareto_table(study, pareto, task)),
-        )
-        if blocks:
-            below.append(_section(f"on-{slug}-cost", task, blocks))
-    return _section("cost", "Reward and what it costs", frontier, below)
+        found = list(cost_tables(study, task))
+        if found:
+            folded = [replace(table, folded=True) for table in found[1:]]
+            every: list[Block] = [optima_known(study, task), found[0], *folded]
+            below.append(_section(f"on-{slug}-cost", task, every))
+    reading = Bullets(tables.READING_OF_COST)
+    return _section("cost", "Reward and what it costs", [*frontier, reading], below)
 
 
 def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Section:

@@ -264,9 +264,9 @@ def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
     )  # fmt: skip
     if cell.variant:
         return
-    row, free = study.methods[key], study.optima.get((task, "free"))
-    for column, macro, arm in (("gap", "Gap", "free"), ("gap_still", "GapStill", "still")):
-        if math.isnan(row[column]):
+    row, free = study.method_rows[key], study.optima.get((task, "free"))
+    for known_gap, macro, arm in ((row.gap, "Gap", "free"), (row.gap_still, "GapStill", "still")):
+        if math.isnan(known_gap):
             continue
         source = study.optima[task, arm]
         best = source.reward

@@ -10,7 +10,7 @@ import typer
 
 from coartic.cli import arguments as given
 from coartic.cli.arguments import labels_in, names_in
-from coartic.cli.terminal import say, show_table
+from coartic.cli.terminal import say, show_data, show_table
 from coartic.errors import CoarticError
 from coartic.text import counted
 
@@ -105,6 +105,8 @@ def compare(
 ) -> None:
     """Compare two results folders cell by cell: versions, machines, parameters."""
     from analysis.comparisons.versions import compare_versions, load_pair
+    from analysis.report.formats.markdown import markdown
+    from analysis.report.pages.versions import versions_document
     from coartic.files import check_outputs, write_outputs
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
@@ -114,11 +116,11 @@ def compare(
         csv = out.with_suffix(".csv")
     check_outputs(filter(None, (out, csv)), replace=replace)
     found = compare_versions(*load_pair(first, second))
-    texts = {out: found.to_markdown(), csv: found.cells.to_csv(index=False)}
+    document = versions_document(found)
+    texts = {out: markdown(document, tables=""), csv: found.cells.to_csv(index=False)}
     written = {path: text.encode() for path, text in texts.items() if path is not None}
     write_outputs(written, replace=replace)
-    for table in (found.differing, found.table):
-        show_table(table.title, table.columns, table.rows, wrap=table is found.differing)
+    show_data(document.tables())
     say(*found.summary)
     if written:
         say(f"In {' and '.join(map(str, written))}.")

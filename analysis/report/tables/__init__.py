@@ -2,13 +2,19 @@
 
 from analysis.report.tables.claims import claims_table
 from analysis.report.tables.common import table_ids
-from analysis.report.tables.cost import areas_table, pareto_table, targets_table
+from analysis.report.tables.cost import (
+    READING_OF_COST,
+    areas_table,
+    pareto_table,
+    targets_table,
+)
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
-from analysis.report.tables.pairs import cost_table, pairwise_table
+from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.report.tables.paper import exhaustive_table, published_table, sequences_table
 from analysis.report.tables.signatures import contexts_table, signatures_tables
 
 __all__ = [
+    "READING_OF_COST",
     "areas_table",
     "claims_table",
     "contexts_table",
@@ -20,6 +26,7 @@ __all__ = [
     "pareto_table",
     "published_table",
     "reading_of_methods",
+    "reading_of_pairs",
     "sequences_table",
     "signatures_tables",
     "table_ids",
