@@ -369,7 +369,8 @@ def analyse(
     from analysis.claims import claims_page
     from analysis.comparisons.frontier_page import frontier_page
     from analysis.comparisons.pairs_page import comparisons_page
-    from analysis.signatures.page import signatures_page
+    from analysis.report.formats.markdown import markdown
+    from analysis.report.pages.signatures import signatures_document
     from analysis.study import load
     from coartic.files import publish
 
@@ -379,7 +380,7 @@ def analyse(
         "claims.md": claims_page(results, study.judged),
         "comparisons.md": comparisons_page(study, study.pairs, study.overall, study.scores),
         "frontier.md": frontier_page(results, study.targets, study.areas, study.pareto),
-        "signatures.md": signatures_page(study),
+        "signatures.md": markdown(signatures_document(study), tables=""),
     }
     frames = {
         "claims.csv": study.claims,

@@ -2,11 +2,12 @@
 
 from analysis.report.tables.claims import claims_table
 from analysis.report.tables.common import table_ids
+from analysis.report.tables.contexts import contexts_table, slopes_tables
 from analysis.report.tables.cost import areas_table, pareto_table, targets_table
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
 from analysis.report.tables.pairs import cost_table, pairwise_table
 from analysis.report.tables.paper import exhaustive_table, published_table
-from analysis.report.tables.signatures import contexts_table, signatures_tables
+from analysis.report.tables.signatures import signatures_tables
 
 __all__ = [
     "areas_table",
@@ -21,6 +22,7 @@ __all__ = [
     "published_table",
     "reading_of_methods",
     "signatures_tables",
+    "slopes_tables",
     "table_ids",
     "targets_table",
 ]
