@@ -137,7 +137,7 @@ def lead(contexts: Contexts, signature: Signature) -> Iterator[Value]:
     if found is None:
         yield signature.at(place, n=n, why_not="not distinguishable at the hit")
     else:
-        yield signature.at(place, value=found, n=n)
+        yield signature.at(place, value=float(found), n=n)
 
 
 @dataclass(frozen=True)
