@@ -8,48 +8,13 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+from analysis.methods import METHODS
 from analysis.signatures.register import REGISTER
 from analysis.words import slugs
 from coartic import CoarticError, __version__
 from coartic.text import one_line
 
 PAPER = "shah2013"
-METHODS: dict[str, tuple[str, ...]] = {
-    "dual-process/": (PAPER,),
-    "dual-process/EC1-nullspace": (PAPER, "liegeois1977"),
-    "dual-process/EC4-nullspace": (PAPER, "liegeois1977"),
-    "dual-process/EC1-biased": (PAPER, "spall2003"),
-    "dual-process/EC4-biased": (PAPER, "spall2003"),
-    "corrective-alone/": ("whitney1969", PAPER),
-    "random-search/pure": ("rastrigin1963",),
-    "random-search/climbing": ("beyer2002",),
-    "cma-es/bandit": ("hansen2016", "auger2005", "auer2002"),
-    "cma-es/every": ("hansen2016", "auger2005", "karnin2013"),
-    "nullspace-qp/": ("nakamura1987", "kanoun2011"),
-    "nullspace-qp/next-goal": (
-        *("nakamura1987", "kanoun2011"),
-        *("rohanimanesh2004", "thibodeau2004"),
-    ),
-    "nullspace-qp/preshaping": (
-        *("nakamura1987", "kanoun2011"),
-        *("rohanimanesh2004", "thibodeau2004"),
-    ),
-    "posture-based/": ("rosenbaum2001",),
-    "trajectory-optimisation/path-length": ("betts1998",),
-    "trajectory-optimisation/squared-changes": ("jordan1992", "jordan1986"),
-    "trajectory-optimisation/acceleration": ("flash1985",),
-    "trajectory-optimisation/jerk": ("flash1985",),
-    "optimum/": (),  # this software's own
-    "optimum/branch-and-bound": ("mccormick1976", "goulart2024"),
-}
-"""Keys of ``references.bib`` by the beginning of a built-in method's id; the longest counts."""
-_NONLINEAR = ("wachter2006", "andersson2019")  # baselines/trajectory_problem.py
-SOLVERS: dict[str, tuple[str, ...]] = {
-    "nullspace-qp/": ("diamond2016", "arnstrom2022"),  # by default
-    "trajectory-optimisation/": _NONLINEAR,
-    "optimum/": _NONLINEAR,
-}
-"""Keys of the works behind what poses and solves a method's programmes, beside the above."""
 ANALYSIS: tuple[str, ...] = (
     *("efron1993", "davison1997", "cliff1993", "agarwal2021", "newcombe2006", "holm1979"),
     *("chung2013", "schuirmann1987", "dolan2002", "kaplan1958", "brookmeyer1982"),
@@ -161,21 +126,6 @@ def software(environment: Mapping[str, Any] | None = None) -> Reference:
     )
 
 
-def keys_of(method: str) -> tuple[str, ...] | None:
-    """Keys of a built-in method, first the most telling; None for one that has no row."""
-    return _longest(METHODS, method)
-
-
-def solver_keys_of(method: str) -> tuple[str, ...]:
-    """Keys of the works behind the solvers of a built-in method."""
-    return _longest(SOLVERS, method) or ()
-
-
-def _longest(rows: Mapping[str, tuple[str, ...]], method: str) -> tuple[str, ...] | None:
-    prefixes = [prefix for prefix in rows if method.startswith(prefix)]
-    return rows[max(prefixes, key=len)] if prefixes else None
-
-
 def bibliography(
     methods: list[MethodSource],
     *,
@@ -193,11 +143,11 @@ def bibliography(
     reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
     others = []
     for method in methods:
-        keys = keys_of(method.id) if method.built_in else None
-        if keys is None:
+        row = METHODS.get(method.id) if method.built_in else None
+        if row is None:
             others.append(method)
             continue
-        for key in (*keys, *solver_keys_of(method.id)):
+        for key in (*row.works, *row.solvers):
             reasons.setdefault(key, []).append(method.id)
     if analysis:
         for key in ANALYSIS:

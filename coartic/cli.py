@@ -665,10 +665,10 @@ def cite(
         ]
     else:
         manifest = load_results(folder).manifest
-        environment = manifest["environment"]
+        environment = manifest.environment.model_dump(mode="json")
         methods = [
-            MethodSource(name, item["title"], item["citation"], item["origin"] == BUILT_IN)
-            for name, item in manifest["specification"]["methods"].items()
+            MethodSource(name, item.title, item.citation, item.origin == BUILT_IN)
+            for name, item in manifest.specification.methods.items()
         ]
     text = bibliography(methods, analysis=analysis, environment=environment)
     _say(*text.rstrip("\n").split("\n"))

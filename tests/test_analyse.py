@@ -6,10 +6,10 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
+from analysis.signatures.page import signatures_page
 from scipy import stats
 
 from analysis.results.folder import load_results
-from analysis.signatures.page import signatures_page
 from analysis.statistics.estimates import holm
 from analysis.study import Study
 from tests.support.commands import call

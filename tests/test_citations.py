@@ -9,17 +9,14 @@ import pytest
 
 from analysis.citations import (
     ANALYSIS,
-    METHODS,
     PAPER,
-    SOLVERS,
     MethodSource,
     bibliography,
-    keys_of,
     parse,
     references,
     software,
-    solver_keys_of,
 )
+from analysis.methods import METHODS
 from analysis.results.laws import read_manifest
 from benchmarks.registry import BUILT_IN, registry
 from benchmarks.suites import Cell
@@ -51,8 +48,7 @@ def surnames(key):
 
 @pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
 def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
-    keys, text = keys_of(method.name), plain(method.citation)
-    assert keys is not None
+    keys, text = METHODS[method.name].works, plain(method.citation)
     if not keys:
         assert text.startswith("This package")
     named = set(re.findall(r"(?:[A-Z]\.-?)+(?: [A-Z]\.)* ([A-Z][\w-]+)", text))
@@ -67,18 +63,13 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
         assert title in text.lower() or key in ("kanoun2011", PAPER)
 
 
-def test_every_row_and_every_entry_is_used():
-    used = {PAPER, *ANALYSIS}
-    for method in BUILT_IN:
-        used.update(keys_of(method.name), solver_keys_of(method.name))
-    assert used == set(BIB)
-    for rows, find in ((METHODS, keys_of), (SOLVERS, solver_keys_of)):
-        for prefix, keys in rows.items():
-            assert any(
-                method.name.startswith(prefix) and find(method.name) == keys for method in BUILT_IN
-            ), prefix
-    assert keys_of("nobody/knows") is None
-    assert solver_keys_of("nobody/knows") == ()
+def test_every_method_has_a_row_and_every_row_a_method():
+    assert list(METHODS) == [method.name for method in BUILT_IN]
+
+
+def test_every_entry_is_used():
+    behind_methods = {key for row in METHODS.values() for key in (*row.works, *row.solvers)}
+    assert {PAPER, *ANALYSIS} | behind_methods == set(BIB)
 
 
 @pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
@@ -90,13 +81,13 @@ def test_solvers_are_cited_where_the_code_uses_them(method):
     if "from baselines.cascade import" in text:
         due = {"diamond2016", "arnstrom2022"}
         assert method.Parameters().solver == "daqp"
-    assert set(solver_keys_of(method.name)) == due
+    assert set(METHODS[method.name].solvers) == due
 
 
 def test_works_behind_analysis_and_solvers_are_named():
     texts = [*ROOT.glob("analysis/**/*.py"), *ROOT.glob("docs/*.md")]
     text = plain("\n".join(path.read_text(encoding="utf-8") for path in texts))
-    for key in (*ANALYSIS, *(key for keys in SOLVERS.values() for key in keys)):
+    for key in (*ANALYSIS, *(key for row in METHODS.values() for key in row.solvers)):
         first = plain(BIB[key].fields["author"]).partition(",")[0]
         assert re.search(rf"{first}[^\n]*\n?[^\n]*{BIB[key].fields['year']}", text), key
 

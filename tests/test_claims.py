@@ -20,21 +20,19 @@ from analysis.claims import (
 )
 from analysis.claims.judges.reach import shortest_reach
 from analysis.results.folder import Results
-from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.signatures.trajectories import Trajectories
+from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.study import Study
 from analysis.table import interval
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
 from coartic.cli import app
-from tests.support.made_up import row
+from tests.support.made_up import manifest_for, row
 from tests.support.strategies import changed
 from tests.support.suites import run_and_write
 
-NOTHING = Results(
-    None, {"specification": {"tasks": {}, "cells": []}}, pd.DataFrame(), pd.DataFrame()
-)
+NOTHING = Results(None, manifest_for([]), pd.DataFrame(), pd.DataFrame())
 
 
 def test(p):
@@ -127,18 +125,13 @@ SEQUENCES = {
 
 def planted_results(rows, tmp_path, sequences=SEQUENCES, tasks=()):
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    cells = runs[["task", "method", "variant"]].drop_duplicates().to_dict("records")
     known = {task.name: task for task in (*map(load_task, runs.task.unique()), *tasks)}
     table = [
         {"task": task, "hands": hands, "reward": reward}
         for task, rewards in sequences.items()
         for hands, reward in rewards.items()
     ]
-    specification = {
-        "tasks": {name: task.model_dump(mode="json") for name, task in known.items()},
-        "cells": cells,
-    }
-    return Results(tmp_path, {"specification": specification}, runs, pd.DataFrame(table))
+    return Results(tmp_path, manifest_for(known.values(), runs), runs, pd.DataFrame(table))
 
 
 def verdict_of(claim, study):

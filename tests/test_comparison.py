@@ -1,5 +1,7 @@
 """The comparison with the paper: its statistics against independent ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from analysis.published import (
 from benchmarks.registry import registry
 from benchmarks.suites import load_suite, select_cells
 from coartic import load_task
-from tests.support.made_up import fake_results
+from tests.support.made_up import fake_results, manifest_for
 
 
 def test_published_numbers():
@@ -70,7 +72,7 @@ def test_cells_and_sequences(tmp_path):
     assert [r[2] for r in sequences.rows] == ["RRLR", "RRRR"]
     assert any("1 runs of two-armed-1 x dual-process/EC2 are infeasible: planted" in note
                for note in page.notes)  # fmt: skip
-    assert "commit abc with changes" in page.to_markdown()
+    assert "commit abc4567 with changes" in page.to_markdown()
     assert any("7 of 30000 trials failed" in note for note in page.notes)
     assert row["task"] == "two-armed-1 †"
     assert any(note.startswith("† Reconstructed: goals and start") for note in page.notes)
@@ -89,11 +91,8 @@ def test_hands_the_paper_does_not_print(tmp_path):
             "hands": ["RLRR", "RRRR"], "initial_reward": [-357, -357],
         },
     )  # fmt: skip
-    for table in (results.runs, results.manifest["specification"]["cells"][0]):
-        table["task"], table["method"] = "two-armed-2", "dual-process/EC4"
-    results.manifest["specification"]["tasks"] = {
-        "two-armed-2": load_task("two-armed-2").model_dump(mode="json")
-    }
+    runs = results.runs.assign(task="two-armed-2", method="dual-process/EC4")
+    results = replace(results, manifest=manifest_for([load_task("two-armed-2")], runs), runs=runs)
     sequences = compare(results).tables[1]
     assert [row[2:5] for row in sequences.rows] == [("RLRR", "–", "–"), ("RRRR", "–", "–")]
 

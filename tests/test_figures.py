@@ -26,9 +26,10 @@ from analysis.figures.profiles import profiles
 from analysis.figures.published import published
 from analysis.figures.recruitment import recruitment
 from analysis.figures.signature_matrix import signature_matrix
-from analysis.figures.style import _KNOWN, RC, amount, looks, number, on, short
+from analysis.figures.style import RC, amount, looks, number, on
 from analysis.figures.svg import compact, relative
 from analysis.figures.tasks import tasks_plot
+from analysis.methods import METHODS, short_name
 from analysis.study import Study
 from benchmarks.suites import load_suite, select_cells
 from coartic import CoarticError, corrective_trial, execute, load_task
@@ -184,7 +185,7 @@ def test_a_row_for_each_common_hand_sequence(study):
             for row in rows.itertuples():
                 own = cell[cell.hands == row.hands].reward.astype(float)
                 assert abs(row.total - own.median()) == (own - own.median()).abs().min()
-                name = f"{short(label)}, {row.hands} ({counts[row.hands]} of 4)"
+                name = f"{short_name(label)}, {row.hands} ({counts[row.hands]} of 4)"
                 assert [title for title in titles if title.endswith(name)]
     assert several
 
@@ -415,14 +416,16 @@ def test_svg_for_a_page(figures):
 
 def test_short_names_and_looks_tell_methods_apart():
     labels = list(KNOWN)
-    assert len({short(label) for label in labels}) == len(labels)
-    assert set(_KNOWN) <= set(labels)
-    assert len(set(looks(_KNOWN).values())) == len(_KNOWN)
+    assert len({short_name(label) for label in labels}) == len(labels)
+    drawn = [name for name, row in METHODS.items() if row.look]
+    assert len(set(looks(drawn).values())) == len(drawn)
     own = looks(f"own-{k}" for k in range(20))
     assert len(set(own.values())) == 20
-    assert looks(["mine", "dual-process/EC4"])["dual-process/EC4"] == _KNOWN["dual-process/EC4"]
-    assert short("dual-process/EC4 noise_sd=0.02") == "EC4 (σ 0.02)"
-    assert short("cma-es/every other_arm=still") == "CMA-ES, every (other arm still)"
+    learner = "dual-process/EC4"
+    assert looks(["mine", learner])[learner] == looks([learner])[learner]
+    assert short_name("dual-process/EC4 noise_sd=0.02") == "EC4 (σ 0.02)"
+    assert short_name("cma-es/every other_arm=still") == "CMA-ES, every (other arm still)"
+    assert short_name("cma-es/bold epsilon=0.1") == "cma-es/bold (ε 0.1)"  # nobody of ours
 
 
 def test_numbers():

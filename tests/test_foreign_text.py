@@ -43,8 +43,10 @@ from benchmarks.harness import Progress
 from benchmarks.store import Store
 from benchmarks.suites import Cell
 from coartic import CoarticError, cli, load_task
+from coartic.record import Commit
 from coartic.text import json_text, one_line, plain, printed, shell_line
 from tests.support.commands import call
+from tests.support.made_up import replanned
 from tests.support.reports import Page
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, run_and_write, with_environment
@@ -298,34 +300,39 @@ def named(results):
     tasks = {name: f"{k}{EVIL}" for k, name in enumerate(results.tasks)}
     methods = {"corrective-alone/given": EVIL, "dual-process/EC3": f"dual-process/{EVIL}"}
     variants = {"noise_sd=0.1": f"noise_sd={EVIL}"}
-    old = results.manifest["specification"]
+    old = results.manifest.specification
     cells = [
-        {
-            "task": tasks[cell["task"]],
-            "method": methods.get(cell["method"], cell["method"]),
-            "variant": variants.get(cell["variant"], cell["variant"]),
-        }
-        for cell in old["cells"]
+        cell.model_copy(
+            update={
+                "task": tasks[cell.task],
+                "method": methods.get(cell.method, cell.method),
+                "variant": variants.get(cell.variant, cell.variant),
+            }
+        )
+        for cell in old.cells
     ]
-    specification = {
-        **old,
-        "suite": EVIL,
-        "cells": cells,
-        "tasks": {tasks[name]: {**task, "title": EVIL} for name, task in old["tasks"].items()},
-        "methods": {
-            methods.get(name, name): {**item, "title": EVIL, "citation": EVIL, "origin": EVIL}
-            for name, item in old["methods"].items()
+    declared = {"title": EVIL, "citation": EVIL, "origin": EVIL}
+    manifest = replanned(
+        results.manifest,
+        suite=EVIL,
+        cells=tuple(cells),
+        tasks={tasks[name]: {**task, "title": EVIL} for name, task in old.tasks.items()},
+        methods={
+            methods.get(name, name): item.model_copy(update=declared)
+            for name, item in old.methods.items()
         },
-    }
-    environment = {
-        **results.manifest["environment"],
-        **dict.fromkeys(
-            ("platform", "processor", "python", "coartic", "date", "model_code"), EVIL
-        ),
-        "command": ["coartic", "run", EVIL],
-        "commit": {"id": EVIL, "dirty": True},
-        "packages": {EVIL: EVIL},
-    }
+    )
+    environment = manifest.environment.model_copy(
+        update={
+            **dict.fromkeys(
+                ("platform", "processor", "python", "coartic", "date", "model_code"), EVIL
+            ),
+            "command": ("coartic", "run", EVIL),
+            "commit": Commit.model_construct(id=EVIL, dirty=True),
+            "packages": {EVIL: EVIL},
+        }
+    )
+    manifest = manifest.model_copy(update={"environment": environment})
     runs = results.runs.assign(
         task=results.runs.task.map(tasks),
         method=results.runs.method.replace(methods),
@@ -343,7 +350,6 @@ def named(results):
     runs["failed_trials"] = 5
     runs.loc[runs.method != "dual-process/EC1", "solution_corrections"] = 1
     sequences = results.sequences.assign(task=results.sequences.task.map(tasks))
-    manifest = {"specification": specification, "environment": environment, "limits": {}}
     hostile = replace(results, manifest=manifest, runs=runs, sequences=sequences)
     # Names of tasks are checked when they are read: here they come past that.
     hostile.__dict__["tasks"] = {
@@ -448,12 +454,12 @@ def test_analyse(hostile, monkeypatch, capsys, tmp_path):
 
 def test_compare(hostile, monkeypatch, capsys, tmp_path):
     changed = hostile.runs.assign(reward=hostile.runs.reward - 1)
-    environment = {**hostile.manifest["environment"], "platform": f"{EVIL}!"}
+    environment = hostile.manifest.environment.model_copy(update={"platform": f"{EVIL}!"})
     other = replace(
         hostile,
         folder=Path(f"/nowhere/{EVIL}"),
         runs=changed,
-        manifest={**hostile.manifest, "environment": environment},
+        manifest=hostile.manifest.model_copy(update={"environment": environment}),
     )
     other.__dict__["tasks"] = hostile.tasks
     words_alone(compare_versions(hostile, other).to_markdown())
@@ -589,7 +595,7 @@ def test_terminal(hostile, monkeypatch, capsys, tmp_path):
     code, out, error = call(monkeypatch, capsys, "cite", tmp_path)
     assert (code, error) == (0, "")
     assert printable(out)
-    assert len(entries(out)) == 2 + len(hostile.manifest["specification"]["methods"])
+    assert len(entries(out)) == 2 + len(hostile.manifest.specification.methods)
 
     def fail(*_):
         warnings.warn(EVIL, stacklevel=1)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -27,6 +28,8 @@ from analysis.comparisons.frontier_page import (
 from analysis.comparisons.progress import SPENDS, by_trial, progress
 from analysis.results.folder import Results
 from coartic import load_task
+from coartic.tables import PlanLimits
+from tests.support.made_up import manifest_for, replanned
 from tests.support.strategies import tiny_task
 
 BEST = -465  # proven optimum of two-armed 1
@@ -64,9 +67,7 @@ def folder(rows, tmp_path):
     counts = ("reward", "proven_bound", "trials", "movement_ticks", "forward_kinematics")
     runs = pd.DataFrame(rows).drop(columns="rewards").astype(dict.fromkeys(counts, "Int64"))
     task = load_task("two-armed-1")
-    cells = runs[["task", "method", "variant"]].drop_duplicates().to_dict("records")
-    specification = {"tasks": {task.name: task.model_dump(mode="json")}, "cells": cells}
-    return Results(tmp_path, {"specification": specification}, runs, pd.DataFrame())
+    return Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame())
 
 
 def of(frame, method, spend="trials"):
@@ -333,7 +334,8 @@ def test_an_exhaustive_search_never_reaches_what_it_missed(tmp_path):
     assert horizons.to_dict() == {"exhaustive": math.inf, "early": math.inf, "stopped": 2}
     ((_, never),) = targets_tables(targets_frame(results), "trials")
     assert never == ["exhaustive", "early", "stopped"]
-    limited = Results(tmp_path, {**results.manifest, "limits": {"trials": 2}}, results.runs, None)
+    limits = {"limits": PlanLimits(time_s=None, trials=2)}
+    limited = replace(results, manifest=results.manifest.model_copy(update=limits))
     assert {run_id: run.stopped for run_id, run in progress(limited).items()} == {
         "exhaustive-0": True, "early-0": True, "stopped-0": True,
     }  # fmt: skip
@@ -411,7 +413,8 @@ def test_an_optimum_by_search_alone_is_marked(tmp_path):
     ):
         rows = [run("m", [-120.0, -101.0]), search | {"proven_bound": bound}]
         results = folder(rows, tmp_path)
-        results.manifest["specification"]["tasks"] = {task.name: task.model_dump(mode="json")}
+        content = {task.name: task.model_dump(mode="json")}
+        results = replace(results, manifest=replanned(results.manifest, tasks=content))
         frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
         assert words in frontier_page(results, *frames, pareto_frame(results))
 
@@ -555,7 +558,7 @@ def test_an_empty_folder_gives_empty_frames(tmp_path):
     results = folder([run("nothing")], tmp_path)
     results = Results(
         tmp_path,
-        {"specification": {**results.manifest["specification"], "cells": []}},
+        replanned(results.manifest, cells=()),
         results.runs[:0],
         results.sequences,
     )

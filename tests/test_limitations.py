@@ -1,6 +1,5 @@
 """What a report says it cannot show: every sentence where it is true, none where it is not."""
 
-import json
 import re
 from dataclasses import replace
 
@@ -12,6 +11,7 @@ from scipy import stats
 from analysis.report.limitations import limitations
 from analysis.study import Study
 from coartic import load_task
+from tests.support.made_up import replanned
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +38,11 @@ def changed(of, column, values):
 
 def of_tasks(of, *tasks):
     """The study as if its folder had these tasks only."""
-    manifest = json.loads(json.dumps(of.results.manifest))
-    specification = manifest["specification"]
-    specification["tasks"] = {task.name: task.model_dump(mode="json") for task in tasks}
-    specification["cells"] = [
-        cell for cell in specification["cells"] if cell["task"] in specification["tasks"]
-    ]
+    kept = {task.name: task.model_dump(mode="json") for task in tasks}
+    cells = [cell for cell in of.results.manifest.specification.cells if cell.task in kept]
+    manifest = replanned(of.results.manifest, tasks=kept, cells=tuple(cells))
     runs = of.results.runs
-    runs = runs[runs.task.isin(list(specification["tasks"]))]
+    runs = runs[runs.task.isin(list(kept))]
     return Study(replace(of.results, manifest=manifest, runs=runs))
 
 
@@ -186,8 +183,7 @@ def test_differences_that_are_found(study):
 
 
 def test_few_runs(clean):
-    manifest = json.loads(json.dumps(clean.results.manifest))
-    manifest["specification"]["runs"] = 1
+    manifest = replanned(clean.results.manifest, runs=1)
     runs = clean.results.runs
     one = Study(replace(clean.results, manifest=manifest, runs=runs[runs.run == 0]))
     found = said(one)

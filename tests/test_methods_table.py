@@ -11,16 +11,14 @@ from analysis.results.folder import Results
 from analysis.results.optima import optima
 from coartic import load_task
 from coartic.method import Information
-from tests.support.made_up import row
+from tests.support.made_up import manifest_for, row
 from tests.support.strategies import changed
 
 
 def results(rows, tmp_path, task=None):
     task = task or load_task("two-armed-1")
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    cells = runs[["task", "method", "variant"]].drop_duplicates().to_dict("records")
-    specification = {"tasks": {task.name: task.model_dump(mode="json")}, "cells": cells}
-    return Results(tmp_path, {"specification": specification}, runs, pd.DataFrame())
+    return Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame())
 
 
 def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):

@@ -15,6 +15,7 @@ from coartic import builtin_tasks, execute, load_task
 from coartic.frames import movement_rows, movements_from
 from coartic.method import MethodError, Session
 from coartic.solution import other_arm_travel
+from tests.support.made_up import manifest_for
 from tests.support.strategies import changed
 
 SOLVED = [entry for entry in entries() if entry.reward is not None]
@@ -135,15 +136,7 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     )  # fmt: skip
     rows = pd.DataFrame(movement_rows(task, execution.movements)).assign(run_id="r1")
     rows.to_parquet(tmp_path / "solutions.parquet")
-    keys = ("coartic", "commit", "model_code", "python", "date")
-    manifest = {
-        "environment": dict.fromkeys(keys, "x"),
-        "specification": {
-            "suite": "optimum",
-            "tasks": {"ascending": task.model_dump(mode="json")},
-        },
-    }
-    (entry,) = collect(Results(Path(tmp_path), manifest, runs, pd.DataFrame()))
+    (entry,) = collect(Results(Path(tmp_path), manifest_for([task]), runs, pd.DataFrame()))
     assert (entry.reward, entry.bound, entry.run_ids) == (-292, -280, ("r1",))
     again = Entry.model_validate_json(entry.model_dump_json()).solution
     assert execute(task, movements_from(task, pd.DataFrame(list(again)))).reward == -292

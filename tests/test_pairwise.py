@@ -18,7 +18,7 @@ from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import load_task
-from tests.support.made_up import row
+from tests.support.made_up import manifest_for, row
 from tests.support.suites import run_and_write
 
 T1, T2 = "two-armed-1", "two-armed-2"
@@ -49,12 +49,7 @@ def study(tmp_path, *cells, tasks=None):
             "reward": pd.array([-671, -357, -319], "Int64"),
         }
     )
-    specification = {
-        "suite": "planted", "seed": 0,
-        "tasks": {name: task.model_dump(mode="json") for name, task in tasks.items()},
-        "cells": runs[["task", "method", "variant"]].drop_duplicates().to_dict("records"),
-    }  # fmt: skip
-    return Study(Results(tmp_path, {"specification": specification}, runs, initial))
+    return Study(Results(tmp_path, manifest_for(tasks.values(), runs), runs, initial))
 
 
 def page(of):

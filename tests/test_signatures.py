@@ -1,7 +1,6 @@
 """Signatures on constructed cases whose right answer is known."""
 
 import itertools
-import json
 import math
 from pathlib import Path
 
@@ -54,6 +53,7 @@ from analysis.study import Study
 from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
 from coartic.frames import movement_rows
 from coartic.solution import other_arm_travel
+from tests.support.made_up import manifest_for
 from tests.support.strategies import changed, tiny_task
 
 
@@ -676,10 +676,8 @@ def results(folder, solved, runs=None):
     empty = {"run_id": [], "order": [], "waypoint": []}
     pd.DataFrame(empty).to_parquet(folder / "paths.parquet")
     frame = pd.DataFrame(rows)
-    cells = frame[["task", "method", "variant"]].drop_duplicates().to_dict("records")
-    content = {"tasks": {n: json.loads(t.model_dump_json()) for n, t in tasks.items()}}
     sequences = pd.DataFrame({"task": ["none"], "hands": ["R"], "reward": [-1]})
-    return Results(folder, {"specification": {**content, "cells": cells}}, frame, sequences)
+    return Results(folder, manifest_for(tasks.values(), frame), frame, sequences)
 
 
 def test_frame_of_two_contexts(tmp_path):

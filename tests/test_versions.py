@@ -1,6 +1,5 @@
 """Two results folders against each other, on runs of our own and on planted differences."""
 
-import copy
 import json
 import re
 import shutil
@@ -18,7 +17,7 @@ from analysis.statistics.equivalence import MARGIN
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
-from coartic.tables import FORMAT
+from coartic.tables import FORMAT, Manifest
 from tests.support.commands import call
 from tests.support.suites import Failing, InProcess, run_and_write
 
@@ -40,12 +39,12 @@ def first(tmp_path_factory):
 
 def planted(first, edit=lambda runs: runs, manifest=lambda content: None):
     """Results with other runs and another manifest, such as no folder could hold them."""
-    runs, content = edit(first.runs.copy()), copy.deepcopy(first.manifest)
+    runs, content = edit(first.runs.copy()), first.manifest.model_dump(mode="json")
     manifest(content)
     old = first.runs.loc[runs.index, OUTCOME].astype(str)
     other = (runs[OUTCOME].astype(str) != old).any(axis=1)
     runs.loc[other, "result"] += "-other"
-    return replace(first, runs=runs, manifest=content)
+    return replace(first, runs=runs, manifest=Manifest.model_validate_json(json.dumps(content)))
 
 
 def of(runs, method=LEARNED):

@@ -61,14 +61,14 @@ def claims_page(results: Results, judged: Sequence[Judged]) -> str:
 
     The runs behind each claim are in :func:`claims_frame`.
     """
-    specification = results.manifest["specification"]
+    specification = results.manifest.specification
     tests = sum(not math.isnan(entry.p) for entry in judged)
     contraries = sum(not math.isnan(entry.contrary_p) for entry in judged)
     parts: list[Part] = [
         Heading(1, "Claims"),
         f"What Shah, Barto & Fagg (2013) say of their model, tested on suite "
-        f"{code(specification['suite'])}: {specification['runs']} runs of "
-        f"{specification['trials']} trials, seed {specification['seed']}.",
+        f"{code(specification.suite)}: {specification.runs} runs of "
+        f"{specification.trials} trials, seed {specification.seed}.",
         _summary(judged),
         f"{_rules()} {FITTED} Run ids of every claim are in `claims.csv`.",
         Table(

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.markup import escaped
+from analysis.methods import LEARNER as LEARNER
 from analysis.results.folder import CellRuns, Results
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.results.optima import Optimum, locks_base, optima
@@ -17,8 +18,6 @@ from analysis.statistics.spread import sd
 from analysis.table import NONE, Table, short, tally
 from coartic.method import Information
 
-LEARNER = "dual-process/"
-"""The paper's learner: the name begins so, and its exploration condition follows."""
 TOLD = {
     Information.GOALS: "G",
     Information.FORWARD_KINEMATICS: "F",

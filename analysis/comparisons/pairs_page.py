@@ -27,10 +27,10 @@ def comparisons_page(
 ) -> str:
     """Markdown of :func:`analysis.comparisons.pairs.pairwise_frame` and
     ``overall_frame``; ``scores`` is what the latter was made of."""
-    specification = study.results.manifest["specification"]
+    specification = study.results.manifest.specification
     parts: list[Part] = [
         Heading(1, "Methods against each other"),
-        f"On suite {code(specification['suite'])}, seed {specification['seed']}. Numbers and more "
+        f"On suite {code(specification.suite)}, seed {specification.seed}. Numbers and more "
         "of them: `comparisons.csv`, `across_tasks.csv`, `profiles.csv` (docs/statistics.md).",
     ]
     if len(pairs):

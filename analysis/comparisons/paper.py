@@ -156,8 +156,8 @@ def _initial_table(results: Results) -> Table:
 
 
 def _notes(results: Results) -> list[str]:
-    specification = results.manifest["specification"]
-    environment = results.manifest["environment"]
+    specification = results.manifest.specification
+    environment = results.manifest.environment
     notes = [
         "Published: Shah, Barto & Fagg (2013). A dual process account of coarticulation in "
         "motor skill acquisition. *Journal of Motor Behavior*. Rewards are -1 per control "
@@ -210,17 +210,17 @@ def _notes(results: Results) -> list[str]:
             f"The runs were made with {libraries} different sets of "
             "library versions (column packages of runs.parquet)."
         )
-    commit = environment["commit"]
-    version = f"coartic {environment['coartic']}"
+    commit = environment.commit
+    version = f"coartic {environment.coartic}"
     if commit:
-        version += f", commit {commit['id'][:12]}{' with changes' if commit['dirty'] else ''}"
+        version += f", commit {commit.id[:12]}{' with changes' if commit.dirty else ''}"
     made = (
-        f", {specification['runs']} runs of {specification['trials']} trials, "
-        f"seed {specification['seed']}; {version}, model code "
-        f"{environment['model_code']}; Python {environment['python']}, "
-        f"{environment['platform']}; {environment['date']}."
+        f", {specification.runs} runs of {specification.trials} trials, "
+        f"seed {specification.seed}; {version}, model code "
+        f"{environment.model_code}; Python {environment.python}, "
+        f"{environment.platform}; {environment.date}."
     )
-    notes.append(f"Suite {code(specification['suite'])}{escaped(made)}")
+    notes.append(f"Suite {code(specification.suite)}{escaped(made)}")
     return notes
 
 

@@ -68,7 +68,7 @@ def progress(results: Results) -> dict[str, Progress]:
     makes fewer, or has no budget, ended by itself.
     """
     rewards = _rewards_by_run(results)
-    limit = results.manifest.get("limits", {}).get("trials")
+    limit = results.manifest.limits.trials
     found = {}
     for cell in results.cells:
         totals = cell.runs[["run_id", *SPENDS]].set_index("run_id").astype("Float64")

@@ -304,13 +304,13 @@ def _tasks(results: Results) -> dict[str, dict[str, Any]]:
     """What movement and scoring depend on in each task."""
     return {
         name: {key: value for key, value in task.items() if key not in _WORDS}
-        for name, task in results.manifest["specification"]["tasks"].items()
+        for name, task in results.manifest.specification.tasks.items()
     }
 
 
 def _codes(results: Results) -> dict[str, str]:
-    methods = results.manifest["specification"]["methods"]
-    return {name: str(method["code"]) for name, method in methods.items()}
+    methods = results.manifest.specification.methods
+    return {name: method.code for name, method in methods.items()}
 
 
 def _surroundings(first: Results, second: Results) -> tuple[Table, list[str]]:
@@ -339,25 +339,27 @@ def _surroundings(first: Results, second: Results) -> tuple[Table, list[str]]:
 
 
 def _facts(results: Results) -> dict[str, str]:
-    specification = results.manifest["specification"]
-    limits = results.manifest.get("limits", {})
-    environment = results.manifest.get("environment", {})
-    commit = environment.get("commit") or {}
+    specification, limits = results.manifest.specification, results.manifest.limits
+    environment = results.manifest.environment
+    commit = environment.commit
     facts = {
-        **{name: specification[name] for name in ("suite", "seed", "runs", "trials")},
-        "time limit (s)": limits.get("time_s"),
-        "trial budget": limits.get("trials"),
+        **{name: getattr(specification, name) for name in ("suite", "seed", "runs", "trials")},
+        "time limit (s)": limits.time_s,
+        "trial budget": limits.trials,
         "rows of runs.parquet": len(results.runs),
-        "coartic": environment.get("coartic"),
-        "code of the model": environment.get("model_code"),
-        "commit": commit and commit["id"][:12] + "+" * commit["dirty"],
+        "coartic": environment.coartic,
+        "code of the model": environment.model_code,
+        "commit": commit and commit.id[:12] + "+" * commit.dirty,
         "commits of the runs": _list(
             text[:12] + "+" * text.endswith("+") for text in results.runs.commit.dropna()
         ),
         "library versions of the runs": _list(results.runs["packages"].dropna()),
-        **{name: environment.get(name) for name in ("python", "platform", "processor", "cores")},
+        **{
+            name: getattr(environment, name)
+            for name in ("python", "platform", "processor", "cores")
+        },
     }
-    return {name: "" if value in (None, {}) else str(value) for name, value in facts.items()}
+    return {name: "" if value is None else str(value) for name, value in facts.items()}
 
 
 def _task_texts(first: Results, second: Results) -> tuple[dict[str, str], dict[str, str]]:
@@ -374,8 +376,7 @@ def _task_texts(first: Results, second: Results) -> tuple[dict[str, str], dict[s
 
 
 def _packages(results: Results) -> dict[str, str]:
-    packages: dict[str, str] = results.manifest.get("environment", {}).get("packages", {})
-    return packages
+    return results.manifest.environment.packages
 
 
 def _list(values: Iterable[Any]) -> str:

@@ -26,9 +26,9 @@ from analysis.figures.style import (
     letters,
     looks,
     percent,
-    short,
     styled,
 )
+from analysis.methods import LEARNER, short_name
 from analysis.published import Summary, published_cell, published_initial
 from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, bootstrap_test, holm, mean
 
@@ -78,7 +78,7 @@ def bars(
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     letters(panels)
     values = "; ".join(
-        f"{row['task']}, {short(row['method'])}: {row['reward']:.1f}"
+        f"{row['task']}, {short_name(row['method'])}: {row['reward']:.1f}"
         for row in data.to_dict("records")
     )
     return Plot(
@@ -107,7 +107,7 @@ def _conditions(task: str) -> list[str]:
 
 
 def _paper(task: str, label: str) -> Any:
-    return published_cell(task, label.removeprefix("dual-process/"))
+    return published_cell(task, label.removeprefix(LEARNER))
 
 
 def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
@@ -183,7 +183,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
                 markeredgecolor=INK, zorder=4,
             )  # fmt: skip
     _brackets(axes, rows, runs)
-    names = ["initial", *(short(label) for label in rows.method[1:])]
+    names = ["initial", *(short_name(label) for label in rows.method[1:])]
     axes.set_xticks(range(len(rows)), names)
     axes.set_xlim(-0.45, len(rows) - 0.4)
     axes.tick_params(axis="x", length=0)

@@ -14,7 +14,8 @@ from matplotlib.lines import Line2D
 from analysis.figures.plot import Plot
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.figures.selection import missing, solved
-from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, short, styled
+from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, styled
+from analysis.methods import LEARNER, short_name
 from analysis.signatures.trajectories import Trajectories
 from coartic import CoarticError, Execution, Task, execute
 from coartic.frames import movements_from
@@ -28,15 +29,15 @@ Rows = Sequence[tuple[str, Sequence[str]]]
 PAPER: dict[str, tuple[str, Rows]] = {
     "configurations-one-armed": (
         "5",
-        (("ascending", ("dual-process/EC1",)), ("descending", ("dual-process/EC1",))),
+        (("ascending", (f"{LEARNER}EC1",)), ("descending", (f"{LEARNER}EC1",))),
     ),
     "configurations-two-armed-1": (
         "6",
-        (("two-armed-1", ("dual-process/EC2", "dual-process/EC3", "dual-process/EC4")),),
+        (("two-armed-1", (f"{LEARNER}EC2", f"{LEARNER}EC3", f"{LEARNER}EC4")),),
     ),
     "configurations-two-armed-2": (
         "7",
-        (("two-armed-2", ("dual-process/EC3", "dual-process/EC4")),),
+        (("two-armed-2", (f"{LEARNER}EC3", f"{LEARNER}EC4")),),
     ),
 }
 """Figures of the paper: number, and methods by task."""
@@ -69,7 +70,7 @@ class Solution:
     @property
     def name(self) -> str:
         """As the row is headed."""
-        name = short(self.method) if self.method else "initial solution"
+        name = short_name(self.method) if self.method else "initial solution"
         found = f" ({self.share})" if self.share else ""
         return f"{name}, {self.execution.hands}{found}"
 

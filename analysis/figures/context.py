@@ -26,9 +26,9 @@ from analysis.figures.style import (
     TALLEST,
     VERMILLION,
     letters,
-    short,
     styled,
 )
+from analysis.methods import short_name
 from analysis.statistics.estimates import holm
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def context(
         letters(panels)
     figure.legend(handles=_handles(), loc="outside lower center", ncols=2, fontsize=SMALL)
     words = "; ".join(
-        f"{short(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
+        f"{short_name(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
         for row in data.to_dict("records")
     )
     return Plot(
@@ -139,7 +139,7 @@ def _panel(axes: Axes, data: pd.DataFrame) -> None:
                 stars(row["holm_equivalent"]), (max(values), -place), (5, -0.5),
                 textcoords="offset points", va="center", fontsize=SMALL, color=INK,
             )  # fmt: skip
-    axes.set_yticks([-place for place in range(len(data))], [short(m) for m in data.method])
+    axes.set_yticks([-place for place in range(len(data))], [short_name(m) for m in data.method])
     axes.set_ylim(-len(data) + 0.4, 0.6)
     axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.4)
     axes.tick_params(axis="y", length=0)

@@ -26,9 +26,9 @@ from analysis.figures.style import (
     log_axis,
     looks,
     percent,
-    short,
     styled,
 )
+from analysis.methods import short_name
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import CONFIDENCE
 from coartic import Task
@@ -111,7 +111,9 @@ def _plot(
     letters(panels[: len(tasks)])
     _legend(figure, data, present)
     ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
-    words = "; ".join(f"{row['task']}, {short(row['method'])}: {row['mean']:.0f}" for row in ends)
+    words = "; ".join(
+        f"{row['task']}, {short_name(row['method'])}: {row['mean']:.0f}" for row in ends
+    )
     return Plot(
         id=f"frontier-{spend.replace('_', '-')}",
         title=f"Reward against {NAMES[spend]}",
@@ -174,7 +176,7 @@ def _legend(figure: Figure, data: pd.DataFrame, labels: Sequence[str]) -> None:
         Line2D(
             [], [], color=style[label].color, marker=style[label].marker, markersize=4,
             linestyle=style[label].dash if label in curves else "", markeredgecolor=INK,
-            markeredgewidth=0.4, label=short(label),
+            markeredgewidth=0.4, label=short_name(label),
         )
         for label in labels
     ]  # fmt: skip

@@ -25,9 +25,9 @@ from analysis.figures.style import (
     letters,
     log_axis,
     looks,
-    short,
     styled,
 )
+from analysis.methods import short_name
 from coartic import CoarticError, Task
 from coartic.robot import Array
 
@@ -85,7 +85,9 @@ def learning_curves(
     letters(panels[: len(shown)])
     _legend(figure, labels)
     ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
-    words = "; ".join(f"{row['task']}, {short(row['method'])}: {row['best']:.0f}" for row in ends)
+    words = "; ".join(
+        f"{row['task']}, {short_name(row['method'])}: {row['best']:.0f}" for row in ends
+    )
     return Plot(
         id="learning-curves",
         title="Learning curves",
@@ -194,7 +196,7 @@ def _legend(figure: Figure, labels: Sequence[str]) -> None:
     style = looks(labels)
     handles = [
         Line2D([], [], color=style[label].color, linestyle=style[label].dash, linewidth=1.3,
-               label=short(label))
+               label=short_name(label))
         for label in labels
     ]  # fmt: skip
     handles += [

@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
-from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, short, styled
+from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, styled
+from analysis.methods import short_name
 from analysis.statistics.across_tasks import by_task, profile, scores_frame
 from analysis.statistics.estimates import CONFIDENCE, SEED
 from coartic import CoarticError
@@ -71,7 +72,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         raise _incomplete(study, tasks, [label for label in labels if label not in everywhere])
     data = pd.concat([_profiles(scores, label) for label in everywhere], ignore_index=True)
     names = ", ".join(tasks)
-    absent = [short(label) for label in methods or () if label not in everywhere]
+    absent = [short_name(label) for label in methods or () if label not in everywhere]
     ends = data[(data.kind == "gap") & (data.threshold.round(6) == 0.05)]
     words = "; ".join(
         f"{_name(row['method'])}: {row['share']:.0%}" for row in ends.to_dict("records")
@@ -133,7 +134,7 @@ def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
 
 
 def _name(label: str) -> str:
-    return "learner (EC1, EC4)" if label == LEARNER else short(label)
+    return "learner (EC1, EC4)" if label == LEARNER else short_name(label)
 
 
 def _looks(labels: Sequence[str]) -> dict[str, Look]:

@@ -23,9 +23,9 @@ from analysis.figures.style import (
     VERMILLION,
     dagger,
     percent,
-    short,
     styled,
 )
+from analysis.methods import LEARNER, short_name
 from analysis.published import TRIALS, Summary, published_cell
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import CONFIDENCE
@@ -69,7 +69,7 @@ def published(
     _draw(axes, data, {name: task.reconstructed != () for name, task in found.items()})
     shown = {name: found[name] for name in data.task.unique()}
     words = "; ".join(
-        f"{row['task']}, {short(row['method'])} {row['hands']}".strip()
+        f"{row['task']}, {short_name(row['method'])} {row['hands']}".strip()
         + f": {row['difference']:+.1f}"
         for row in rows
         if row["runs"]
@@ -95,7 +95,7 @@ def published(
 
 
 def _rows(study: Study, task: str, label: str) -> list[dict[str, Any]]:
-    paper = published_cell(task, label.removeprefix("dual-process/"))
+    paper = published_cell(task, label.removeprefix(LEARNER))
     good = solved(study, task, label).good
     if paper is None or not bool((good.trials == TRIALS).all()):
         return []
@@ -166,7 +166,7 @@ def _draw(axes: Axes, data: pd.DataFrame, reconstructed: dict[str, bool]) -> Non
         else:
             dagger_ = " †" if reconstructed[row["task"]] else ""
             star = "*" if row["pooled"] else ""
-            names.append(f"{row['task']}{dagger_}, {short(row['method'])}{star}")
+            names.append(f"{row['task']}{dagger_}, {short_name(row['method'])}{star}")
     axes.axvline(0, color=INK, linewidth=0.6)
     axes.set_yticks([-place for place in range(len(data))], names)
     axes.tick_params(axis="y", length=0)

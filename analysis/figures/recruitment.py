@@ -22,9 +22,9 @@ from analysis.figures.style import (
     heading,
     letters,
     on,
-    short,
     styled,
 )
+from analysis.methods import LEARNER, short_name
 from analysis.published import RUNS, published_cell
 from coartic import Task
 
@@ -63,7 +63,7 @@ def recruitment(
     letters(panels)
     _legend(figure, order)
     words = "; ".join(
-        f"{task}, {short(str(label))}{'' if source == 'ours' else ', published'}: "
+        f"{task}, {short_name(str(label))}{'' if source == 'ours' else ', published'}: "
         + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
         for (task, label, source), rows in data.groupby(["task", "method", "source"], sort=False)
     )
@@ -91,7 +91,7 @@ def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
         rows += [(task, label, "ours", str(hands), int(n)) for hands, n in counts.items()]
         paper = None
         if label in CONDITIONS:
-            paper = published_cell(task, label.removeprefix("dual-process/"))
+            paper = published_cell(task, label.removeprefix(LEARNER))
         printed = [(s.hands, s.runs) for s in paper.sequences if s.runs] if paper else []
         if sum(runs for _, runs in printed) == RUNS:
             rows += [(task, label, "published", hands, runs) for hands, runs in printed]
@@ -117,7 +117,7 @@ def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None
                     fontsize=6, color=on(colors.get(row["hands"], GREY)),
                 )  # fmt: skip
             left += row["share"]
-        name = short(str(label))
+        name = short_name(str(label))
         names.append(name if source == "ours" else "published")
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.tick_params(axis="y", length=0)

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from analysis.methods import LEARNER, METHODS
 from analysis.results.folder import CellRuns
 from coartic import CoarticError, Task
 from coartic.robot import Array
@@ -13,26 +14,9 @@ from coartic.robot import Array
 if TYPE_CHECKING:
     from analysis.study import Study
 
-CONDITIONS = tuple(f"dual-process/EC{number}" for number in range(1, 5))
-HEADLINES = (
-    *CONDITIONS,
-    "corrective-alone/given",
-    "corrective-alone/every",
-    "random-search/pure",
-    "random-search/climbing",
-    "cma-es/bandit",
-    "nullspace-qp/none",
-    "nullspace-qp/next-goal",
-    "posture-based/one-goal",
-    "posture-based/two-goals",
-    "trajectory-optimisation/path-length",
-    "trajectory-optimisation/squared-changes",
-    "trajectory-optimisation/acceleration",
-    "trajectory-optimisation/jerk",
-    "optimum/branch-and-bound",
-)
+CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in range(1, 5))
+HEADLINES = tuple(name for name, row in METHODS.items() if row.headline)
 """Methods that stand for their families where none are named, in the order of figures."""
-_FAMILIES = {label.partition("/")[0] for label in HEADLINES}
 
 
 def headline(study: Study, tasks: Iterable[str]) -> list[str]:
@@ -41,15 +25,13 @@ def headline(study: Study, tasks: Iterable[str]) -> list[str]:
     Those of :data:`HEADLINES`, then methods that are not the project's own; all where there
     is neither.
     """
-    tasks = set(tasks)
+    tasks, families = set(tasks), {name.partition("/")[0] for name in METHODS}
     found = {
         label: cell.method
         for (task, label), cell in study.cells.items()
         if task in tasks and len(cell.good)
     }
-    others = [
-        label for label, method in found.items() if method.partition("/")[0] not in _FAMILIES
-    ]
+    others = [label for label, method in found.items() if method.partition("/")[0] not in families]
     return [label for label in HEADLINES if label in found] + others or list(found)
 
 

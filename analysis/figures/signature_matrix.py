@@ -16,7 +16,8 @@ from matplotlib.patches import Rectangle
 
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, has, known_tasks, missing
-from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, short, styled
+from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, styled
+from analysis.methods import short_name
 from analysis.signatures.register import REGISTER
 from analysis.words import slugs
 from coartic import Task
@@ -103,7 +104,7 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
             f"apply, or there are too few runs.{dagger([task])}"
         ),
         alt=(
-            f"Matrix of {len(labels)} methods ({', '.join(map(short, labels))}) by "
+            f"Matrix of {len(labels)} methods ({', '.join(map(short_name, labels))}) by "
             f"{len(columns)} signatures on {task.label}; its numbers are in the table."
         ),
         figure=_matrix(shown, labels, columns),
@@ -113,7 +114,7 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
 
 def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -> Figure:
     """The figure: labels by columns, as large as they need."""
-    left = min(0.1 + 0.062 * max(len(short(label)) for label in labels), TWO / 2)
+    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), TWO / 2)
     above, right, below, tall = 1.38, 0.7, 0.06, 0.19  # inches
     side = min((TWO - left - right) / len(columns), 0.6)
     width = column_width(left + side * len(columns) + right)
@@ -129,7 +130,7 @@ def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -
             _draw_cell(axes, x, y, float(value), float(standardised))
     axes.set_xlim(0, len(columns))
     axes.set_ylim(len(labels), 0)
-    axes.set_yticks(np.arange(len(labels)) + 0.5, [short(label) for label in labels])
+    axes.set_yticks(np.arange(len(labels)) + 0.5, [short_name(label) for label in labels])
     axes.xaxis.tick_top()
     headings = [SIGNATURES[name] for name in columns]
     places = np.arange(len(columns)) + 0.5

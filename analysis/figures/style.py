@@ -1,4 +1,4 @@
-"""One style for all figures: sizes, colours, marks and short names.
+"""One style for all figures: sizes, colours and marks.
 
 Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on
 white. All are legible on white and on #111; marks and dashes tell what colours tell.
@@ -7,8 +7,7 @@ white. All are legible on white and on #111; marks and dashes tell what colours 
 from __future__ import annotations
 
 import itertools
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from string import ascii_lowercase
 from typing import Any, NamedTuple, ParamSpec, TypeVar
@@ -17,8 +16,8 @@ from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from analysis.methods import METHODS, Color, Dash
 from coartic import Task
-from coartic.text import one_line
 
 INCH = 25.4  # mm
 ONE = 85 / INCH
@@ -99,30 +98,31 @@ class Look(NamedTuple):
     marker: str
 
 
-_KNOWN = {
-    "dual-process/EC1": Look(BLUE, DASHES[0], "o"),
-    "dual-process/EC2": Look(SKY, DASHES[0], "s"),
-    "dual-process/EC3": Look(GREEN, DASHES[0], "D"),
-    "dual-process/EC4": Look(VERMILLION, DASHES[0], "^"),
-    "corrective-alone/given": Look(GREY, DASHES[3], "v"),
-    "corrective-alone/every": Look(GREY, DASHES[1], "P"),
-    "random-search/pure": Look(ORANGE, DASHES[2], "X"),
-    "random-search/climbing": Look(ORANGE, DASHES[1], "s"),
-    "cma-es/bandit": Look(PURPLE, DASHES[1], "D"),
-    "cma-es/every": Look(PURPLE, DASHES[2], "d"),
-    "nullspace-qp/none": Look(BLUE, DASHES[2], "<"),
-    "nullspace-qp/next-goal": Look(BLUE, DASHES[3], "p"),
-    "posture-based/one-goal": Look(GREEN, DASHES[2], "v"),
-    "posture-based/two-goals": Look(GREEN, DASHES[1], "^"),
-    "trajectory-optimisation/path-length": Look(INK, DASHES[0], "*"),
-    "trajectory-optimisation/squared-changes": Look(INK, DASHES[1], "h"),
-    "trajectory-optimisation/acceleration": Look(INK, DASHES[3], "X"),
-    "trajectory-optimisation/jerk": Look(INK, DASHES[2], "d"),
+_COLORS: Mapping[Color, str] = {
+    "blue": BLUE,
+    "sky": SKY,
+    "green": GREEN,
+    "orange": ORANGE,
+    "vermillion": VERMILLION,
+    "purple": PURPLE,
+    "grey": GREY,
+    "ink": INK,
+}
+_DASHES: Mapping[Dash, Any] = {
+    "solid": DASHES[0],
+    "dashed": DASHES[1],
+    "dotted": DASHES[2],
+    "dash-dotted": DASHES[3],
 }
 
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Colour, dash and mark of each method: the project's own look the same in all figures."""
+    own = {
+        name: Look(_COLORS[row.look[0]], _DASHES[row.look[1]], row.look[2])
+        for name, row in METHODS.items()
+        if row.look is not None
+    }
     free = itertools.cycle(
         Look(color, dash, marker)
         for (dash, color), marker in zip(
@@ -131,49 +131,7 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
             strict=False,
         )
     )
-    return {label: _KNOWN.get(label) or next(free) for label in dict.fromkeys(labels)}
-
-
-_SHORT = {
-    "corrective-alone/given": "corrective alone",
-    "corrective-alone/every": "corrective, best hands",
-    "random-search/pure": "random search",
-    "random-search/climbing": "hill climbing",
-    "trajectory-optimisation/path-length": "plan: path length",
-    "trajectory-optimisation/squared-changes": "plan: squared changes",
-    "optimum/dynamic-programming": "optimum, DP",
-    "optimum/branch-and-bound": "optimum, proof",
-    "optimum/multistart": "optimum, multistart",
-}
-_FAMILIES = {
-    "dual-process/": "",
-    "cma-es/": "CMA-ES, ",
-    "nullspace-qp/": "QP: ",
-    "posture-based/": "postures: ",
-    "trajectory-optimisation/": "plan: ",
-}
-_VARIANTS = {
-    "other_arm=": "other arm ",
-    "noise_sd=": "σ ",
-    "epsilon=": "ε ",
-    "hands=": "hands ",
-    "timing=fixed": "fixed times",
-}
-
-
-def short(label: str) -> str:
-    """The name of a method with its variant as figures show it."""
-    method, _, variant = one_line(label).partition(" ")
-    name = _SHORT.get(method)
-    if name is None:
-        name = method
-        for family, instead in _FAMILIES.items():
-            if method.startswith(family):
-                name = (instead + method.removeprefix(family)).replace("-", " ")
-                name = name.replace("CMA ES", "CMA-ES")
-    for key, words in _VARIANTS.items():
-        variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
-    return f"{name} ({variant.replace('_', ' ')})" if variant else name
+    return {label: own.get(label) or next(free) for label in dict.fromkeys(labels)}
 
 
 def heading(task: Task) -> str:

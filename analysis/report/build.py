@@ -148,20 +148,20 @@ def write(report: Report, study: Study, folder: Path) -> None:
 
 
 def _title(results: Results) -> str:
-    return f"coartic: suite {results.manifest['specification']['suite']}"
+    return f"coartic: suite {results.manifest.specification.suite}"
 
 
 def _lead(results: Results) -> str:
-    specification, environment = results.manifest["specification"], results.manifest["environment"]
-    commit = environment["commit"]
-    where = f"coartic {environment['coartic']}"
+    specification, environment = results.manifest.specification, results.manifest.environment
+    commit = environment.commit
+    where = f"coartic {environment.coartic}"
     if commit:
-        where += f", commit {commit['id'][:12]}{' with changes' if commit['dirty'] else ''}"
-    trials = specification["trials"]
+        where += f", commit {commit.id[:12]}{' with changes' if commit.dirty else ''}"
+    trials = specification.trials
     return escaped(
-        f"{len(results.runs)} runs, up to {specification['runs']} a cell"
+        f"{len(results.runs)} runs, up to {specification.runs} a cell"
         + (f", of {trials} trials where a method learns" if trials else "")
-        + f"; seed {specification['seed']}. Made with {where} on {environment['date'][:10]}."
+        + f"; seed {specification.seed}. Made with {where} on {environment.date[:10]}."
     )
 
 

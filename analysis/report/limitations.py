@@ -142,7 +142,7 @@ def _versions(study: Study) -> Iterator[str]:
 
 
 def _numbers_of_runs(study: Study) -> Iterator[str]:
-    specification = study.results.manifest["specification"]
+    specification = study.results.manifest.specification
     learner = {key: cell for key, cell in study.cells.items() if key[1].startswith(LEARNER)}
     if any((cell.runs.trials != TRIALS).any() for cell in learner.values()):
         yield (
@@ -176,9 +176,9 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
             f"{'' if len(few) == 1 else f' to {few[-1]}'}."
         )
     sizes = [len(cell.good) for cell in study.cells.values()]
-    once = specification["runs"] > 1 and 1 in [len(cell.runs) for cell in study.cells.values()]
+    once = specification.runs > 1 and 1 in [len(cell.runs) for cell in study.cells.values()]
     yield (
-        f"*One seed.* All runs derive from seed {specification['seed']}"
+        f"*One seed.* All runs derive from seed {specification.seed}"
         + (
             "; methods that draw nothing at random were run once and have no spread"
             if once
@@ -213,12 +213,12 @@ def _optima(study: Study) -> Iterator[str]:
 
 
 def _timing(study: Study) -> Iterator[str]:
-    runs, environment = study.results.runs, study.results.manifest["environment"]
+    runs, environment = study.results.runs, study.results.manifest.environment
     cold = ~runs.warm.astype("boolean")  # unknown where it went with the process
     share = int(cold.sum()) / len(runs)
     yield (
-        f"*Times.* Taken on {escaped(environment['processor'] or 'an unnamed processor')} with "
-        f"{environment['cores']} cores, one thread a run, runs side by side as far as asked "
+        f"*Times.* Taken on {escaped(environment.processor or 'an unnamed processor')} with "
+        f"{environment.cores} cores, one thread a run, runs side by side as far as asked "
         f"for; {_percent(share)} of the runs were the first of their method in their process "
         "and hold its warming up. "
         "Times compare within a folder; counts of evaluations compare between machines."

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import hashlib
 import json
 import re
 from collections.abc import Iterable, Sequence
@@ -19,6 +18,7 @@ from analysis.report.text import heads, texts
 from analysis.results.folder import Results
 from analysis.results.optima import SHIPPED, optima
 from coartic import CoarticError, builtin_tasks
+from coartic.record import content_hash
 from coartic.text import json_text, one_line, shell_line
 
 FILE = "trace.json"
@@ -74,7 +74,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
     commits = results.runs.set_index("run_id").commit.astype(object).fillna("unknown")
     labels = {(cell.task, cell.label): cell for cell in results.cells}
     places = {key: place for place, key in enumerate(document.runs)}
-    environment = results.manifest["environment"]
+    environment = results.manifest.environment.model_dump(mode="json")
     command = [Path(part).name if Path(part).is_absolute() else part
                for part in environment["command"]]  # fmt: skip
     content = {
@@ -140,12 +140,7 @@ def trace_json(results: Results, document: Document, numbers: Iterable[Number]) 
 
 def specification_hash(results: Results) -> str:
     """SHA-256 of a suite's specification: tasks, methods, parameters, seed, run ids."""
-    return _hash(results.manifest["specification"])
-
-
-def _hash(specification: dict[str, Any]) -> str:
-    text = json.dumps(specification, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    return content_hash(results.manifest.specification.model_dump(mode="json"))
 
 
 def find_report(folder: Path) -> Path:
@@ -345,17 +340,19 @@ def _results_folder(folder: Path, specification: str) -> Path | None:
     """The folder if it holds the results that a report with this specification is of."""
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        same = _hash(manifest["specification"]) == specification
+        same = content_hash(manifest["specification"]) == specification
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return folder if same else None
 
 
 def _suite(results: Results) -> dict[str, Any]:
-    specification = results.manifest["specification"]
+    specification = results.manifest.specification
     return {
-        "name": specification["suite"],
-        **{name: specification[name] for name in ("runs", "trials", "seed")},
+        "name": specification.suite,
+        "runs": specification.runs,
+        "trials": specification.trials,
+        "seed": specification.seed,
     }
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
+from coartic.tables import Manifest
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Results:
     """The tables of one results folder; their columns are listed in docs/results.md."""
 
     folder: Path
-    manifest: dict[str, Any]
+    manifest: Manifest
     runs: pd.DataFrame
     sequences: pd.DataFrame
 
@@ -46,7 +46,7 @@ class Results:
     def tasks(self) -> dict[str, Task]:
         """The tasks as they were run, by name."""
         source = str(self.folder / "manifest.json")
-        content = self.manifest["specification"]["tasks"]
+        content = self.manifest.specification.tasks
         return {name: parse_task(task, source) for name, task in content.items()}
 
     @cached_property
@@ -54,16 +54,16 @@ class Results:
         """The cells with their runs, in the order of the plan."""
         return [
             CellRuns(
-                cell["task"],
-                cell["method"],
-                cell["variant"],
+                cell.task,
+                cell.method,
+                cell.variant,
                 self.runs[
-                    (self.runs["task"] == cell["task"])
-                    & (self.runs["method"] == cell["method"])
-                    & (self.runs["variant"] == cell["variant"])
+                    (self.runs["task"] == cell.task)
+                    & (self.runs["method"] == cell.method)
+                    & (self.runs["variant"] == cell.variant)
                 ],
             )
-            for cell in self.manifest["specification"]["cells"]
+            for cell in self.manifest.specification.cells
         ]
 
     def solutions(self) -> pd.DataFrame:
@@ -96,7 +96,7 @@ def load_results(folder: Path) -> Results:
     check_tables(folder, manifest, read_records(folder, manifest))
     return Results(
         folder,
-        manifest.model_dump(mode="json"),
+        manifest,
         read_table(folder, "runs"),
         read_table(folder, "sequences"),
     )

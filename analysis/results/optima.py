@@ -146,7 +146,7 @@ def collect(results: Results) -> list[Entry]:
     runs["other_arm"] = parameters.map(lambda values: values["other_arm"])
     runs["base"] = parameters.map(lambda values: values["base"])
     movements = results.solutions()
-    environment = results.manifest["environment"]
+    environment = results.manifest.environment.model_dump(mode="json")
     keys = ("coartic", "commit", "model_code", "python", "date")
     made_by = {key: environment[key] for key in keys}
     found = []

@@ -4,6 +4,8 @@ import pandas as pd
 
 from analysis.results.folder import Results
 from coartic import load_task
+from coartic.record import Commit, Environment
+from coartic.tables import Manifest, Plan, PlanLimits, PlannedCell
 
 
 def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
@@ -17,18 +19,38 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
     }  # fmt: skip
 
 
+def planned(task, method, variant=""):
+    """A cell of a plan."""
+    return PlannedCell(
+        task=task, method=method, variant=variant, parameters={}, complete={}, run_ids=()
+    )
+
+
+def manifest_for(tasks, runs=None, *, trials=10_000):
+    """A manifest with these tasks and the cells that the rows of runs are of."""
+    keys = ["task", "method", "variant"]
+    rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
+    plan = Plan(
+        suite="paper", runs=3, seed=0, trials=trials, methods={},
+        tasks={task.name: task.model_dump(mode="json") for task in tasks},
+        cells=tuple(planned(**row) for row in rows),
+    )  # fmt: skip
+    environment = Environment(
+        coartic="0", model_code="code", commit=Commit(id="abc4567", dirty=True), python="3",
+        packages={}, platform="here", processor="one", cores=2, date="today", command=(),
+        threads=None,
+    )  # fmt: skip
+    limits = PlanLimits(time_s=None, trials=None)
+    return Manifest(specification=plan, limits=limits, environment=environment, tables={})
+
+
+def replanned(manifest, **update):
+    """A manifest with another plan, unchecked: there may be no such folder."""
+    plan = manifest.specification.model_copy(update=update)
+    return manifest.model_copy(update={"specification": plan})
+
+
 def fake_results(tmp_path, runs):
-    manifest = {
-        "specification": {
-            "suite": "paper", "runs": 3, "trials": 10_000, "seed": 0,
-            "tasks": {"two-armed-1": load_task("two-armed-1").model_dump(mode="json")},
-            "cells": [{"task": "two-armed-1", "method": "dual-process/EC2", "variant": ""}],
-        },
-        "environment": {
-            "coartic": "0", "commit": {"id": "abc", "dirty": True}, "model_code": "code",
-            "python": "3", "platform": "here", "date": "today",
-        },
-    }  # fmt: skip
     frame = pd.DataFrame(runs).assign(
         task="two-armed-1", method="dual-process/EC2", variant="", commit="abc", packages="p"
     )
@@ -40,4 +62,5 @@ def fake_results(tmp_path, runs):
     )  # fmt: skip
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
     sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
+    manifest = manifest_for([load_task("two-armed-1")], frame)
     return Results(tmp_path, manifest, frame, sequences)

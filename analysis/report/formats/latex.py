@@ -12,8 +12,8 @@ import textwrap
 import unicodedata
 from collections.abc import Sequence
 
-from analysis.figures.style import short
 from analysis.markup import inline
+from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
 from analysis.report.text import Part, parts
 from analysis.words import MINUS, NO_SPREAD, NONE
@@ -213,7 +213,7 @@ def _head(part: Part, table: DataTable, width: float | None) -> str:
 def _words(part: Part, value: Value) -> str:
     """A value as it is printed, before LaTeX."""
     text = part.text(value)
-    return short(text) if part.column.name in _LABELS and text != NONE else text
+    return short_name(text) if part.column.name in _LABELS and text != NONE else text
 
 
 def latex_text(text: str) -> str:

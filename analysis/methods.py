@@ -1,0 +1,69 @@
+"""What the analysis knows of the built-in methods: names, looks and works behind them.
+
+A row of ``methods.toml`` for each; methods of others have none.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+from coartic.learner import METHOD_PREFIX
+from coartic.text import one_line
+
+LEARNER = METHOD_PREFIX
+"""The paper's learner: the name begins so, and its exploration condition follows."""
+
+
+Color = Literal["blue", "sky", "green", "orange", "vermillion", "purple", "grey", "ink"]
+Dash = Literal["solid", "dashed", "dotted", "dash-dotted"]
+
+
+class KnownMethod(BaseModel):
+    """A built-in method's row."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    short: str
+    """Its name in figures and printed tables."""
+    look: tuple[Color, Dash, str] | None = None
+    """Colour, dash and matplotlib's marker in all figures; None for what is left there."""
+    headline: bool = False
+    """Whether it stands for its family where no methods are named."""
+    works: tuple[str, ...]
+    """Keys of ``references.bib``, the most telling first; none for what is this software's own."""
+    solvers: tuple[str, ...] = ()
+    """Keys of the works behind what poses and solves its programmes."""
+
+
+def _read() -> Mapping[str, KnownMethod]:
+    text = (Path(__file__).parent / "methods.toml").read_text(encoding="utf-8")
+    return TypeAdapter(dict[str, KnownMethod]).validate_python(tomllib.loads(text))
+
+
+METHODS = _read()
+"""Rows of the built-in methods by id, in the order of lists and figures."""
+_PARAMETERS = {
+    "other_arm=": "other arm ",
+    "noise_sd=": "σ ",
+    "epsilon=": "ε ",
+    "hands=": "hands ",
+    "timing=fixed": "fixed times",
+}
+
+
+def short_name(label: str) -> str:
+    """The name of a method with its variant as figures and printed tables show it.
+
+    Of a method that is not built in it is the label itself.
+    """
+    method, _, variant = one_line(label).partition(" ")
+    name = METHODS[method].short if method in METHODS else method
+    for key, words in _PARAMETERS.items():
+        variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
+    return f"{name} ({variant.replace('_', ' ')})" if variant else name
