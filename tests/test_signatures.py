@@ -14,7 +14,7 @@ from scipy import integrate, stats
 from analysis.calibration import signatures as signature_nulls
 from analysis.citations import references
 from analysis.results.folder import Results
-from analysis.signatures import intervals, study_rows, within
+from analysis.signatures import intervals
 from analysis.signatures.context import (
     context_dependence,
     context_pairs,
@@ -40,7 +40,7 @@ from analysis.signatures.paths import (
 )
 from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
 from analysis.signatures.register import REGISTER
-from analysis.signatures.rows import Place, Signature
+from analysis.signatures.rows import Place
 from analysis.signatures.subtasks import (
     change_from,
     excess,
@@ -787,26 +787,6 @@ def test_the_register_and_its_documentation_say_the_same():
         assert f"| {signature.name} | {signature.extent} | {signature.meaning} |" in rows
     works = references()
     assert all(key in works for entry in REGISTER.values() for key in entry.sources)
-
-
-def test_a_signature_is_a_measure_and_a_row(tmp_path, monkeypatch):
-    """Added to the register, it has values, a column of its table and one of the matrix."""
-
-    def length(cell, signature):
-        yield within.mean_of(signature, Place(), [run.ticks for run in cell.runs])
-
-    row = Signature(
-        "length", length, "ticks", "ticks", "how long", "length",
-        table="main-signatures", matrix="length (ticks)",
-    )  # fmt: skip
-    monkeypatch.setattr(study_rows, "WITHIN", (*study_rows.WITHIN, row))
-    monkeypatch.setitem(REGISTER, "length", row)
-    task = load_task("ascending")
-    movements = corrective_trial(task, "RRR").movements
-    study = Study(results(tmp_path, [(task, "corrective", [movements])]))
-    (found,) = [value for value in study.signature_rows if value.signature == "length"]
-    assert found.value == 319
-    assert (found.task, found.label, found.n) == ("ascending", "corrective", 1)
 
 
 def test_trajectories_put_like_sequences_together():
