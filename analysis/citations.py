@@ -9,6 +9,7 @@ from importlib import resources
 from typing import Any
 
 from analysis.methods import METHODS
+from analysis.signatures.register import REGISTER
 from analysis.words import slugs
 from coartic import CoarticError, __version__
 from coartic.text import one_line
@@ -17,8 +18,8 @@ PAPER = "shah2013"
 ANALYSIS: tuple[str, ...] = (
     *("efron1993", "davison1997", "cliff1993", "agarwal2021", "newcombe2006", "holm1979"),
     *("chung2013", "schuirmann1987", "dolan2002", "kaplan1958", "brookmeyer1982"),
-    *("clopper1934", "cohen1988", "scholz1999", "verrel2010", "miller1974"),
-    *("balasubramanian2015", "hogan2009", "sussman1991", "engel1997"),
+    *("clopper1934", "cohen1988"),
+    *dict.fromkeys(key for signature in REGISTER.values() for key in signature.sources),
 )
 """Keys of the works behind signatures and statistics."""
 

@@ -24,9 +24,9 @@ from analysis.comparisons.progress import BestSoFar, best_so_far
 from analysis.comparisons.targets import targets
 from analysis.results.folder import CellRuns, Results, load_results
 from analysis.results.optima import Optimum, optima
-from analysis.signatures import signatures_frame
-from analysis.signatures.cell import Cell, cells_of
-from analysis.statistics.estimates import SEED
+from analysis.signatures.rows import SignatureRow
+from analysis.signatures.study_rows import signature_rows, signatures_table
+from analysis.signatures.trajectories import Trajectories, all_trajectories
 from coartic import Task
 
 CellKey = tuple[str, str]
@@ -60,12 +60,9 @@ class Study:
         return {(cell.task, cell.label): cell for cell in self.results.cells}
 
     @cached_property
-    def trajectories(self) -> dict[CellKey, Cell]:
+    def trajectories(self) -> dict[CellKey, Trajectories]:
         """Solutions tick by tick."""
-        return {
-            (cell.task.name, f"{cell.method} {cell.variant}".strip()): cell
-            for cell in cells_of(self.results)
-        }
+        return all_trajectories(self)
 
     @cached_property
     def optima(self) -> dict[tuple[str, str], Optimum]:
@@ -134,10 +131,14 @@ class Study:
         return pareto_sets(self)
 
     @cached_property
+    def signature_rows(self) -> list[SignatureRow]:
+        """Every value of every signature."""
+        return signature_rows(self)
+
+    @cached_property
     def signatures(self) -> pd.DataFrame:
-        """:func:`analysis.signatures.signatures_frame` with a column ``label``."""
-        frame = signatures_frame(self.results, list(self.trajectories.values()), seed=SEED)
-        return frame.assign(label=(frame.method + " " + frame.variant).str.strip())
+        """The same, one row a value, with the place in columns (docs/signatures.md)."""
+        return signatures_table(self.signature_rows)
 
     @cached_property
     def judged(self) -> list[Judged]:

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-import analysis.signatures.cell
 from analysis.claims import (
     CLAIMS,
     Claim,
@@ -21,6 +20,7 @@ from analysis.claims import (
 )
 from analysis.claims.judges.reach import shortest_reach
 from analysis.results.folder import Results
+from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.study import Study
 from analysis.table import interval
@@ -474,7 +474,7 @@ def with_paths(results, paths):
     """A study whose solutions are planted: runs by task and label."""
     study = Study(results)
     study.__dict__["trajectories"] = {
-        (task, label): analysis.signatures.cell.Cell(load_task(task), label, "", tuple(runs))
+        (task, label): Trajectories(load_task(task), label, "", tuple(runs))
         for (task, label), runs in paths.items()
     }
     return study

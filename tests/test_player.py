@@ -15,7 +15,7 @@ from analysis.report.player import (
     player_json,
     rounding_unit,
 )
-from analysis.signatures.cell import Cell
+from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
 from coartic import Movement, Robot, corrective_trial, load_task, trajectory
 from coartic.robot import HANDS
@@ -166,7 +166,7 @@ def test_the_run_nearest_the_median(ticks, index):
         def __init__(self, ticks):
             self.ticks = ticks
 
-    assert nearest_to_median(Cell(None, "m", "", tuple(map(Run, ticks)))) == index
+    assert nearest_to_median(Trajectories(None, "m", "", tuple(map(Run, ticks)))) == index
 
 
 def test_the_same_study_gives_the_same_text(study):

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,9 +12,9 @@ from hypothesis import strategies as st
 from scipy import integrate, stats
 
 from analysis.calibration import signatures as signature_nulls
+from analysis.citations import references
 from analysis.results.folder import Results
-from analysis.signatures import intervals, signatures_frame
-from analysis.signatures.cell import Cell
+from analysis.signatures import intervals
 from analysis.signatures.context import (
     context_dependence,
     context_pairs,
@@ -38,6 +39,8 @@ from analysis.signatures.paths import (
     turning_angles,
 )
 from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
+from analysis.signatures.register import REGISTER
+from analysis.signatures.rows import Place
 from analysis.signatures.subtasks import (
     change_from,
     excess,
@@ -45,6 +48,8 @@ from analysis.signatures.subtasks import (
     sacrifice_p,
     sacrifices,
 )
+from analysis.signatures.trajectories import Trajectories
+from analysis.study import Study
 from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
 from coartic.frames import movement_rows
 from coartic.solution import other_arm_travel
@@ -312,7 +317,7 @@ def test_other_hands_are_no_sacrifice(tmp_path):
     initial, other = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
     assert change_from(other, initial)[0] > 1  # the old comparison took this for a sacrifice
     assert other.ticks < initial.ticks
-    frame = signatures_frame(results(tmp_path, [(task, "every", [other.movements])]))
+    frame = Study(results(tmp_path, [(task, "every", [other.movements])])).signatures
     rows = frame.set_index("signature")
     assert rows.loc["first subtask against initial"].value > 1
     assert rows.loc["first subtask against the same hands"].value == 0
@@ -687,8 +692,8 @@ def test_frame_of_two_contexts(tmp_path):
             (task, "failed", []),
         ]
     folder = results(tmp_path, solved)
-    frame = signatures_frame(folder)
-    assert frame.equals(signatures_frame(folder))  # nothing random but by the seed
+    frame = Study(folder).signatures
+    assert frame.equals(Study(folder).signatures)  # nothing is random but by its seed
 
     def one(method, signature):
         rows = frame[(frame.task == "ascending") & (frame.method == method)]
@@ -721,24 +726,24 @@ def test_frame_of_a_family(tmp_path):
         lower = 0.02 * (height - 2.0)
         targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
         solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
-    frame = signatures_frame(results(tmp_path, solved))
-    slopes = frame[frame.signature == "locus slope"].set_index("where")
+    frame = Study(results(tmp_path, solved)).signatures
+    slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
+    assert set(slopes.moving) == {2}
+    norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])
     reached = {
         goal: [
             execute(task, solution[0]).configurations[goal - 1, 1] for task, _, solution in solved
         ]
         for goal in (1, 3)
     }
-    for goal, kind in ((1, "anticipatory"), (3, "carry-over")):
-        row = slopes.loc[f"goal {goal}, {kind} of goal 2, right hand, base_y"]
+    for goal in (1, 3):
+        row = slopes.loc[goal, "right", "base_y"]
         assert row.value == pytest.approx(reached[goal][2] - reached[goal][0])  # over length 1
         assert row.n == 6
-        norms = frame[frame.signature == "locus slope norm"].set_index("where")
-        at = f"goal {goal}, {kind} of goal 2, right hand"
-        every = slopes.value[slopes.index.str.startswith(at)]
-        assert norms.loc[at].value == pytest.approx(np.linalg.norm(every))
-        assert norms.loc[at].p in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
-    assert slopes.loc["goal 1, anticipatory of goal 2, right hand, base_y"].value > 0.001
+        every = slopes.value.loc[goal, "right"]
+        assert norms.value[goal, "right"] == pytest.approx(np.linalg.norm(every))
+        assert norms.p[goal, "right"] in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
+    assert slopes.value[1, "right", "base_y"] > 0.001
     contexts = frame[frame.signature == "context distance"]
     assert contexts.why_not.str.contains("locus slopes").all()
 
@@ -749,8 +754,8 @@ def test_frame_has_the_student_interval_of_its_runs(tmp_path):
     bends = (0.0, 0.1, 0.2, 0.5)
     solutions = [planned(posture(1.0, left_4=b), posture(4.0), hands="RL") for b in bends]
     travelled = [execute(task, solution).configurations[0, 5] for solution in solutions]
-    frame = signatures_frame(results(tmp_path, [(task, "planner", solutions)]))
-    row = frame[(frame.signature == "travel of the other arm") & (frame["where"] == "goal 1")]
+    frame = Study(results(tmp_path, [(task, "planner", solutions)])).signatures
+    row = frame[(frame.signature == "travel of the other arm") & (frame.goal == 1)]
     half = 3.1824463 * np.std(travelled, ddof=1) / 2  # Student's t, 3 degrees of freedom
     mean = np.mean(travelled)
     assert row[["value", "low", "high"]].squeeze().tolist() == pytest.approx(
@@ -759,13 +764,38 @@ def test_frame_has_the_student_interval_of_its_runs(tmp_path):
     assert row.n.item() == 4
 
 
-def test_cells_put_like_sequences_together():
+def test_places_in_words():
+    """As ``signatures.csv`` has always had them."""
+    assert str(Place()) == ""
+    assert str(Place(joint="base_x")) == "base x"
+    assert str(Place(hand="chosen")) == "chosen hand"
+    follows = Place(goal=1, moving=2, hand="right", joint="base_y")
+    assert str(follows) == "goal 1, anticipatory of goal 2, right hand, base_y"
+    assert str(Place(goal=3, moving=2)) == "goal 3, carry-over of goal 2"
+    context = Place(goal=1, hand="right", against="descending", longest=141)
+    assert str(context) == "goal 1, right hand, against descending, of at most 141"
+    assert (
+        str(Place(goal=2, hand="left", hands="RL", neutral=0.34657))
+        == "goal 2, left hand, RL, neutral at 0.347"
+    )
+
+
+def test_the_register_and_its_documentation_say_the_same():
+    page = Path("docs/signatures.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| ")]
+    for signature in REGISTER.values():
+        assert f"| {signature.name} | {signature.extent} | {signature.meaning} |" in rows
+    works = references()
+    assert all(key in works for entry in REGISTER.values() for key in entry.sources)
+
+
+def test_trajectories_put_like_sequences_together():
     task = load_task("two-armed-2")
     runs = tuple(
         trajectory(task, corrective_trial(task, hands).movements)
         for hands in ("RRRR", "RLRR", "RLRR")
     )
-    cell = Cell(task, "m", "", runs)
+    cell = Trajectories(task, "m", "", runs)
     assert cell.sequences == ["RRRR", "RLRR", "RLRR"]
     assert [run.execution.hands for run in cell.typical] == ["RLRR", "RLRR"]
     assert len(cell.with_hand("left", 2)) == 2

@@ -303,7 +303,7 @@ def _context_present(data: Data, label: str) -> tuple[bool, float] | None:
     if apart is None:
         return None
     try:
-        p = data.signature(ASCENDING, label, "context dependence", "goal 1")["p"]
+        p = data.signature(ASCENDING, label, "context dependence", 1).p
     except MissingError:
         p = math.nan
     return apart > STEP_APART and not p >= LEVEL, apart
@@ -321,7 +321,7 @@ def _sacrifice(data: Data, label: str) -> str:
         return NONE
     ticks = sacrifice(data, label)
     assert ticks is not None
-    low = runs["value"] if math.isnan(runs["low"]) else runs["low"]
+    low = runs.value if math.isnan(runs.low) else runs.low
     return _said(low > 0.5, f"{ticks[0]:+.1f}, {ticks[1]:+.1f}")
 
 
@@ -330,7 +330,7 @@ def _equivalence(data: Data, label: str) -> str:
     if found is None:
         return NONE
     same, other = (
-        data.signature(ASCENDING, label, name, "goal 1")["value"]
+        data.signature(ASCENDING, label, name, 1).value
         for name in ("motor-equivalent part", "non-motor-equivalent part")
     )
     return _said(found[0] and same > other, f"{same:.3f} and {other:.3f}")
@@ -348,19 +348,16 @@ def _lead(data: Data, label: str) -> str:
     try:
         data.runs(ASCENDING, label)
         several = len(data.runs(DESCENDING, label)) > 1
-        lead = data.signature(ASCENDING, label, "lead time", "goal 1")
+        lead = data.signature(ASCENDING, label, "lead time", 1)
     except MissingError:
         return "no" if context_distance(data, label) is not None and several else NONE
-    return _said(lead["value"] > 0, f"{lead['value']:.0f} ticks")
+    return _said(lead.value > 0, f"{lead.value:.0f} ticks")
 
 
 def _turning(data: Data, label: str) -> str:
     try:
         own, initial = (
-            sum(
-                data.signature(ASCENDING, name, "turning angle", goal)["value"]
-                for goal in ("goal 1", "goal 2")
-            )
+            sum(data.signature(ASCENDING, name, "turning angle", goal).value for goal in (1, 2))
             for name in (label, "corrective-alone/given")
         )
     except MissingError:

@@ -7,9 +7,9 @@ import numpy as np
 from analysis.claims.data import ONE, Data, MissingError
 from analysis.claims.register import Claim, Finding
 from analysis.comparisons.methods import LEARNER
-from analysis.signatures.cell import Cell
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
+from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean, share_test
 from analysis.table import interval
 from coartic.robot import Array
@@ -34,7 +34,7 @@ def _hand_coarticulation(data: Data) -> Finding:
     )
 
 
-def prepared_by_waiting(cell: Cell) -> Array:
+def prepared_by_waiting(cell: Trajectories) -> Array:
     """How much nearer the waiting arm has brought its hand to its next goal, mean over goals.
 
     :func:`analysis.signatures.other_arm.preshaping_since_hit` of each run, shape ``(runs,)``:
@@ -46,7 +46,7 @@ def prepared_by_waiting(cell: Cell) -> Array:
     return np.asarray(np.nanmean(values[known.any(axis=1)], axis=1))
 
 
-def _by_goal(cell: Cell, *, since_hit: bool) -> Array:
+def _by_goal(cell: Trajectories, *, since_hit: bool) -> Array:
     """Preshaping of each run by goal, shape ``(runs, G)``."""
     initial = cell.initial
     if initial is None:

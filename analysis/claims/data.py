@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -11,8 +12,9 @@ import pandas as pd
 from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.published import TRIALS
 from analysis.results.folder import Results
-from analysis.signatures.cell import Cell
 from analysis.signatures.recruitment import best_sequences
+from analysis.signatures.rows import SignatureRow
+from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST
 from coartic import Execution, Task, corrective_trial, initial_hands
 from coartic.errors import NotApplicableError
@@ -148,20 +150,22 @@ class Data:
             )
         return found
 
-    def cell(self, task: str, method: str) -> Cell:
+    def cell(self, task: str, method: str) -> Trajectories:
         """Executed solutions; raises MissingError where there are none."""
         self.runs(task, method)
         return self.study.trajectories[task, method]
 
-    def signature(self, task: str, method: str, name: str, where: str = "") -> dict[str, Any]:
-        """The first row of a signature whose ``where`` begins so; MissingError without one."""
+    def signature(
+        self, task: str, method: str, name: str, goal: int | None = None
+    ) -> SignatureRow:
+        """The first value of a signature (at a goal); MissingError without one."""
         self.runs(task, method)
-        frame = self.study.signatures
-        rows = frame[(frame.task == task) & (frame.label == method) & (frame.signature == name)]
-        rows = rows[rows["where"].str.startswith(where) & rows.value.notna()]
-        if not len(rows):
-            raise MissingError(f"{name} of {method} on {task} has no value")
-        return {str(key): value for key, value in rows.iloc[0].items()}
+        for row in self.study.signature_rows:
+            if (row.task, row.label, row.signature) == (task, method, name) and (
+                goal in (None, row.place.goal) and not math.isnan(row.value)
+            ):
+                return row
+        raise MissingError(f"{name} of {method} on {task} has no value")
 
     def task(self, name: str) -> Task:
         """A task of the folder."""

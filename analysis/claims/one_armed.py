@@ -51,36 +51,35 @@ def sacrifice(data: Data, method: str) -> tuple[float, float] | None:
         total = data.signature(ASCENDING, method, "total against the same hands")
     except MissingError:
         return None
-    return float(first["value"]), float(total["value"])
+    return float(first.value), float(total.value)
 
 
 def _context_matters(data: Data) -> Finding:
-    where = "goal 1"
     data.runs(DESCENDING, _EC1)
-    distance = data.signature(ASCENDING, _EC1, "context distance", where)["value"]
-    row = data.signature(ASCENDING, _EC1, "context dependence", where)
-    equivalent = data.signature(ASCENDING, _EC1, "motor-equivalent part", where)["value"]
-    other = data.signature(ASCENDING, _EC1, "non-motor-equivalent part", where)["value"]
-    apart = row["value"]
-    test = Inference(apart, (int(row["n"]),), "permutation test over runs", p=row["p"], seed=SEED)
+    distance = data.signature(ASCENDING, _EC1, "context distance", 1).value
+    row = data.signature(ASCENDING, _EC1, "context dependence", 1)
+    equivalent = data.signature(ASCENDING, _EC1, "motor-equivalent part", 1).value
+    other = data.signature(ASCENDING, _EC1, "non-motor-equivalent part", 1).value
+    apart = row.value
+    test = Inference(apart, (int(row.n),), "permutation test over runs", p=row.p, seed=SEED)
     parts = [
         f"postures at goal 1 lie {distance:.2f} apart, {apart:.1f} pooled SDs; per dimension "
         f"{equivalent:.3f} leave the hand in place and {other:.3f} move it"
     ]
     parts += [
-        f"{method}: {apart:.2f} apart"
+        f"{method}: {own:.2f} apart"
         for method in CONTROLS
-        if (apart := context_distance(data, method)) is not None
+        if (own := context_distance(data, method)) is not None
     ]
     # A permutation test has no contrary side: too small a difference leaves it open.
-    return Finding(True if row["value"] > 1 else None, "; ".join(parts), (test,), ())
+    return Finding(True if row.value > 1 else None, "; ".join(parts), (test,), ())
 
 
 def context_distance(data: Data, method: str) -> float | None:
     """Distance of mean postures at goal 1, ascending and descending; None without runs."""
     try:
         data.runs(DESCENDING, method)
-        return float(data.signature(ASCENDING, method, "context distance", "goal 1")["value"])
+        return float(data.signature(ASCENDING, method, "context distance", 1).value)
     except MissingError:
         return None
 

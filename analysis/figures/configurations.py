@@ -16,7 +16,7 @@ from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.figures.selection import missing, solved
 from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, styled
 from analysis.methods import LEARNER, short_name
-from analysis.signatures.cell import Cell
+from analysis.signatures.trajectories import Trajectories
 from coartic import CoarticError, Execution, Task, execute
 from coartic.frames import movements_from
 from coartic.robot import Array
@@ -80,7 +80,7 @@ def initial_solution(study: Study, task: str) -> Solution:
 
     Raises CoarticError where that does not complete the task.
     """
-    execution = Cell(study.results.tasks[task], "", "", ()).initial
+    execution = Trajectories(study.results.tasks[task], "", "", ()).initial
     if execution is None:
         raise missing(study, f"the corrective process alone does not complete {task}")
     return Solution(study.results.tasks[task], "", "", execution)

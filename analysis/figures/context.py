@@ -29,14 +29,13 @@ from analysis.figures.style import (
     styled,
 )
 from analysis.methods import short_name
-from analysis.signatures.register import CONTEXT
 from analysis.statistics.estimates import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
 MOST = 6
-_PARTS = {CONTEXT[2]: "equivalent", CONTEXT[3]: "other"}
+_PARTS = {"motor-equivalent part": "equivalent", "non-motor-equivalent part": "other"}
 
 
 @styled
@@ -49,31 +48,7 @@ def context(
     among ``tasks`` where these are named. Raises CoarticError where no method has runs on two
     such tasks, or there are more than :data:`MOST` panels.
     """
-    names = set(known_tasks(study, tasks))
-    frame = study.signatures
-    frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
-    other_task = frame["where"].str.split("against ").str[-1]
-    frame = frame[frame.task.isin(names) & other_task.isin(names)]
-    labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
-    frame = frame[frame.label.isin(labels)]
-    if not len(frame):
-        raise missing(study, "no method has solved runs on two tasks that share their first goals")
-    keys = ["task", "where", "label", "n"]
-    equivalent, other = (
-        frame[frame.signature == name]
-        .set_index(keys)[["value", "p"]]
-        .rename(columns={"value": part, "p": f"p_{part}"})
-        for name, part in _PARTS.items()
-    )
-    data = equivalent.join(other).reset_index().rename(columns={"label": "method", "n": "runs"})
-    together = data[["p_equivalent", "p_other"]].to_numpy(dtype=float)
-    adjusted = np.reshape(holm(together.ravel().tolist()), together.shape)
-    data = data.assign(holm_equivalent=adjusted[:, 0], holm_other=adjusted[:, 1])
-    order = {label: place for place, label in enumerate(labels)}
-    data = data.sort_values(
-        ["task", "where", "method"], key=lambda c: c.map(order) if c.name == "method" else c,
-        kind="stable",
-    ).reset_index(drop=True)  # fmt: skip
+    data = _parts(study, methods, tasks)
     places = list(data.groupby(["task", "where"], sort=False))
     if len(places) > MOST:
         raise missing(
@@ -81,10 +56,10 @@ def context(
         )
     rows = sum(len(group) + 4 for _, group in places)
     figure = Figure(figsize=(ONE, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
-    panels = figure.subplots(
-        len(places), 1, squeeze=False, sharex=True,
-        height_ratios=[len(group) + 1 for _, group in places],
-    )[:, 0]  # fmt: skip
+    heights = [len(group) + 1 for _, group in places]
+    panels = figure.subplots(len(places), 1, squeeze=False, sharex=True, height_ratios=heights)[
+        :, 0
+    ]
     farthest = float(data[["equivalent", "other"]].max().max()) or 1.0  # all the same: any scale
     for axes, ((task, where), group) in zip(panels, places, strict=True):
         _panel(axes, group)
@@ -114,6 +89,35 @@ def context(
         figure=figure,
         data=data,
     )
+
+
+def _parts(
+    study: Study, methods: Sequence[str] | None, tasks: Sequence[str] | None
+) -> pd.DataFrame:
+    """One row a place and method: both parts, with p raw and adjusted over all rows."""
+    names, frame = set(known_tasks(study, tasks)), study.signatures
+    frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
+    frame = frame[frame.task.isin(names) & frame.against.isin(names)]
+    labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
+    frame = frame[frame.label.isin(labels)]
+    if not len(frame):
+        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+    keys = ["task", "where", "label", "n"]
+    equivalent, other = (
+        frame[frame.signature == name]
+        .set_index(keys)[["value", "p"]]
+        .rename(columns={"value": part, "p": f"p_{part}"})
+        for name, part in _PARTS.items()
+    )
+    data = equivalent.join(other).reset_index().rename(columns={"label": "method", "n": "runs"})
+    together = data[["p_equivalent", "p_other"]].to_numpy(dtype=float)
+    adjusted = np.reshape(holm(together.ravel().tolist()), together.shape)
+    data = data.assign(holm_equivalent=adjusted[:, 0], holm_other=adjusted[:, 1])
+    order = {label: place for place, label in enumerate(labels)}
+    data = data.assign(order=data.method.map(order)).sort_values(
+        ["task", "where", "order"], kind="stable"
+    )
+    return data.drop(columns="order").reset_index(drop=True)
 
 
 def _panel(axes: Axes, data: pd.DataFrame) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -17,6 +18,7 @@ from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, has, known_tasks, missing
 from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, styled
 from analysis.methods import short_name
+from analysis.signatures.register import REGISTER
 from analysis.words import slugs
 from coartic import Task
 
@@ -24,22 +26,7 @@ if TYPE_CHECKING:
     from analysis.study import Study
 
 SIGNATURES = {
-    "first subtask against initial": "first subtask (ticks)",
-    "total against initial": "total (ticks)",
-    "subtask against isolated reach": "against isolated reach (ticks)",
-    "hand entropy": "hand entropy (bit)",
-    "hand as in isolation": "hand as in isolation (share)",
-    "preshaping of the other arm": "preshaping",
-    "travel of the other arm": "other arm's travel (rad)",
-    "base reversals": "base reversals",
-    "turning angle": "turning angle (rad)",
-    "hand path SPARC": "SPARC",
-    "hand path log dimensionless jerk": "log jerk",
-    "ΔV z": "ΔV z",
-    "context distance": "context distance",
-    "context dependence": "context dependence (SD)",
-    "motor-equivalent part": "motor-equivalent",
-    "non-motor-equivalent part": "moves the hand",
+    signature.name: signature.matrix for signature in REGISTER.values() if signature.matrix
 }
 """Signatures of a column each, and the column's heading."""
 LIMIT = 2.0  # standard deviations at which colours saturate
@@ -101,58 +88,10 @@ def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
 
 
 def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
-    values = data.pivot_table(
-        index="method", columns="signature", values="value", sort=False, dropna=False
-    )
-    columns = [name for name in SIGNATURES if values[name].notna().any()]
+    known = set(data.signature[data.value.notna()])
+    columns = [name for name in SIGNATURES if name in known]
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
-    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), TWO / 2)
-    above, right, tall = 1.38, 0.7, 0.19  # inches
-    side = min((TWO - left - right) / len(columns), 0.6)
-    width = column_width(left + side * len(columns) + right)
-    side = (width - left - right) / len(columns)
-    height = above + tall * len(labels) + 0.06
-    figure = Figure(figsize=(width, height))
-    axes = figure.add_axes(
-        (
-            left / width,
-            0.06 / height,
-            side * len(columns) / width,
-            tall * len(labels) / height,
-        )
-    )
-    colors = colormaps[_MAP]
-    cells = shown.set_index(["method", "signature"])
-    for y, label in enumerate(labels):
-        for x, name in enumerate(columns):
-            value = float(cells.value[label, name])
-            if math.isnan(value):
-                axes.add_patch(
-                    Rectangle(
-                        (x, y), 1, 1, facecolor="none", edgecolor=GREY, hatch="/////", linewidth=0
-                    )
-                )
-                continue
-            shade = float(cells.standardised[label, name]) / (2 * LIMIT) + 0.5
-            color = to_hex(colors(min(max(shade, 0.0), 1.0)))
-            axes.add_patch(
-                Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3)
-            )
-            axes.text(
-                x + 0.5, y + 0.52, _figures(value), ha="center", va="center", fontsize=6,
-                color=on(color),
-            )  # fmt: skip
-    axes.set_xlim(0, len(columns))
-    axes.set_ylim(len(labels), 0)
-    axes.set_yticks(np.arange(len(labels)) + 0.5, [short_name(label) for label in labels])
-    axes.xaxis.tick_top()
-    axes.set_xticks(
-        np.arange(len(columns)) + 0.5, [SIGNATURES[name] for name in columns],
-        rotation=50, ha="left", rotation_mode="anchor",
-    )  # fmt: skip
-    axes.tick_params(length=0, pad=2)
-    axes.spines[:].set_visible(False)
     return Plot(
         id=f"signatures-{slug}",
         title=f"Signatures of coarticulation: {task.label}",
@@ -168,9 +107,51 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
             f"Matrix of {len(labels)} methods ({', '.join(map(short_name, labels))}) by "
             f"{len(columns)} signatures on {task.label}; its numbers are in the table."
         ),
-        figure=figure,
+        figure=_matrix(shown, labels, columns),
         data=shown,
     )
+
+
+def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -> Figure:
+    """The figure: labels by columns, as large as they need."""
+    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), TWO / 2)
+    above, right, below, tall = 1.38, 0.7, 0.06, 0.19  # inches
+    side = min((TWO - left - right) / len(columns), 0.6)
+    width = column_width(left + side * len(columns) + right)
+    side = (width - left - right) / len(columns)
+    height = above + tall * len(labels) + below
+    figure = Figure(figsize=(width, height))
+    across, up = side * len(columns) / width, tall * len(labels) / height
+    axes = figure.add_axes((left / width, below / height, across, up))
+    cells = data.set_index(["method", "signature"])
+    for y, label in enumerate(labels):
+        for x, name in enumerate(columns):
+            value, standardised = cells.value[label, name], cells.standardised[label, name]
+            _draw_cell(axes, x, y, float(value), float(standardised))
+    axes.set_xlim(0, len(columns))
+    axes.set_ylim(len(labels), 0)
+    axes.set_yticks(np.arange(len(labels)) + 0.5, [short_name(label) for label in labels])
+    axes.xaxis.tick_top()
+    headings = [SIGNATURES[name] for name in columns]
+    places = np.arange(len(columns)) + 0.5
+    axes.set_xticks(places, headings, rotation=50, ha="left", rotation_mode="anchor")
+    axes.tick_params(length=0, pad=2)
+    axes.spines[:].set_visible(False)
+    return figure
+
+
+def _draw_cell(axes: Axes, x: int, y: int, value: float, standardised: float) -> None:
+    """A value on its colour; hatched where there is none."""
+    if math.isnan(value):
+        empty = Rectangle((x, y), 1, 1, facecolor="none", edgecolor=GREY, linewidth=0)
+        empty.set_hatch("/////")
+        axes.add_patch(empty)
+        return
+    shade = standardised / (2 * LIMIT) + 0.5
+    color = to_hex(colormaps[_MAP](min(max(shade, 0.0), 1.0)))
+    axes.add_patch(Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3))
+    text = axes.text(x + 0.5, y + 0.52, _figures(value), ha="center", va="center")
+    text.set(fontsize=6, color=on(color))
 
 
 def _figures(value: float) -> str:

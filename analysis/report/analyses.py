@@ -6,7 +6,7 @@ from analysis.claims import claims_page
 from analysis.report.formats.markdown import markdown
 from analysis.report.pages.comparisons import comparisons_document
 from analysis.report.pages.frontier import frontier_document
-from analysis.signatures.page import signatures_page
+from analysis.report.pages.signatures import signatures_document
 from analysis.study import Study
 
 
@@ -16,7 +16,7 @@ def analyse(study: Study) -> dict[str, bytes]:
         "claims.md": claims_page(study.results, study.judged),
         "comparisons.md": markdown(comparisons_document(study), tables=""),
         "frontier.md": markdown(frontier_document(study), tables=""),
-        "signatures.md": signatures_page(study),
+        "signatures.md": markdown(signatures_document(study), tables=""),
     }
     tables = {
         "claims.csv": study.claims,

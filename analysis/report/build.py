@@ -235,7 +235,8 @@ def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Se
         found = tables.signatures_tables(study, task)
         if found:
             below.append(_section(f"on-{slug}-signatures", task, _tables(*found)))
-    blocks = [*context, *_tables(tables.contexts_table(study)), *matrices]
+    between = _tables(tables.contexts_table(study), *tables.slopes_tables(study))
+    blocks = [*context, *between, *matrices]
     return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 

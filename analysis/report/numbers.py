@@ -21,6 +21,8 @@ from analysis.comparisons.methods import LEARNER, solve_times
 from analysis.published import published_cell, published_initial
 from analysis.results.folder import CellRuns
 from analysis.results.optima import SHIPPED
+from analysis.signatures.register import PER_DIMENSION, REGISTER
+from analysis.signatures.rows import SignatureRow
 from analysis.statistics.estimates import (
     SEED,
     Inference,
@@ -41,13 +43,6 @@ Cell = tuple[str, str]
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 _INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
 """Exploration condition under which the paper speaks of a task's initial solution."""
-_SIGNATURES = {
-    "first subtask against initial": ("FirstSubtask", "ticks"),
-    "context distance": ("ContextDistance", "length unit, rad"),
-    "context dependence": ("ContextDependence", "pooled SD"),
-    "motor-equivalent part": ("MotorEquivalent", "length unit, rad"),
-    "non-motor-equivalent part": ("NonMotorEquivalent", "length unit, rad"),
-}
 
 
 @dataclass(frozen=True)
@@ -363,25 +358,23 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
 
 
 def _signatures(study: Study, names: Names) -> Iterator[Number]:
-    frame = study.signatures
-    frame = frame[
-        frame.signature.isin(list(_SIGNATURES)) & frame.value.notna() & (frame.variant == "")
-    ]
-    for key, rows in frame.groupby(["task", "label", "signature"], sort=False):
+    places: dict[tuple[str, str, str], list[SignatureRow]] = {}
+    for row in study.signature_rows:
+        if REGISTER[row.signature].macro and not row.variant and not math.isnan(row.value):
+            places.setdefault((row.task, row.label, row.signature), []).append(row)
+    for (task, label, name), rows in places.items():
         if len(rows) > 1:  # several places: a table's, not a headline
             continue
-        task, label, signature = map(str, key)
-        row = rows.iloc[0]
-        where = str(row["where"])
-        other = (where.partition("against ")[2], label)
-        cells = [(task, label), *([other] if other in study.cells else [])]
-        what, unit = _SIGNATURES[signature]
-        n = int(row["n"])
-        place = f" ({where})" if where else ""
+        (row,) = rows
+        signature = REGISTER[name]
+        other = (row.place.against, label)
+        place = f" ({row.place})" if str(row.place) else ""
         yield Number(
-            f"{PREFIX}{names.tasks[task]}{names.labels[label]}{what}",
-            f"{signature}{place}", float(row["value"]), 2, unit,
-            float(row["low"]), float(row["high"]),
-            n=n if n != len(study.cells[task, label].good) else None,
-            how="docs/signatures.md", cells=tuple(cells), of=f"{label} on {task}",
+            f"{PREFIX}{names.tasks[task]}{names.labels[label]}{signature.macro}",
+            f"{name}{place}", row.value, 2, signature.unit.removesuffix(PER_DIMENSION),
+            row.low, row.high,
+            n=row.n if row.n != len(study.cells[task, label].good) else None,
+            how="docs/signatures.md",
+            cells=((task, label), *([other] if other in study.cells else [])),
+            of=f"{label} on {task}",
         )  # fmt: skip

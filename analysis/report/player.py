@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.document import CellKey
-from analysis.signatures.cell import Cell
+from analysis.signatures.trajectories import Trajectories
 from coartic import Robot, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS, Array
@@ -43,7 +43,7 @@ def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
     return json_text({"tasks": [task for task in tasks if task["movements"]]}, allow_nan=False)
 
 
-def nearest_to_median(cell: Cell) -> int:
+def nearest_to_median(cell: Trajectories) -> int:
     """Index of the run whose reward is nearest the median, the first of several."""
     rewards = np.array([-run.ticks for run in cell.runs], dtype=np.float64)
     return int(np.abs(rewards - np.median(rewards)).argmin())

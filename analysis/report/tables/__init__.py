@@ -2,6 +2,7 @@
 
 from analysis.report.tables.claims import claims_table
 from analysis.report.tables.common import table_ids
+from analysis.report.tables.contexts import contexts_table, slopes_tables
 from analysis.report.tables.cost import (
     READING_OF_COST,
     areas_table,
@@ -11,7 +12,7 @@ from analysis.report.tables.cost import (
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
 from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.report.tables.paper import exhaustive_table, published_table, sequences_table
-from analysis.report.tables.signatures import contexts_table, signatures_tables
+from analysis.report.tables.signatures import signatures_tables
 
 __all__ = [
     "READING_OF_COST",
@@ -29,6 +30,7 @@ __all__ = [
     "reading_of_pairs",
     "sequences_table",
     "signatures_tables",
+    "slopes_tables",
     "table_ids",
     "targets_table",
 ]

@@ -1,135 +1,278 @@
-"""Signatures of coarticulation, on one task and between tasks."""
+"""Signatures of coarticulation on one task.
+
+Which signature a table shows, and under which heading, is said by the register
+(:mod:`analysis.signatures.register`).
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row, Value
-from analysis.report.tables.common import finite, table, table_ids, with_interval
-from analysis.signatures.page import CONTEXTS, OTHER, main_columns, other_arm_columns, place
-from analysis.signatures.page import Column as SignatureColumn
+from analysis.report.tables.common import counts, table, table_ids, with_interval
+from analysis.signatures.register import REGISTER
+from analysis.signatures.rows import Signature, SignatureRow
+from analysis.statistics.estimates import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-MOST_CONTEXTS = 120
-_UNITS = ("ticks", "share", "bit", "count", "rad", "1")
+
+class _Kind(NamedTuple):
+    """A table of one task."""
+
+    id: str
+    title: str
+    shows: str
+    """What signatures of the register name as their table."""
+    note: str = ""
+
+
+_KINDS = (
+    _Kind("main-signatures", "Main signatures", "main-signatures"),
+    _Kind("further-goals", "Signatures at further goals", "main-signatures"),
+    _Kind(
+        "hands",
+        "Hands",
+        "hands",
+        "Hand sequences with the number of runs; ticks less those of the corrective process "
+        "alone with each run's own hands, which is what a sacrifice is judged by; and by goal, "
+        "the share of runs that hit it with the hand that is quickest for it by itself.",
+    ),
+    _Kind(
+        "other-arm",
+        "The arm that is not chosen",
+        "other-arm",
+        "How much nearer the waiting hand is to its next goal than in the initial solution when "
+        "each goal is hit (a ratio; 1: there already): in all; seen from the base, which leaves "
+        "out what a base does that moved otherwise than in the initial solution; and by what the "
+        "arm did since its own last hit, 0 where it keeps still while it waits.",
+    ),
+    _Kind("travel", "Travel of the arm that is not chosen", "travel"),
+    _Kind(
+        "synergy",
+        "Synergy, ΔV z",
+        "synergy",
+        "ΔV z at each goal, over the runs with a method's commonest hand sequence; p of the test "
+        "against its neutral value, ½ ln(d_ucm/d_ort). **It is above neutral nearly everywhere, "
+        "and says little**: a hit confines the hand to a disc of the task's radius, so that runs "
+        "cannot differ much in directions that move it, whatever the method.",
+    ),
+    _Kind(
+        "variance",
+        "Synergy, V_ucm, V_ort and ΔV",
+        "variance",
+        "Variance over runs per dimension within (V_ucm) and orthogonal to (V_ort) the "
+        "uncontrolled manifold, squared units, and ΔV, their difference over the total.",
+    ),
+)
+
+
+class Spot(NamedTuple):
+    """A signature at one place of a task, whatever differs between methods: a column."""
+
+    signature: Signature
+    goal: int | None
+    joint: str
+
+    @property
+    def name(self) -> str:
+        """Of the column."""
+        goal = "" if self.goal is None else f"goal {self.goal}"
+        return identifier(self.signature.name, goal, self.joint)
+
+    @property
+    def header(self) -> str:
+        """Of the column."""
+        heading = self.signature.heading
+        if self.joint:
+            return f"{self.joint.replace('_', ' ')} {heading}"
+        by_goal = self.signature.extent.endswith("by goal")
+        return f"{heading}, goal {self.goal}" if by_goal else heading
 
 
 def signatures_tables(study: Study, task: str) -> list[DataTable]:
-    """The main signatures of all methods on one task, and what the other arm does."""
-    content = study.results.tasks[task]
-    found = [
-        _signatures(study, task, "main-signatures", "Main signatures", main_columns(content)),
-        _signatures(
-            study,
-            task,
-            "other-arm",
-            "The arm that is not chosen",
-            other_arm_columns(content),
-            OTHER,
-        )
-        if len(content.hands) > 1
-        else None,
-    ]
-    return [table for table in found if table is not None]
-
-
-def contexts_table(study: Study) -> DataTable | None:
-    """Postures at a shared goal before different successors."""
-    names = (
-        "context distance", "context dependence", "motor-equivalent part",
-        "non-motor-equivalent part", "lead time",
-    )  # fmt: skip
-    frame = study.signatures
-    frame = frame[frame.signature.isin(names) & frame.value.notna()]
-    frame = frame.assign(at=frame["where"].str.replace(r", of at most \d+$", "", regex=True))
-    rows = []
-    for (task, at, label), own in frame.groupby(["task", "at", "label"], sort=False):
-        by_name = {row["signature"]: row for row in own.to_dict("records")}
-        other = str(at).partition("against ")[2]
-        cells = [(str(task), str(label))]
-        if (other, str(label)) in study.cells:
-            cells.append((other, str(label)))
-        dependence = by_name.get("context dependence")
-        rows.append(
-            Row(
-                f"{task}, {at}, {label}",
-                (
-                    str(label),
-                    f"{task}, {at}",
-                    *(_estimate(by_name[n]) if n in by_name else None for n in names),
-                    finite(dependence["p"]) if dependence else None,
-                ),
-                tuple(cells),
-            )
-        )
-    if len(rows) > MOST_CONTEXTS:  # families of variants have too many to be read here
-        return None
-    heads = ("distance", "dependence", "motor-equivalent", "non-motor-equivalent", "lead")
-    units = ("", "pooled SD", "", "", "ticks")
-    return table(
-        "contexts",
-        "The same goal before different successors.",
-        (
-            Column("method", "method"),
-            Column("where", "where", printed=False),
-            *(
-                Column(f"context_{i}", head, "number", unit)
-                for i, (head, unit) in enumerate(zip(heads, units, strict=True))
-            ),
-            Column("p", "p of dependence", "p", digits=4),
-        ),
-        rows,
-        (f"{CONTEXTS} p is of the permutation test, uncorrected; {len(rows)} rows.",),
-    )
-
-
-def _signatures(
-    study: Study,
-    task: str,
-    name: str,
-    title: str,
-    columns: list[SignatureColumn],
-    note: str = "",
-) -> DataTable | None:
-    frame = study.signatures
-    frame = frame[(frame.task == task) & frame.value.notna()]
-    values = {
-        (row["label"], row["signature"], place(row)): row for row in frame.to_dict("records")
-    }
-    rows = []
-    for own, label in study.method_rows:
-        if own != task:
+    """The signatures of all methods on one task; the main ones first, the others folded."""
+    rows = [row for row in study.signature_rows if row.task == task]
+    found = []
+    for kind in _KINDS:
+        if kind.id == "hands" and len(study.tasks[task].hands) < 2:
             continue
-        entries = [values.get((label, column.signature, column.place)) for column in columns]
-        if any(entries):
-            cells = tuple(None if entry is None else _estimate(entry) for entry in entries)
-            rows.append(Row(label, (label, *cells), ((task, label),)))
-    heads = []
-    for index, column in enumerate(columns):
-        head, _, unit = column.head.rpartition(", ")
-        if unit not in _UNITS:
-            head, unit = column.head, ""
-        unit = "" if unit == "1" else unit
-        heads.append(
-            Column(
-                f"signature_{index}",
-                head,
-                "number",
-                unit,
-                printed=index < 2,
-            )
-        )
+        made = _of_task(study, task, kind, rows)
+        if made is not None:
+            found.append(replace(made, folded=kind.id not in ("main-signatures", "other-arm")))
+    return found
+
+
+def _of_task(
+    study: Study, task: str, kind: _Kind, every: Sequence[SignatureRow]
+) -> DataTable | None:
+    """Methods by signatures and places; None where no method has a value."""
+    rows = [row for row in every if REGISTER[row.signature].table == kind.shows]
+    spots = _spots(rows, kind.id)
+    own = {(row.label, spot_of(row)): row for row in rows}
+    adjusted = holm_adjusted(row for row in own.values() if spot_of(row) in spots)
+    tested = {spot for label, spot in adjusted}
+    found, empty = [], _Reasons()
+    for label in labels_of(study, task):
+        values = [own.get((label, spot)) for spot in spots]
+        whole = {row.signature: row.why_not for row in rows if row.label == label and not row.unit}
+        empty.note(label, spots, values, whole)
+        known = [row for row in values if row is not None and not math.isnan(row.value)]
+        if not known:
+            continue
+        cells: list[Value] = [label, max(row.n for row in known)]
+        if kind.id == "hands":
+            cells.append(counts(study.cells[task, label].good.hands))
+        for spot, row in zip(spots, values, strict=True):
+            cells.append(None if row is None else estimate_of(row))
+            if spot in tested:
+                cells.append(adjusted.get((label, spot)))
+        found.append(Row(label, tuple(cells), ((task, label),)))
+    columns = [Column("method", "method"), runs_column()]
+    if kind.id == "hands":
+        columns.append(Column("hands", "hands", rests_on=("runs",)))
+    for number, spot in enumerate(spots):
+        neutral = _neutral(row for (_, at), row in own.items() if at == spot)
+        columns.append(value_column(spot.signature, spot.name, spot.header + neutral, number < 2))
+        if spot in tested:
+            columns.append(p_column(spot.name, "p"))
     return table(
-        f"{name}-{table_ids(study)[task]}",
-        f"{title} on {escaped(task)}.",
-        (Column("method", "method"), *heads),
-        rows,
-        (note,) if note else (),
+        f"{kind.id}-{table_ids(study)[task]}",
+        f"{kind.title} on {escaped(task)}.",
+        tuple(columns),
+        found,
+        tuple(filter(None, (kind.note, *empty.lines()))),
     )
 
 
-def _estimate(row: dict[Any, Any]) -> Value:
-    return with_interval(float(row["value"]), float(row["low"]), float(row["high"]))
+def _spots(rows: Sequence[SignatureRow], kind: str) -> list[Spot]:
+    """The columns of a table, in the order of the register; of variance goal by goal."""
+    order = list(REGISTER)
+    found = {spot_of(row) for row in rows if row.unit}
+    if kind in ("main-signatures", "further-goals"):
+        found = {spot for spot in found if ((spot.goal or 1) > 1) == (kind == "further-goals")}
+
+    def place(spot: Spot) -> tuple[int, int, int, str]:
+        first = spot.goal or 0 if kind == "variance" else 0
+        return first, order.index(spot.signature.name), spot.goal or 0, spot.joint
+
+    return sorted(found, key=place)
+
+
+def spot_of(row: SignatureRow) -> Spot:
+    """Where a value stands in a table."""
+    return Spot(REGISTER[row.signature], row.place.goal, row.place.joint)
+
+
+def _neutral(rows: Iterable[SignatureRow]) -> str:
+    """The neutral values, one for all methods and hands as a rule, for a header."""
+    places = dict.fromkeys(row.place.neutral for row in rows)
+    known = dict.fromkeys(f"{value:.3f}" for value in places if value is not None)
+    return f", neutral {' or '.join(known)}" if known else ""
+
+
+class _Reasons:
+    """Why methods have no value in some or all columns of a table."""
+
+    def __init__(self) -> None:
+        self._some: dict[str, dict[str, None]] = {}
+        self._all: dict[str, list[str]] = {}
+
+    def note(
+        self,
+        label: str,
+        spots: Sequence[Spot],
+        values: Sequence[SignatureRow | None],
+        whole: dict[str, str],
+    ) -> None:
+        """Record a method's row; ``whole``: why it lacks signatures altogether."""
+        reasons = [
+            row.why_not if row else whole.get(spot.signature.name, "not in every run's sequence")
+            for spot, row in zip(spots, values, strict=True)
+            if row is None or math.isnan(row.value)
+        ]
+        if spots and len(reasons) == len(spots):
+            self._all.setdefault(reasons[0], []).append(label)
+            return
+        for why in reasons:
+            self._some.setdefault(why, {})[label] = None
+
+    def lines(self) -> list[str]:
+        """In inline markup; nothing where there are none."""
+        lines = [f"Empty: {why} ({', '.join(labels)})." for why, labels in self._some.items()]
+        lines += [
+            f"Without values: {', '.join(labels)} ({why})." for why, labels in self._all.items()
+        ]
+        return [escaped(line) for line in lines]
+
+
+def definitions_table() -> DataTable:
+    """What every signature says."""
+    return DataTable(
+        "signatures-explained",
+        "What the signatures say.",
+        (
+            Column("signature", "signature"),
+            Column("extent", "unit, range"),
+            Column("meaning", "what it says"),
+        ),
+        tuple(
+            Row(signature.name, (signature.name, signature.extent, signature.meaning))
+            for signature in REGISTER.values()
+        ),
+    )
+
+
+def labels_of(study: Study, task: str) -> list[str]:
+    """Methods of a task, best mean reward first."""
+    return [label for name, label in study.method_rows if name == task]
+
+
+def holm_adjusted(rows: Iterable[SignatureRow]) -> dict[tuple[str, Spot], float]:
+    """Holm-adjusted p by label and spot, of those that have one."""
+    tests = [row for row in rows if not math.isnan(row.p)]
+    adjusted = holm([row.p for row in tests])
+    return {(row.label, spot_of(row)): p for row, p in zip(tests, adjusted, strict=True)}
+
+
+def estimate_of(row: SignatureRow) -> Value:
+    """The value with its interval."""
+    return with_interval(row.value, row.low, row.high)
+
+
+def identifier(*words: str) -> str:
+    """A column's name: the words in small ASCII letters."""
+    text = " ".join(words).lower().replace("δ", "d")
+    return re.sub(r"\W+", "_", text.strip())
+
+
+def runs_column(*, printed: bool = False) -> Column:
+    """Runs that went into a row."""
+    return Column("runs", "runs", "number", rests_on=("runs",), printed=printed)
+
+
+def value_column(signature: Signature, name: str, header: str, printed: bool) -> Column:
+    """Values of a signature, with its unit and decimals."""
+    unit = "" if signature.unit == "1" or signature.table == "slopes" else signature.unit
+    unit = unit if unit in ("ticks", "bit", "rad", "pooled SD") else ""
+    kind, digits = ("share", 0) if signature.share else ("number", signature.digits)
+    return Column(
+        name,
+        header,
+        "share" if kind == "share" else "number",
+        unit,
+        digits,
+        rests_on=("runs",),
+        printed=printed,
+    )
+
+
+def p_column(name: str, header: str, printed: bool = False) -> Column:
+    """p-values beside the values of a column."""
+    return Column(f"{name}_p", header, "p", digits=3, rests_on=("runs",), printed=printed)

@@ -1,28 +1,37 @@
-"""One cell of a results folder, its runs as tick-by-tick trajectories."""
+"""Solutions of one method on one task, tick by tick, and what they are compared with."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from analysis.results.folder import Results
+from analysis.signatures.recruitment import best_sequences
+from analysis.signatures.subtasks import change_from
 from coartic import Execution, Hand, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
 from coartic.frames import movements_from
 from coartic.robot import Array
 
+if TYPE_CHECKING:
+    from analysis.study import Study
+
 
 @dataclass(frozen=True)
-class Cell:
+class Trajectories:
     """The solved runs of one method with parameters on one task."""
 
     task: Task
     method: str
     variant: str
     runs: tuple[Trajectory, ...]
+    best_hands: tuple[str, ...] = ()
+    """Hand sequences that are best by the corrective process alone, as far as the folder
+    knows."""
 
     @cached_property
     def initial(self) -> Execution | None:
@@ -57,6 +66,29 @@ class Cell:
         """Runs that hit a goal with ``hand``; ``goal`` counts from 1."""
         return tuple(run for run in self.runs if run.hands[goal - 1] == hand)
 
+    @cached_property
+    def against_initial(self) -> NDArray[np.int64]:
+        """Ticks of subtasks less the initial solution's, ``(runs, G)``; no row without one."""
+        initial = self.initial
+        return self._changes([initial] * len(self.runs))
+
+    @cached_property
+    def against_same_hands(self) -> NDArray[np.int64]:
+        """Ticks of subtasks less the corrective process's with each run's own hands.
+
+        Shape ``(n, G)``: runs whose hands it completes the task with.
+        """
+        alone = {hands: self.corrective(hands) for hands in set(self.sequences)}
+        return self._changes([alone[hands] for hands in self.sequences])
+
+    def _changes(self, references: list[Execution | None]) -> NDArray[np.int64]:
+        rows = [
+            change_from(run.execution, reference)
+            for run, reference in zip(self.runs, references, strict=True)
+            if reference is not None
+        ]
+        return np.array(rows, dtype=np.int64).reshape(-1, len(self.task.goals))
+
 
 def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:
     """Configuration of each run when it hit a goal, shape ``(runs, dof)``."""
@@ -71,24 +103,18 @@ def last_ticks(runs: tuple[Trajectory, ...], goal: int, count: int) -> Array:
     )
 
 
-def cells_of(results: Results) -> list[Cell]:
-    """Every cell of a results folder in the order of the plan."""
-    tasks = results.tasks
-    solutions = dict(list(results.solutions().groupby("run_id")))
-    waypoints = results.paths()
+def all_trajectories(study: Study) -> dict[tuple[str, str], Trajectories]:
+    """By task and label, in the order of the plan; those without a solution have no runs."""
+    solutions = dict(list(study.results.solutions().groupby("run_id")))
+    waypoints = study.results.paths()
     paths = dict(list(waypoints.groupby("run_id"))) if len(waypoints) else {}
-    return [
-        Cell(
-            tasks[cell.task],
-            cell.method,
-            cell.variant,
-            tuple(
-                trajectory(
-                    tasks[cell.task],
-                    movements_from(tasks[cell.task], solutions[run_id], paths.get(run_id)),
-                )
-                for run_id in cell.good.run_id
-            ),
+    found = {}
+    for key, cell in study.cells.items():
+        task = study.tasks[cell.task]
+        runs = tuple(
+            trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)))
+            for run_id in cell.good.run_id
         )
-        for cell in results.cells
-    ]
+        best = best_sequences(study.results.sequences, cell.task)
+        found[key] = Trajectories(task, cell.method, cell.variant, runs, tuple(best))
+    return found

@@ -1,0 +1,133 @@
+"""What a signature is, and one value of it: typed, with the place it belongs to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+NO_RUN = "no run has a solution"
+ONE_HAND = "the task has one hand"
+NO_INITIAL = "the corrective process alone does not complete the task"
+ONE_RUN = "one run: no interval"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in a solution, and between which tasks, a value belongs; what does not apply is
+    empty."""
+
+    goal: int | None = None
+    """Number of the goal, from 1."""
+    hand: str = ""
+    """``left``, ``right``, or ``chosen``: the one chosen in each subtask."""
+    hands: str = ""
+    """Hand sequences of the runs, with their counts where there are several."""
+    against: str = ""
+    """Task that is the other context."""
+    moving: int | None = None
+    """Number of the goal that differs between the tasks of a family."""
+    joint: str = ""
+    neutral: float | None = None
+    """Value that says nothing, where that is not 0."""
+    longest: int | None = None
+    """Ticks that a lead can have at most."""
+
+    def __str__(self) -> str:
+        """In words: ``goal 1, right hand, against descending, of at most 141``."""
+        parts = [] if self.goal is None else [f"goal {self.goal}"]
+        joint = self.joint.replace("_", " ")
+        if self.moving is not None:
+            kind = "anticipatory" if self.goal is None or self.goal < self.moving else "carry-over"
+            parts.append(f"{kind} of goal {self.moving}")
+            joint = self.joint
+        parts += [f"{self.hand} hand"] if self.hand else []
+        parts += [self.hands] if self.hands else []
+        parts += [f"against {self.against}"] if self.against else []
+        parts += [joint] if joint else []
+        parts += [] if self.neutral is None else [f"neutral at {self.neutral:.3f}"]
+        parts += [] if self.longest is None else [f"of at most {self.longest}"]
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class Value:
+    """One value of a signature, or why there is none."""
+
+    signature: str
+    place: Place = Place()
+    value: float = math.nan
+    low: float = math.nan
+    """Interval at 95 %."""
+    high: float = math.nan
+    p: float = math.nan
+    """Uncorrected."""
+    n: int = 0
+    """Runs that went into it."""
+    unit: str = ""
+    """Empty where the signature does not apply."""
+    why_not: str = ""
+    """Why there is no value, or no interval or test; empty where all is there."""
+
+    def of(self, task: str, method: str, variant: str) -> SignatureRow:
+        """The same as a row of a study."""
+        return SignatureRow(**vars(self), task=task, method=method, variant=variant)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignatureRow(Value):
+    """A value of one method with parameters on one task."""
+
+    task: str
+    method: str
+    variant: str
+
+    @property
+    def label(self) -> str:
+        """The method with its variant."""
+        return f"{self.method} {self.variant}".strip()
+
+
+Measure = Callable[..., Iterator[Value]]
+"""Takes what is measured (:class:`~.trajectories.Trajectories`, a pair of contexts or a family
+of tasks), then the signatures that it measures, in the order of the register."""
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One signature: how it is measured, called, explained and shown."""
+
+    name: str
+    measure: Measure
+    """Signatures that are computed together share one."""
+    unit: str
+    extent: str
+    """Unit and range, for people."""
+    meaning: str
+    """What it says, in inline markup."""
+    heading: str
+    """Short name, for tables and figures."""
+    table: str = ""
+    """Id of the table of a task that shows it (:mod:`analysis.report.tables.signatures`)."""
+    digits: int | None = 2
+    """Decimals shown; None: three figures."""
+    matrix: str = ""
+    """Heading of its column in the matrix of signatures; empty: it has none."""
+    macro: str = ""
+    """Of the number that a paper may quote; empty: there is none."""
+    sources: tuple[str, ...] = ()
+    """Keys of ``references.bib``."""
+
+    @property
+    def share(self) -> bool:
+        """Whether it is a share of runs."""
+        return self.extent.startswith("share")
+
+    def at(self, place: Place = Place(), **values: Any) -> Value:
+        """A value of it, with its unit; ``values`` as :class:`Value` has them."""
+        return replace(Value(self.name, place, unit=self.unit), **values)
+
+    def without(self, why: str, place: Place = Place(), n: int = 0) -> Value:
+        """That it does not apply."""
+        return Value(self.name, place, n=n, why_not=why)

@@ -1,0 +1,247 @@
+"""Measures of one method on one task: its runs' values as means, shares and synergies.
+
+A measure takes :class:`~.trajectories.Trajectories`, then the signatures that it measures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from analysis.signatures import intervals
+from analysis.signatures.manifold import movable
+from analysis.signatures.manifold import synergy as synergy_of
+from analysis.signatures.other_arm import travel
+from analysis.signatures.paths import reversals_of, smoothness, turning_angles
+from analysis.signatures.recruitment import entropy, isolated_agreement
+from analysis.signatures.rows import (
+    NO_INITIAL,
+    NO_RUN,
+    ONE_HAND,
+    ONE_RUN,
+    Measure,
+    Place,
+    Signature,
+    Value,
+)
+from analysis.signatures.subtasks import excess, sacrifice_p, sacrifices
+from analysis.signatures.trajectories import Trajectories, postures
+from analysis.statistics import spread
+from analysis.statistics.estimates import SEED
+from coartic import Execution, Trajectory
+from coartic.robot import Array
+
+
+def first_subtask(changes: Callable[[Trajectories], Array]) -> Measure:
+    """Measure the mean change of the first subtask; ``changes`` has shape ``(runs, G)``."""
+
+    def measure(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+        found = changes(cell)
+        yield (
+            mean_of(signature, Place(goal=1), found[:, 0])
+            if len(found)
+            else signature.without(_no_reference(cell))
+        )
+
+    return measure
+
+
+def whole(changes: Callable[[Trajectories], Array]) -> Measure:
+    """Measure the mean change of all subtasks together."""
+
+    def measure(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+        found = changes(cell)
+        yield (
+            mean_of(signature, Place(), found.sum(axis=1))
+            if len(found)
+            else signature.without(_no_reference(cell))
+        )
+
+    return measure
+
+
+def _no_reference(cell: Trajectories) -> str:
+    return NO_INITIAL if cell.runs else NO_RUN
+
+
+def sacrificed(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Share of runs that sacrifice the first subtask, against their own hands."""
+    changes = cell.against_same_hands
+    if not len(changes):
+        yield signature.without(_no_reference(cell))
+        return
+    shown = share_of(signature, Place(), [sacrifices(change) for change in changes])
+    p = sacrifice_p(changes, seed=SEED)
+    why = shown.why_not
+    if not why and math.isnan(p):
+        why = "no test: the first subtask or the whole takes the same ticks in every run"
+    yield replace(shown, p=p, why_not=why)
+
+
+def against_isolated_reach(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Mean excess of each subtask over an isolated reach."""
+    missing = "the corrective process reaches the goal from the posture before with no hand"
+    values = [excess(run) for run in cell.runs]
+    yield from by_goal(signature, len(cell.task.goals), values, missing)
+
+
+def of_two_hands(measure: Measure) -> Measure:
+    """Restrict a measure to solved tasks with two hands."""
+
+    def restricted(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+        if len(cell.task.hands) < 2 or not cell.runs:
+            yield signature.without(ONE_HAND if cell.runs else NO_RUN)
+        else:
+            yield from measure(cell, signature)
+
+    return restricted
+
+
+@of_two_hands
+def hand_entropy(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Entropy of the hand sequences."""
+    counts = pd.Series(cell.sequences).value_counts()
+    yield signature.at(
+        Place(hands=", ".join(f"{hands} {count}" for hands, count in counts.items())),
+        value=entropy(cell.sequences),
+        n=len(cell.runs),
+        why_not="" if len(cell.runs) > 1 else "one run: no distribution",
+    )
+
+
+@of_two_hands
+def as_in_isolation(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Share of runs that hit each goal with the hand that is quickest for it by itself."""
+    agreement = np.array([isolated_agreement(run) for run in cell.runs])
+    for number, agrees in enumerate(agreement.T, 1):
+        yield share_of(signature, Place(goal=number), agrees.tolist())
+
+
+@of_two_hands
+def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Share of runs with a hand sequence that is best by the corrective process alone."""
+    best = cell.best_hands
+    if best:
+        agrees = [hands in best for hands in cell.sequences]
+        yield share_of(signature, Place(hands=", ".join(best)), agrees)
+    else:
+        yield signature.without("the folder's table of sequences has no reward")
+
+
+def nearer_than_initially(preshaping: Callable[[Trajectory, Execution], Array]) -> Measure:
+    """Measure one of the preshapings of :mod:`~.other_arm` at every goal but the last."""
+
+    @of_two_hands
+    def measure(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+        initial = cell.initial
+        if initial is None:
+            yield signature.without(NO_INITIAL)
+            return
+        values = [preshaping(run, initial) for run in cell.runs]
+        missing = "the other hand hits no later goal"
+        yield from by_goal(signature, len(cell.task.goals) - 1, values, missing)
+
+    return measure
+
+
+@of_two_hands
+def travel_of_the_other_arm(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Mean travel of the arm that is not chosen, by subtask."""
+    yield from by_goal(signature, len(cell.task.goals), [travel(run) for run in cell.runs])
+
+
+def base_reversals(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Mean number of reversals of each base coordinate."""
+    reversals = [reversals_of(run) for run in cell.runs]
+    for k, name in enumerate("xy"):
+        place = Place(joint=f"base_{name}")
+        if name in cell.task.locked_base:
+            yield signature.without("the coordinate is locked", place)
+        else:
+            yield mean_of(signature, place, [run[k] for run in reversals])
+
+
+def turning(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Mean turning angle at every goal but the last."""
+    goals = len(cell.task.goals)
+    if goals < 2:
+        yield signature.without("the task has one goal")
+        return
+    turns = [
+        turning_angles(np.vstack([run.task.q0, run.execution.configurations])) for run in cell.runs
+    ]
+    yield from by_goal(signature, goals - 1, turns, "a subtask without displacement")
+
+
+def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Iterator[Value]:
+    """Smoothness of the chosen hand's path."""
+    found = [smoothness(run) for run in cell.runs]
+    short = "every subtask is too short, or its path is without jerk"
+    for k, signature in enumerate((sparc, jerk)):
+        yield mean_of(signature, Place(hand="chosen"), [run[k] for run in found], short)
+
+
+def synergies(
+    cell: Trajectories, within: Signature, across: Signature, delta: Signature, z: Signature
+) -> Iterator[Value]:
+    """Variance over runs by what it does to the hand, over runs with the commonest hands."""
+    runs, n = cell.typical, len(cell.typical)
+    if n < 2:
+        why = "one run: no variance across runs" if runs else NO_RUN
+        yield from (signature.without(why, n=n) for signature in (within, across, delta, z))
+        return
+    for number in range(1, len(cell.task.goals) + 1):
+        hand = runs[0].hands[number - 1]
+        joints = movable(cell.task, hand)
+        q = postures(runs, number)
+        jacobian = cell.task.robot.jacobian(spread.mean(q), hand)[:, joints]
+        found = synergy_of(q[:, joints], jacobian)
+        place = Place(goal=number, hand=hand, hands=runs[0].execution.hands)
+        why = "runs do not differ" if math.isnan(found.z) else ""
+        yield within.at(place, value=found.within, n=n, why_not=why)
+        yield across.at(place, value=found.orthogonal, n=n, why_not=why)
+        yield delta.at(place, value=found.delta, n=n, why_not=why)
+        if not why:
+            place = replace(place, neutral=found.neutral)
+            if math.isnan(found.p):
+                why = "fewer than three runs" if n < 3 else "runs differ along one line"
+        yield z.at(
+            place, value=found.z, low=found.low, high=found.high, p=found.p, n=n, why_not=why
+        )
+
+
+def by_goal(
+    signature: Signature, goals: int, values: Sequence[Array], missing: str = ""
+) -> Iterator[Value]:
+    """Means at the first ``goals`` goals of ``values``, a row of them a run."""
+    for number in range(1, goals + 1):
+        own = [run[number - 1] for run in values]
+        yield mean_of(signature, Place(goal=number), own, missing)
+
+
+def mean_of(
+    signature: Signature, place: Place, values: Sequence[float] | Array, missing: str = ""
+) -> Value:
+    """Mean over the runs that have a value, with Student's interval.
+
+    ``missing`` says why a run may have none.
+    """
+    given = np.asarray(values, dtype=np.float64)
+    known = given[np.isfinite(given)]
+    if not len(known):
+        return signature.at(place, why_not=missing if len(given) else NO_RUN)
+    return _estimated(signature, place, intervals.mean(known), len(known))
+
+
+def share_of(signature: Signature, place: Place, agrees: Sequence[bool]) -> Value:
+    """Share of runs, with Wilson's interval."""
+    return _estimated(signature, place, intervals.share(agrees), len(agrees))
+
+
+def _estimated(signature: Signature, place: Place, found: intervals.Interval, n: int) -> Value:
+    why = ONE_RUN if n == 1 else ""
+    return signature.at(place, **found._asdict(), n=n, why_not=why)
