@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from analysis.claims import claims_page
 from analysis.comparisons.frontier_page import frontier_page
 from analysis.comparisons.pairs_page import comparisons_page
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.claims import claims_document
 from analysis.signatures.page import signatures_page
 from analysis.study import Study
 
@@ -12,7 +13,7 @@ from analysis.study import Study
 def analyse(study: Study) -> dict[str, bytes]:
     """All pages and tables by file name."""
     pages = {
-        "claims.md": claims_page(study.results, study.judged),
+        "claims.md": markdown(claims_document(study), tables=""),
         "comparisons.md": comparisons_page(study, study.pairs, study.overall, study.scores),
         "frontier.md": frontier_page(study.results, study.targets, study.areas, study.pareto),
         "signatures.md": signatures_page(study),

@@ -1,0 +1,1 @@
+"""Pages of ``coartic analyse``: documents of the report's tables."""
