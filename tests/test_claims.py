@@ -22,7 +22,7 @@ from analysis.report.pages.claims import claims_document
 from analysis.results.folder import Results
 from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.study import Study
-from analysis.table import interval
+from analysis.words import interval
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
 from tests.support.made_up import MadeUp, manifest_for, row

@@ -25,7 +25,7 @@ from analysis.published import Summary, published_cell
 from analysis.report.document import Column, RestsOn, Row
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import SEED, difference_of_means, mean
-from analysis.table import NONE, interval
+from analysis.words import NONE, interval
 
 _EQUIVALENT = f"within ± {MARGIN:.0%}"
 

@@ -13,7 +13,7 @@ from analysis.claims.register import Finding
 from analysis.comparisons.methods import LEARNER, TOLD
 from analysis.report.document import Column, RestsOn, Row, Value
 from analysis.results.optima import METHODS as OPTIMUM
-from analysis.table import NONE, short
+from analysis.words import NONE, short
 from coartic.method import Information
 
 _TASKS = tuple(task for task, _ in BEST)

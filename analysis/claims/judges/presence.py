@@ -14,7 +14,7 @@ from analysis.claims.register import Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.report.document import CellKey, Column, Row, Value
 from analysis.statistics.estimates import LEVEL
-from analysis.table import NONE
+from analysis.words import NONE
 
 REPRESENTATIVES = (
     ("learner", f"{LEARNER}EC1", f"{LEARNER}EC4"),

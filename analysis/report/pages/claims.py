@@ -13,8 +13,7 @@ from analysis.report.document import Block, Bullets, Document, Prose, Section
 from analysis.report.legends import with_legends
 from analysis.report.summary import verdicts
 from analysis.report.tables import claims_table
-from analysis.slugs import slugs
-from analysis.table import NONE
+from analysis.words import NONE, slugs
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -31,7 +30,7 @@ _FIGURES = {
 
 def claims_document(study: Study) -> Document:
     """The register as a document: counts, a table of verdicts, then claim by claim."""
-    specification = study.results.manifest["specification"]
+    specification = study.results.manifest.specification
     table = claims_table(study)
     counted = verdicts(study.judged, "verdicts")
     groups = [
@@ -49,8 +48,8 @@ def claims_document(study: Study) -> Document:
             ),
         ),
         f"What Shah, Barto & Fagg (2013) say of their model, tested on suite "
-        f"{code(specification['suite'])}: {specification['runs']} runs of "
-        f"{specification['trials']} trials, seed {specification['seed']}. Run ids of every claim "
+        f"{code(specification.suite)}: {specification.runs} runs of "
+        f"{specification.trials} trials, seed {specification.seed}. Run ids of every claim "
         "are in `claims.csv`.",
         study.run_ids,
     )
