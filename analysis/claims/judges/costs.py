@@ -133,7 +133,7 @@ def experience(data: Data) -> Finding:
             Column("reward", "mean reward", "number", digits=1, rests_on=("runs",)),
             Column("runs", "runs", "number", rests_on=("runs",)),
             *of_either_optimum(
-                Column("reached", near_it, "number", rests_on=rests),
+                Column("reached", f"within {NEAR:.0%}", "number", rests_on=rests),
                 Column("median_trials", "median trials", "number", digits=0, rests_on=rests),
             ),
         ),

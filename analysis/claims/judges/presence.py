@@ -182,7 +182,7 @@ class _Sign(NamedTuple):
 
 
 def _number(name: str, header: str, unit: str = "", digits: int = 2) -> Column:
-    return Column(name, header, "number", unit, digits, rests_on=("runs",))
+    return Column(name, header, "number", unit, digits, rests_on=("runs",), printed=False)
 
 
 _SIGNS = (
