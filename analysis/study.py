@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.claims import Judged, claims_frame, judge
+from analysis.claims import Judged, judge, register_table
 from analysis.comparisons.anytime import anytime_curves
 from analysis.comparisons.areas import areas
 from analysis.comparisons.methods import MethodRow, method_rows
@@ -28,6 +29,9 @@ from analysis.signatures.rows import SignatureRow
 from analysis.signatures.study_rows import signature_rows, signatures_table
 from analysis.signatures.trajectories import Trajectories, all_trajectories
 from coartic import Task
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CellKey = tuple[str, str]
 """Name of a task, and label of a method: its name with its variant."""
@@ -58,6 +62,11 @@ class Study:
     def cells(self) -> dict[CellKey, CellRuns]:
         """Rows of the runs, in the order of the plan."""
         return {(cell.task, cell.label): cell for cell in self.results.cells}
+
+    @cached_property
+    def run_ids(self) -> dict[CellKey, tuple[str, ...]]:
+        """Ids of the runs of every cell."""
+        return {key: tuple(map(str, cell.runs.run_id)) for key, cell in self.cells.items()}
 
     @cached_property
     def trajectories(self) -> dict[CellKey, Trajectories]:
@@ -148,4 +157,18 @@ class Study:
     @cached_property
     def claims(self) -> pd.DataFrame:
         """The same, one row a claim."""
-        return claims_frame(self.judged)
+        return register_table(self.judged)
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Figures by id (docs/figures.md), each drawn when it is first asked for."""
+        from analysis.figures import Figures
+
+        return Figures(self)
+
+    @cached_property
+    def tables(self) -> Mapping[str, pd.DataFrame]:
+        """The report's tables by id, with the columns of their CSV files."""
+        from analysis.report.build import report_tables
+
+        return report_tables(self)

@@ -29,7 +29,7 @@ from analysis.published import TRIALS
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.signatures.subtasks import postures_before
 from analysis.statistics.estimates import SEED, bootstrap_test, mean
-from analysis.table import interval, short
+from analysis.words import interval, short
 from coartic.task import hands_of
 
 CLOSE = 0.10

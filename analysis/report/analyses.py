@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from analysis.claims import claims_page
 from analysis.report.formats.markdown import markdown
+from analysis.report.pages.claims import claims_document
 from analysis.report.pages.comparisons import comparisons_document
 from analysis.report.pages.frontier import frontier_document
 from analysis.report.pages.signatures import signatures_document
@@ -13,7 +13,7 @@ from analysis.study import Study
 def analyse(study: Study) -> dict[str, bytes]:
     """All pages and tables by file name."""
     pages = {
-        "claims.md": claims_page(study.results, study.judged),
+        "claims.md": markdown(claims_document(study), tables=""),
         "comparisons.md": markdown(comparisons_document(study), tables=""),
         "frontier.md": markdown(frontier_document(study), tables=""),
         "signatures.md": markdown(signatures_document(study), tables=""),

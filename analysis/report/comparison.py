@@ -43,7 +43,7 @@ def comparison_document(study: Study) -> Document:
         "Comparison",
         tuple(section for section in (paper, methods, limits) if section.blocks),
         _made(study),
-        {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
+        study.run_ids,
     )
 
 

@@ -1,11 +1,24 @@
 """Rows of runs that nobody ran, for what is computed of them."""
 
+from functools import cached_property
+
 import pandas as pd
 
 from analysis.results.folder import Results
+from analysis.study import Study
 from coartic import load_task
 from coartic.record import Commit, Environment
 from coartic.tables import Manifest, Plan, PlanLimits, PlannedCell
+
+
+class MadeUp(Study):
+    """A study with some of its parts made up: ``MadeUp(results, signatures=...)``."""
+
+    def __init__(self, results, **parts):
+        super().__init__(results)
+        for name in parts:
+            assert isinstance(getattr(Study, name), cached_property)
+        vars(self).update(parts)
 
 
 def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
