@@ -14,6 +14,7 @@ from benchmarks.specification import RunSpec
 from benchmarks.store import Damage, Store
 from coartic import CoarticError, Movement
 from coartic.errors import IncompleteError
+from coartic.inputs import problems_inline
 from coartic.method import Information
 from coartic.record import (
     MOST_MOVEMENTS,
@@ -28,7 +29,6 @@ from coartic.record import (
     Status,
     Timing,
     Values,
-    problems,
     solved,
 )
 from coartic.text import plain
@@ -155,7 +155,7 @@ def record_of(answer: Answer, spec: RunSpec) -> Record:
         said = _Said.model_validate_json(answer["outcome"])
     except ValidationError as error:
         return _failure(
-            spec, "solver-failed", f"what it handed over cannot be kept: {problems(error)}"
+            spec, "solver-failed", f"what it handed over cannot be kept: {problems_inline(error)}"
         )
     if said.foreign_code and spec.entry.foreign is None:
         raise CoarticError(plain(said.error or "other code"))

@@ -17,9 +17,8 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
-from benchmarks.declaration import decapitalised
 from benchmarks.provenance import surroundings
 from benchmarks.registry import Entry, Registry, unknown
 from benchmarks.specification import UNLIMITED, Limits, RunSpec
@@ -38,7 +37,6 @@ from coartic.inputs import (
     MOST_RUNS,
     MOST_SECONDS,
     MOST_TRIALS,
-    brief,
     brief_value,
     problems,
     read_toml,
@@ -224,15 +222,8 @@ def _read(path: Path) -> Suite:
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
-        details = error.errors(include_url=False)
-        raise CoarticError(problems(str(path), details, _explain)) from None
-
-
-def _explain(detail: ErrorDetails) -> str:
-    key = ".".join(brief(str(part)) for part in detail["loc"])
-    if detail["type"] == "string_pattern_mismatch":
-        return f"{key} is {brief_value(detail['input'])}; use letters, digits, '.', '_' and '-'"
-    return f"{key}: {decapitalised(detail['msg'])} (found {brief_value(detail['input'])})"
+        keys = [*Suite.model_fields, *_Block.model_fields, *_Move.model_fields]
+        raise CoarticError(problems(str(path), error, keys)) from None
 
 
 def select_cells(

@@ -241,14 +241,20 @@ def test_grid_and_fixed_parameters(tmp_path):
     [
         ('methods = ["dual-proces/EC1"]', "did you mean 'dual-process/EC1'"),
         ('methods = ["dual-process/EC3"]', "task 'ascending' has no left hand"),
-        ('methods = ["dual-process/EC1"]\nparameters = {noise = 1.0}', "noise: extra inputs"),
+        (
+            'methods = ["dual-process/EC1"]\nparameters = {noise = 1.0}',
+            "noise is an unknown key; did you mean 'noise_sd'?",
+        ),
         (
             'methods = ["dual-process/EC1"]\ngrid = {noise_sd = [-1.0]}',
-            "noise_sd: input should be",
+            "noise_sd is -1.0; it must be at least 0",
         ),
-        ('methods = ["dual-process/EC1"]\ngrid = {noise_sd = []}', "own.toml: cells.0.grid"),
-        ("methods = []", "own.toml: cells.0.methods"),
-        ('methods = ["dual-process/EC1"]\nrun = 3', "own.toml: cells.0.run: extra inputs"),
+        ('methods = ["dual-process/EC1"]\ngrid = {noise_sd = []}', "own.toml: cells[0].grid"),
+        ("methods = []", "own.toml: cells[0].methods"),
+        (
+            'methods = ["dual-process/EC1"]\nrun = 3',
+            "own.toml: cells[0].run is an unknown key; did you mean 'runs'?",
+        ),
     ],
 )
 def test_suite_files_that_cannot_be_used(block, words, tmp_path):
@@ -482,7 +488,7 @@ def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):
             assert bool(method.secondary) == name.endswith("-nullspace")
             assert ("Jacobian" in method.told) == name.endswith("-biased")
     for foreign in ("nullspace_gain", "bias"):  # told would no longer be right
-        with pytest.raises(CoarticError, match=f"{foreign}: extra inputs"):
+        with pytest.raises(CoarticError, match=f"{foreign} is an unknown key"):
             KNOWN["dual-process/EC4"].complete({foreign: 0.1})
 
 
@@ -546,7 +552,7 @@ def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
     [
         ([], "not an object"),
         ({"format": 2}, "have format 2"),
-        ({"format": FORMAT}, "specification: field required"),
+        ({"format": FORMAT}, "specification is missing"),
         (lambda found: found["specification"]["methods"].pop("dual-process/EC4"), "its seal"),
     ],
 )
