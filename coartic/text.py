@@ -69,8 +69,8 @@ def json_text(content: Any, *, indent: int | None = None, allow_nan: bool = True
 
 
 def counted(count: int, thing: str) -> str:
-    """``1 run``, ``2 runs``, ``10_000 runs``."""
-    return f"{count:_} {thing}{'' if count == 1 else 's'}"
+    """``1 run``, ``2 runs``."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

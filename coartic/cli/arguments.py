@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +11,7 @@ import typer
 
 from coartic.errors import CoarticError
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.text import did_you_mean
 
 
 def _suites() -> Iterable[str]:
@@ -126,6 +127,32 @@ def labels_in(text: str, option: str) -> list[str]:
     if not labels or not all(labels):
         raise CoarticError(f"{option} {text!r} has an empty name; write for example a,b")
     return list(dict.fromkeys(labels))
+
+
+def results_folder(text: str) -> Path:
+    """The folder of ``--out``. Raises CoarticError for an empty name."""
+    if not text.strip():
+        raise CoarticError("--out is empty; name a folder for the results")
+    return Path(text)
+
+
+def endings_in(text: str, known: Collection[str]) -> list[str]:
+    """The endings of a report's figures, ``.svg`` among them.
+
+    Raises CoarticError for one that is not among the ``known`` ones.
+    """
+    formats = [ending.removeprefix(".") for ending in known]
+    names = names_in(text, "--formats")
+    for name in names:
+        if name not in formats:
+            hint = did_you_mean(name, formats) or ";"
+            raise CoarticError(
+                f"--formats: figures are not written as {name!r}{hint} choose of "
+                f"{', '.join(formats)}"
+            )
+    if "svg" not in names:
+        raise CoarticError(f"--formats {text}: svg must be among them: report.md shows it")
+    return [f".{name}" for name in names]
 
 
 def check_numbers(jobs: int, time_limit: float | None) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import labels_in, names_in
+from coartic.cli.arguments import endings_in, labels_in
 from coartic.cli.terminal import say, show_data, show_table
 from coartic.errors import CoarticError
 from coartic.text import counted
@@ -57,19 +57,18 @@ def report(
 
     A folder that holds anything else than an earlier report, unchanged, is refused.
     """
+    from analysis.figures.plot import FILES
     from analysis.report.build import build, write
     from analysis.report.write import check_report_folder
     from analysis.study import load
 
     started = time.monotonic()
+    endings = endings_in(formats, FILES)
     study = load(folder)
     out = folder / "report" if out is None else out
     check_report_folder(out, folder)
-    made = build(
-        study,
-        None if methods is None else labels_in(methods, "--methods"),
-        [f".{name}" for name in names_in(formats, "--formats")],
-    )
+    labels = None if methods is None else labels_in(methods, "--methods")
+    made = build(study, labels, endings)
     write(made, study, out)
     say(
         f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import check_numbers, names_in
+from coartic.cli.arguments import check_numbers, names_in, results_folder
 from coartic.cli.terminal import Display, performing, say, show_data, show_lines, show_table
 from coartic.errors import CoarticError
 from coartic.text import counted, json_text
 
 if TYPE_CHECKING:
+    from benchmarks.executors import Executor
     from benchmarks.registry import Entry
     from coartic import Task
 
@@ -42,34 +44,31 @@ def run(
 
     Interrupted by whatever, the same command goes on where it stopped.
     """
-    from benchmarks.cluster import Dask
-    from benchmarks.executors import Local
     from benchmarks.run import Selection, plan_suite
     from benchmarks.specification import Limits
     from benchmarks.suites import load_suite
 
     check_numbers(jobs, time_limit)
-    if not folder.strip():
-        raise CoarticError("--out is empty; name a folder for the results")
-    chosen, out = load_suite(suite), Path(folder)
+    chosen, out = load_suite(suite), results_folder(folder)
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
     plan = plan_suite(chosen, runs=runs, trials=trials, seed=seed, select=select, limits=limits)
+    perform = partial(plan.perform, out, retry_failed=retry_failed, redo=redo)
     with performing(chosen.name, out) as display:
-        comparison = _Comparison(display)
-        report = plan.perform(
-            out,
-            executor=Local(jobs) if scheduler is None else Dask(scheduler, say=display.line),
-            retry_failed=retry_failed,
-            redo=redo,
-            watch=display.update,
-            pages=comparison.pages,
-        )
+        comparison, executor = _Comparison(display), _executor(jobs, scheduler, display)
+        report = perform(executor=executor, watch=display.update, pages=comparison.pages)
     comparison.show()
     say("", f"{report}, this comparison in {out / 'comparison.md'}.")
     if report.crashed:
         sys.exit(1)
+
+
+def _executor(jobs: int, scheduler: str | None, display: Display) -> Executor:
+    from benchmarks.cluster import Dask
+    from benchmarks.executors import Local
+
+    return Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
 
 
 class _Comparison:
