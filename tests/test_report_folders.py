@@ -193,7 +193,7 @@ def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, few_figures
     near = refused(monkeypatch, capsys, "report", odd.folder, "--methods", "dual-process/EC44")
     assert "did you mean 'dual-process/EC4'" in near
     assert "empty name" in refused(monkeypatch, capsys, "report", odd.folder, "--methods", "a,,b")
-    assert "choose of .pdf" in refused(
+    assert "svg must be among them" in refused(
         monkeypatch, capsys, "report", odd.folder, "--formats", "png"
     )
     # Somebody's folder, whose page has the name of ours.
