@@ -29,6 +29,7 @@ from analysis.signatures.rows import SignatureRow
 from analysis.signatures.study_rows import signature_rows, signatures_table
 from analysis.signatures.trajectories import Trajectories, all_trajectories
 from coartic import Task
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +48,11 @@ class Study:
     """Stored results and what follows from them."""
 
     results: Results
+
+    def __repr__(self) -> str:
+        runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")
+        suite = self.results.manifest.specification.suite
+        return f"Study of {self.results.folder}: {runs} of suite {suite}, {cells}"
 
     @property
     def runs(self) -> pd.DataFrame:

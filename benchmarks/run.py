@@ -42,15 +42,15 @@ class Selection:
 ALL_OF_IT = Selection()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunReport:
-    """What performing a plan came to; as text, one sentence."""
+    """What performing a plan came to; shown as a sentence."""
 
     folder: Path
-    progress: Progress = field(repr=False)
+    progress: Progress
     wall_s: float
     """Seconds that the runs took, all together."""
-    records: Mapping[str, Record] = field(repr=False)
+    records: Mapping[str, Record]
     """All records of the plan by run id, those that were there before among them."""
 
     @property
@@ -58,7 +58,7 @@ class RunReport:
         """Runs that crashed, now or before."""
         return sum(record.status == "crashed" for record in self.records.values())
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         progress = self.progress
         return (
             f"{counted(progress.total, 'run')}: {progress.present} were there, {progress.done} "
