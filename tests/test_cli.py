@@ -1,6 +1,7 @@
 """The command line as a user meets it."""
 
 import json
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -8,12 +9,13 @@ from pathlib import Path
 
 import pandas as pd
 
+from benchmarks import executors
 from benchmarks.store import Store
 from coartic import __version__
 from coartic.files import LISTING
 from coartic.record import run_seed
 from tests.support.commands import call
-from tests.support.suites import BROKEN, ROOT
+from tests.support.suites import BROKEN, ROOT, InProcess
 
 from .attacks.inputs import GOOD
 
@@ -80,8 +82,6 @@ def test_run_own_task(monkeypatch, capsys, tmp_path):
 
 
 def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
-    from benchmarks import executors
-
     asked = []
     real = executors.Local
 
@@ -159,6 +159,34 @@ def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):
     assert code == 1
     assert "2 runs of ascending x test/dies are crashed: the worker process ended" in text
     assert "2 failed" in text
+
+
+def test_an_interrupt_that_gets_lost_is_raised_again(monkeypatch, capsys, tmp_path):
+    """What a signal raises in a destructor, Python drops; the run that was done is kept."""
+
+    class Fragile:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    class Interrupted(InProcess):
+        def perform(self, jobs):
+            for answer in super().perform(jobs):
+                Fragile()
+                yield answer
+
+    dropped = []
+    monkeypatch.setattr(executors, "Local", lambda jobs: Interrupted())
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: dropped.append(lost.exc_type))
+    before = signal.getsignal(signal.SIGINT)
+    code, _, error = call(
+        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 3, "--trials", 2,
+        "--out", tmp_path,
+    )  # fmt: skip
+    assert dropped == [KeyboardInterrupt]
+    assert code == 130
+    assert f"interrupted; 1 run done now is kept in {tmp_path}" in error
+    assert len(list(tmp_path.glob("records/*.json"))) == 1
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_trial_budget(monkeypatch, capsys, tmp_path):

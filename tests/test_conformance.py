@@ -17,7 +17,6 @@ from tests.support.suites import InProcess, spec_of
 from .attacks.inputs import GOOD
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
-KNOWN = registry([BROKEN])
 BUILT_IN = registry()
 OPTIMUM = {
     entry.task: entry.reward
@@ -40,10 +39,15 @@ FEW_TASKS = [load_task("ascending"), tiny_task()]
 """For searches that take seconds on two hands and four goals, and for what breaks a law."""
 
 
+@pytest.fixture(scope="module")
+def known():
+    return registry([BROKEN])
+
+
 @pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])
-def test_methods_that_keep_every_law(name):
+def test_methods_that_keep_every_law(known, name):
     slow = name.startswith(("optimum/", "nullspace-qp/", "trajectory-optimisation/"))
-    laws = check_method(KNOWN[name], tasks=FEW_TASKS if slow else None)
+    laws = check_method(known[name], tasks=FEW_TASKS if slow else None)
     assert [law.name for law in laws] == LAWS
     assert [law for law in laws if not law.passed] == []
     assert all(law.finding for law in laws)
@@ -57,10 +61,10 @@ def test_methods_that_keep_every_law(name):
     assert all(int(reward) <= OPTIMUM.get(task, -1) for task, reward in found)
 
 
-def test_what_a_session_shows_cannot_be_written():
-    laws = check_method(KNOWN["test/forger"], laws=("solution", "information"))
+def test_what_a_session_shows_cannot_be_written(known):
+    laws = check_method(known["test/forger"], laws=("solution", "information"))
     assert [law.passed for law in laws] == [True, True]
-    (spec,) = spec_of(KNOWN, "test/forger")
+    (spec,) = spec_of(known, "test/forger")
     (answer,) = InProcess().perform([spec.job()])
     record = record_of(answer, spec)
     assert record.meter.trials == 1
@@ -96,9 +100,9 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "law", "finding"), CASES)
-def test_each_law_can_be_broken(name, law, finding):
+def test_each_law_can_be_broken(known, name, law, finding):
     alone = law not in ("solution", "information", "determinism")  # those have consequences
-    laws = check_method(KNOWN[name], laws=None if alone else (law,), tasks=FEW_TASKS)
+    laws = check_method(known[name], laws=None if alone else (law,), tasks=FEW_TASKS)
     (broken,) = (found for found in laws if not found.passed)
     assert broken.name == law
     assert finding in broken.finding
@@ -109,8 +113,8 @@ def test_every_law_is_broken_by_some_method():
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)
-def test_shipped_tasks_keep_every_law(path):
-    assert [law for law in check_task_file(path, KNOWN) if not law.passed] == []
+def test_shipped_tasks_keep_every_law(known, path):
+    assert [law for law in check_task_file(path, known) if not law.passed] == []
 
 
 @pytest.mark.parametrize(
@@ -133,9 +137,9 @@ def test_shipped_tasks_keep_every_law(path):
         ),
     ],
 )
-def test_laws_of_a_task_file(text, law, finding, tmp_path):
+def test_laws_of_a_task_file(known, text, law, finding, tmp_path):
     path = tmp_path / "own.toml"
     path.write_text(text, encoding="utf-8")
-    laws = {found.name: found for found in check_task_file(path, KNOWN)}
+    laws = {found.name: found for found in check_task_file(path, known)}
     assert finding in laws[law].finding
     assert laws[law].passed == (law == "methods")

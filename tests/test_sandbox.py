@@ -163,7 +163,7 @@ def test_one_sandbox_performs_many_jobs_and_says_warm(known):
 def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     """Killed or interrupted at work or as it starts, a suite takes its workers along.
 
-    ``python -m benchmarks.kill_resume`` does it at fifty moments.
+    ``python -m benchmarks.kill_resume`` does it at a hundred moments.
     """
     suite = subprocess.Popen(
         [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, "--jobs", "2"],
