@@ -6,22 +6,29 @@ import numpy as np
 import pytest
 
 from analysis.calibration import error_rates
-from analysis.calibration.error_rates import Check
+from analysis.calibration.simulation import Check, lines, rate
 
 
-def test_errors_are_counted_and_marked(monkeypatch):
+def test_errors_are_counted_and_marked():
     one_in_20 = itertools.cycle([True] + [False] * 19)
-    plan = [
-        Check("errs too often", "x", 0.05, lambda rng, seed: rng.random() < 0.2),
-        Check("holds", "x", 0.05, lambda rng, seed: next(one_in_20)),
-        Check("errs too seldom", "x", 0.05, lambda rng, seed: False),
-    ]
-    monkeypatch.setattr(error_rates, "checks", lambda: plan)
-    table = error_rates.error_rates(2_000, seed=1, jobs=1)
-    assert [row[-1] for row in table.rows] == ["+", "", "-"]
-    assert table.rows[2][3].startswith("0.0% [0.0%, 0.2%]")
-    assert table == error_rates.error_rates(2_000, seed=1, jobs=1)
-    assert error_rates.simulate(plan[0], 5_000, 2) == pytest.approx(1_000, abs=4 * 28)
+    often = Check("errs too often", "x", lambda rng: rng.random() < 0.2, 0.05)
+    holds = Check("holds", "x", lambda rng: next(one_in_20), 0.05)
+    seldom = Check("errs too seldom", "x", lambda rng: False, 0.05)
+    unknown = Check("promises nothing", "x", lambda rng: True)
+
+    def said():
+        sections = {"Errs": [often, holds], "More": [seldom, unknown]}
+        return list(lines(sections, 2_000, lambda number, check: number, "wilson"))
+
+    first, second, third, fourth = [line for line in said() if ", x" in line]
+    assert first.endswith("ABOVE")
+    assert second.endswith("]")
+    assert third.endswith("0.00%  [0.00%, 0.19%]  BELOW")
+    assert fourth.endswith("]")
+    assert said() == said()
+    found = rate(often, 5_000, 2)
+    assert found.share == pytest.approx(0.2, abs=4 * 28 / 5_000)
+    assert found == rate(often, 5_000, 2) != rate(often, 5_000, 3)
 
 
 def test_populations_have_the_parameters_they_state():
@@ -36,4 +43,4 @@ def test_populations_have_the_parameters_they_state():
 
 def test_every_check_runs():
     for check in error_rates.checks():
-        assert error_rates.simulate(check, 1, 0) in (0, 1), check.subject
+        assert rate(check, 1, 0).share in (0, 1), check.name

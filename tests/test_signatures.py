@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from analysis.calibration import signatures as signature_nulls
+from analysis.calibration import signatures as simulated
+from analysis.calibration.simulation import rate
 from analysis.citations import references
 from analysis.results.folder import Results
 from analysis.signatures import intervals
@@ -237,16 +238,16 @@ def test_jackknife_is_the_loop_over_runs():
 
 
 def test_synergy_finds_what_is_planted():
-    null, complement = subspaces(signature_nulls._JACOBIAN)
-    runs = signature_nulls.normal(rng(7), 20)
-    quiet = synergy(runs, signature_nulls._JACOBIAN)
+    null, complement = subspaces(simulated.JACOBIAN)
+    runs = simulated.normal(rng(7), 20)
+    quiet = synergy(runs, simulated.JACOBIAN)
     assert quiet.p > 0.05
     assert quiet.low < quiet.neutral < quiet.high
     squeezed = runs @ (null @ null.T + 0.2 * complement @ complement.T)
-    assert synergy(squeezed, signature_nulls._JACOBIAN).p < 1e-6
-    assert synergy(squeezed, signature_nulls._JACOBIAN).delta > 1.2
-    assert math.isnan(synergy(runs[:1], signature_nulls._JACOBIAN).delta)
-    assert math.isnan(synergy(runs[[0, 0, 0]], signature_nulls._JACOBIAN).delta)
+    assert synergy(squeezed, simulated.JACOBIAN).p < 1e-6
+    assert synergy(squeezed, simulated.JACOBIAN).delta > 1.2
+    assert math.isnan(synergy(runs[:1], simulated.JACOBIAN).delta)
+    assert math.isnan(synergy(runs[[0, 0, 0]], simulated.JACOBIAN).delta)
 
 
 # Subtasks and hands
@@ -802,33 +803,41 @@ def test_trajectories_put_like_sequences_together():
     assert cell.initial.hands == "RRRR"
 
 
+# The simulations; their full grid is the module's command
+
+
+def share_of(check, simulations):
+    return rate(check, simulations, simulated.seed_of(0, check))
+
+
 def test_nulls_are_nulls():
     """Every simulated null has mean zero or equal variances, and rejects sometimes only."""
-    names = [null.name for null in signature_nulls.nulls()]
-    assert len(set(names)) == len(names)
-    null, complement = signature_nulls._NULLSPACE, signature_nulls._RANGE
-    scatter = signature_nulls.correlated(rng(9), 40_000)
+    nulls = simulated.tests(planted=False)
+    assert len({null.name for null in nulls}) == len(nulls)
+    null, complement = simulated.NULLSPACE, simulated.RANGE
+    scatter = simulated.correlated(rng(9), 40_000)
     per_dimension = [(scatter @ basis).var() for basis in (null, complement)]
     assert per_dimension[0] == pytest.approx(per_dimension[1], rel=0.03)
-    for test in signature_nulls.nulls():
-        if "20 and 20 runs" in test.name or "ΔV" in test.name:
-            share, _, _ = signature_nulls.rate(test, 60)
-            assert share < 0.2
+    for test in nulls:
+        if "20 and 20 runs" in test.data or test.subject == "ΔV z":
+            assert share_of(test, 40).share < 0.2
 
 
 def test_every_test_finds_what_is_planted():
     """Each test that has nulls has effects as well, and finds them more often than nulls."""
-    kinds = {simulation.name.split(",")[0] for simulation in signature_nulls.nulls()}
-    assert kinds == {simulation.name.split(",")[0] for simulation in signature_nulls.planted()}
-    for simulation in signature_nulls.planted():
-        share, low, _ = signature_nulls.rate(simulation, 30)
-        assert low > signature_nulls.ALPHA, f"{simulation.name}: {share}"
+    planted = simulated.tests(planted=True)
+    subjects = {check.subject for check in planted}
+    assert subjects == {check.subject for check in simulated.tests(planted=False)}
+    for check in planted:
+        share, low, _ = share_of(check, 12)
+        assert low > simulated.ALPHA, f"{check.name}: {share}"
 
 
 def test_intervals_hold_the_truth():
-    for simulation in signature_nulls.coverage():
-        share, _, high = signature_nulls.rate(simulation, 100)
-        low_counts = "Poisson, 0.1" in simulation.name
-        assert high > (0.6 if low_counts else 0.9), f"{simulation.name}: {share}"
-    (_, first), (truth, second), _ = signature_nulls.entropies(400)
+    for check in simulated.coverage():
+        if check.subject in ("mean", "share") or "normal" in check.data:
+            share, _, high = share_of(check, 60)
+            low_counts = "Poisson, 0.1" in check.data
+            assert high > (0.6 if low_counts else 0.9), f"{check.name}: {share}"
+    (_, first), (truth, second), _ = simulated.entropies(400)
     assert first < second < truth == pytest.approx(0.8813, abs=1e-4)  # biased downwards

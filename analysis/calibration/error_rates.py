@@ -1,41 +1,41 @@
 """Do the tests and intervals of this package hold their nominal rates on data like ours?
 
 ``python -m analysis.calibration.error_rates`` simulates samples of 20 runs from normal
-distributions
-and from distributions shaped like learned rewards (skewed, with several levels, in whole
-ticks), applies the functions that the tables use, and prints how often each errs: type-I
-error of tests at level 0.05, coverage of 95 % intervals, and how often means that differ by
-just the margin are called equivalent (nominal 2.5 %). Rates come with their 95 % interval
-(Wilson), and a mark where that interval excludes the nominal rate: ``+`` errs too often,
-``-`` errs too seldom; of rates that hold, about one in 20 gets a mark by chance. A few
-minutes on two cores; the same seed gives the same table.
+distributions and from distributions shaped like learned rewards (skewed, with several levels, in
+whole ticks), applies the functions that the tables use, and prints how often each errs: type-I
+error of tests at level 0.05, intervals of 95 % that miss the truth, and how often means that
+differ by just the margin are called equivalent (nominal 2.5 %). Rates come with their 95 %
+interval (Wilson), and a mark where that interval excludes the nominal rate; of rates that hold,
+about one in 20 gets a mark by chance. A few minutes on two cores; the same seed gives the same
+rates.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from scipy import stats
 
+from analysis.calibration.simulation import Check, Draw, arguments, lines
 from analysis.published import Summary
 from analysis.statistics import estimates as statistics
 from analysis.statistics.across_tasks import interquartile_mean
-from analysis.statistics.equivalence import bootstrap_equivalence, difference
+from analysis.statistics.equivalence import Equivalence, bootstrap_equivalence, difference
 from analysis.statistics.estimates import LEVEL
-from analysis.table import Table
 from coartic.robot import Array
-
-Draw = Callable[[np.random.Generator, int], Array]
 
 RUNS = 20
 RESAMPLES = 999
 SIMULATIONS = 4_000
+MARGIN = 5.0
+
+Sample = Callable[[np.random.Generator], Any]
+"""Draws what a test or interval is given."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,17 @@ class Population:
     middle: float
     """Interquartile mean."""
 
+    def sample(self, runs: int = RUNS) -> Sample:
+        """So many rewards."""
+        return lambda rng: self.draw(rng, runs)
 
-@dataclass(frozen=True)
-class Check:
-    """A claim to be counted: whether one simulated data set leads to an error."""
+    def centred(self, rng: np.random.Generator) -> Array:
+        """Rewards less their true mean."""
+        return self.draw(rng, RUNS) - self.mean
 
-    subject: str
-    data: str
-    nominal: float
-    errs: Callable[[np.random.Generator, int], bool]
+    def near(self, shift: float) -> Sample:
+        """Rewards around ``shift``, small beside the margin: else wide intervals never err."""
+        return lambda rng: self.centred(rng) / 10 + shift
 
 
 # Share, mean and SD of the hand sequences that runs settle on: two-armed-2 under
@@ -94,26 +96,25 @@ def _population(name: str, draw: Draw, mean: float) -> Population:
 
 def checks() -> list[Check]:
     """Everything that is simulated, in the order of the table."""
-    normal, skewed, two, three = populations()
+    normal, skewed, two, three = every = populations()
     found: list[Check] = []
-    for each in (normal, skewed, two, three):
-        found += [_null_test(name, each, each) for name in _TESTS]
+    for each in every:
+        found += _null_tests(each, each)
     # Equal means, different shapes: what a test of means is asked in earnest.
     for each in (skewed, two, three):
-        found += [_null_test(name, each, normal) for name in _TESTS]
-        found += [_null_test(name, normal, each) for name in _TESTS]
-    for each in (normal, skewed, two, three):
+        found += [*_null_tests(each, normal), *_null_tests(normal, each)]
+    for each in every:
         found += [_known_test(each, tail) for tail in ("greater", "less")]
     found += [_flip_test(each, normal, tail) for each in (normal, two) for tail in _ONE_TAILED]
-    found += [_covers_mean(normal, runs) for runs in (5, 10)]
-    for each in (normal, skewed, two, three):
-        found += [_covers_mean(each, RUNS), _covers_difference(each, normal), _covers_middle(each)]
+    found += [_covers(normal, runs) for runs in (5, 10)]
+    for each in every:
+        found += [_covers(each), _covers_difference(each, normal), _covers(each, middle=True)]
     found += [_covers_improvement(theta) for theta in (0.5, 0.8, 0.95, 0.99)]
-    found.append(_covers_across((normal, skewed, two, three)))
-    for each in (normal, skewed, two, three):
-        found += [_equivalent(each, normal, side) for side in (1, -1)]
-        found += [_equivalent_to_summary(each, normal, side) for side in (1, -1)]
-    for each in (normal, skewed, two, three):
+    found.append(_covers_across(every))
+    for each in every:
+        above, below = (_equivalent(each, normal, side) for side in (1, -1))
+        found += [check for pair in zip(above, below, strict=True) for check in pair]
+    for each in every:
         found += [_covers_studentised(each, None), _covers_studentised(each, normal)]
     return found
 
@@ -125,99 +126,106 @@ _TESTS = {
 }
 
 
-def _centred(population: Population, rng: np.random.Generator, n: int = RUNS) -> Array:
-    return population.draw(rng, n) - population.mean
+def _check(
+    subject: str,
+    data: str,
+    errs: Callable[[Any], bool],
+    infer: Callable[..., Any],
+    *samples: Sample,
+    nominal: float = LEVEL,
+) -> Check:
+    """Whether what ``infer`` says of samples is an error."""
+
+    def seen(rng: np.random.Generator) -> bool:
+        seed = int(rng.integers(2**32))
+        drawn = [sample(rng) for sample in samples]
+        return errs(infer(*drawn, seed=seed, resamples=RESAMPLES))
+
+    return Check(subject, data, seen, nominal)
 
 
-def _null_test(name: str, first: Population, second: Population) -> Check:
-    test = _TESTS[name]
+def _rejects(found: statistics.Inference) -> bool:
+    return found.p <= LEVEL
 
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        a, b = _centred(first, rng), _centred(second, rng)
-        return test(a, b, seed=seed, resamples=RESAMPLES).p <= LEVEL
 
-    return Check(f"{name}, one-tailed", f"{first.name} > {second.name}", LEVEL, errs)
+def _misses(truth: float) -> Callable[[statistics.Inference], bool]:
+    """Whether an interval leaves out the true value; one that is missing does."""
+    return lambda found: not found.low <= truth <= found.high
+
+
+def _agrees(found: Equivalence) -> bool:
+    return found.verdict == "equivalent"
+
+
+def _null_tests(first: Population, second: Population) -> list[Check]:
+    data = f"{first.name} > {second.name}"
+    return [
+        _check(f"{name}, one-tailed", data, _rejects, test, first.centred, second.centred)
+        for name, test in _TESTS.items()
+    ]
 
 
 def _known_test(population: Population, tail: statistics.Alternative) -> Check:
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        values = population.draw(rng, RUNS)
-        found = statistics.bootstrap_test(
-            values, population.mean, tail, seed=seed, resamples=RESAMPLES
-        )
-        return found.p <= LEVEL
+    def test(values: Array, **options: Any) -> statistics.Inference:
+        return statistics.bootstrap_test(values, population.mean, tail, **options)
 
-    sign = ">" if tail == "greater" else "<"
-    name = "bootstrap test against a known value"
-    return Check(name, f"{population.name} {sign} value", LEVEL, errs)
+    data = f"{population.name} {_sign(tail)} value"
+    subject = "bootstrap test against a known value"
+    return _check(subject, data, _rejects, test, population.sample())
 
 
 def _flip_test(first: Population, second: Population, tail: statistics.Alternative) -> Check:
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        a, b = _centred(first, rng), _centred(second, rng)
-        return statistics.sign_flip_test(a, b, tail, seed=seed, resamples=RESAMPLES).p <= LEVEL
-
-    sign = ">" if tail == "greater" else "<"
-    return Check("sign-flip test, one-tailed", f"{first.name} {sign} {second.name}", LEVEL, errs)
+    test = partial(statistics.sign_flip_test, alternative=tail)
+    data = f"{first.name} {_sign(tail)} {second.name}"
+    subject = "sign-flip test, one-tailed"
+    return _check(subject, data, _rejects, test, first.centred, second.centred)
 
 
-def _misses(found: statistics.Inference, truth: float) -> bool:
-    """Whether an interval leaves out the true value; one that is missing does."""
-    return not found.low <= truth <= found.high
+def _sign(tail: statistics.Alternative) -> str:
+    return ">" if tail == "greater" else "<"
 
 
-def _covers_mean(population: Population, runs: int) -> Check:
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        found = statistics.mean(population.draw(rng, runs), seed=seed, resamples=RESAMPLES)
-        return _misses(found, population.mean)
-
-    return Check(f"BCa interval of a mean, n = {runs}", population.name, LEVEL, errs)
+def _covers(population: Population, runs: int = RUNS, *, middle: bool = False) -> Check:
+    """The interval of a mean, or of an interquartile mean."""
+    subject = f"BCa interval of a{'n interquartile mean' if middle else f' mean, n = {runs}'}"
+    errs = _misses(population.middle if middle else population.mean)
+    infer = statistics.interquartile_mean if middle else statistics.mean
+    return _check(subject, population.name, errs, infer, population.sample(runs))
 
 
 def _covers_difference(first: Population, second: Population) -> Check:
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        found = statistics.difference_of_means(
-            first.draw(rng, RUNS), second.draw(rng, RUNS), seed=seed, resamples=RESAMPLES
-        )
-        return _misses(found, first.mean - second.mean)
-
-    data = f"{first.name} - {second.name}"
-    return Check("BCa interval of a difference of means", data, LEVEL, errs)
+    return _check(
+        "BCa interval of a difference of means",
+        f"{first.name} - {second.name}",
+        _misses(first.mean - second.mean),
+        statistics.difference_of_means,
+        first.sample(),
+        second.sample(),
+    )
 
 
 def _covers_studentised(first: Population, second: Population | None) -> Check:
     """The interval of the equivalence test, of a mean or a difference; its margin is idle."""
 
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        a = _centred(first, rng)
-        b = 0.0 if second is None else _centred(second, rng)
-        found = bootstrap_equivalence(a, b, 1.0, seed=seed, resamples=RESAMPLES)
-        return _misses(found, 0.0)
+    def infer(a: Array, b: Array | float = 0.0, **options: Any) -> Equivalence:
+        return bootstrap_equivalence(a, b, 1.0, **options)
 
-    if second is None:
-        return Check("studentised bootstrap interval of a mean", first.name, LEVEL, errs)
-    data = f"{first.name} - {second.name}"
-    return Check("studentised bootstrap interval of a difference", data, LEVEL, errs)
-
-
-def _covers_middle(population: Population) -> Check:
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        values = population.draw(rng, RUNS)
-        found = statistics.interquartile_mean(values, seed=seed, resamples=RESAMPLES)
-        return _misses(found, population.middle)
-
-    return Check("BCa interval of an interquartile mean", population.name, LEVEL, errs)
+    subject = f"studentised bootstrap interval of a {'difference' if second else 'mean'}"
+    data = f"{first.name} - {second.name}" if second else first.name
+    samples = [each.centred for each in (first, second) if each is not None]
+    return _check(subject, data, _misses(0.0), infer, *samples)
 
 
 def _covers_improvement(theta: float) -> Check:
     shift = math.sqrt(2) * float(stats.norm.ppf(theta))
-
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        a, b = rng.normal(shift, 1, RUNS), rng.normal(0, 1, RUNS)
-        found = statistics.probability_of_improvement(a, b, seed=seed, resamples=RESAMPLES)
-        return _misses(found, theta)
-
-    return Check("interval of a probability of improvement", f"normal, {theta}", LEVEL, errs)
+    return _check(
+        "interval of a probability of improvement",
+        f"normal, {theta}",
+        _misses(theta),
+        statistics.probability_of_improvement,
+        lambda rng: rng.normal(shift, 1, RUNS),
+        lambda rng: rng.normal(0, 1, RUNS),
+    )
 
 
 def _covers_across(tasks: tuple[Population, ...]) -> Check:
@@ -225,93 +233,43 @@ def _covers_across(tasks: tuple[Population, ...]) -> Check:
     rng = np.random.default_rng(0)
     scales = [float(each.draw(rng, 1_000_000).std()) for each in tasks]
 
-    def scores(rng: np.random.Generator, n: int) -> dict[str, Array]:
+    def scores(rng: np.random.Generator, n: int = RUNS) -> dict[str, Array]:
         return {
-            each.name: _centred(each, rng, n) / scale
+            each.name: (each.draw(rng, n) - each.mean) / scale
             for each, scale in zip(tasks, scales, strict=True)
         }
 
     pool = np.concatenate(list(scores(rng, 1_000_000).values()))
     truth = float(stats.trim_mean(np.sort(pool), 0.25))
-
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        found = interquartile_mean(scores(rng, RUNS), seed=seed, resamples=RESAMPLES)
-        return _misses(found, truth)
-
-    return Check("interval of an interquartile mean across tasks", "all four", LEVEL, errs)
+    subject = "interval of an interquartile mean across tasks"
+    return _check(subject, "all four", _misses(truth), interquartile_mean, scores)
 
 
-def _equivalent(first: Population, second: Population, side: int) -> Check:
-    margin = 5.0
+def _equivalent(first: Population, second: Population, side: int) -> list[Check]:
+    """At the margin, between samples, and between a sample and a published summary."""
 
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        a, b = _shrunk(first, rng) + side * margin, _shrunk(second, rng)
-        found = bootstrap_equivalence(a, b, margin, seed=seed, resamples=RESAMPLES)
-        return found.verdict == "equivalent"
-
-    data = f"{first.name}, {'above' if side > 0 else 'below'}"
-    return Check("equivalence by bootstrap, at the margin", data, LEVEL / 2, errs)
-
-
-def _equivalent_to_summary(first: Population, second: Population, side: int) -> Check:
-    margin = 5.0
-
-    def errs(rng: np.random.Generator, seed: int) -> bool:
-        a, b = _shrunk(first, rng) + side * margin, _shrunk(second, rng)
+    def beside_summary(a: Array, b: Array, **_: object) -> Equivalence:
         published = Summary(float(b.mean()), float(b.std(ddof=1)), len(b))
-        return difference(a, published, margin=margin).verdict == "equivalent"
+        return difference(a, published, margin=MARGIN)
 
     data = f"{first.name}, {'above' if side > 0 else 'below'}"
-    return Check("equivalence to mean ± SD (Welch), at the margin", data, LEVEL / 2, errs)
-
-
-def _shrunk(population: Population, rng: np.random.Generator) -> Array:
-    """Around 0, and small beside the margin: else wide intervals would never err."""
-    return _centred(population, rng) / 10
-
-
-def simulate(check: Check, simulations: int, seed: int) -> int:
-    """How often a check errs in so many simulated data sets."""
-    rng = np.random.default_rng(seed)
-    return sum(check.errs(rng, int(rng.integers(2**32))) for _ in range(simulations))
-
-
-def error_rates(simulations: int, seed: int, jobs: int) -> Table:
-    """The table: what errs, on which data, how often, with a mark."""
-    plan = checks()
-    counts = Parallel(n_jobs=jobs)(
-        delayed(simulate)(check, simulations, seed + number) for number, check in enumerate(plan)
-    )
-    rows = []
-    for check, errors in zip(plan, counts, strict=True):
-        interval = stats.binomtest(errors, simulations).proportion_ci(method="wilson")
-        mark = (
-            "+" if interval.low > check.nominal else "-" if interval.high < check.nominal else ""
+    samples = first.near(side * MARGIN), second.near(0.0)
+    return [
+        _check(f"{subject}, at the margin", data, _agrees, infer, *samples, nominal=LEVEL / 2)
+        for subject, infer in (
+            ("equivalence by bootstrap", partial(bootstrap_equivalence, margin=MARGIN)),
+            ("equivalence to mean ± SD (Welch)", beside_summary),
         )
-        rows.append(
-            (
-                check.subject,
-                check.data,
-                f"{check.nominal:.1%}",
-                f"{errors / simulations:.1%} [{interval.low:.1%}, {interval.high:.1%}]",
-                mark,
-            )
-        )
-    title = f"Error rates, n = {RUNS}, {simulations} simulations, seed {seed}"
-    return Table(title, ("what", "data", "nominal", "errs [95 % interval]", ""), tuple(rows))
+    ]
 
 
 def main() -> None:
-    """``python -m analysis.calibration.error_rates``: print the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--simulations", type=int, default=SIMULATIONS)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=2)
-    given = parser.parse_args()
-    if given.simulations < 1:
-        sys.exit("at least one simulation")
-    table = error_rates(given.simulations, given.seed, given.jobs)
-    print(f"# {table.title}\n\n{table.to_markdown()}")
+    """``python -m analysis.calibration.error_rates``: print a line for each check."""
+    given = arguments(__doc__, SIMULATIONS, 0)
+    seed: int = given.seed
+    sections, rule = {"Errs": checks()}, lambda number, check: seed + number
+    for line in lines(sections, given.simulations, rule, "wilson", given.jobs):
+        print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,23 @@
-"""What the signatures' tests and intervals do: ``python -m analysis.calibration.signatures [N]``.
+"""What the signatures' tests and intervals do: ``python -m analysis.calibration.signatures``.
 
-Every row simulates N data sets (2000 by default) and prints a share with its exact binomial
-interval. Nulls: nothing to find, tested at 5 %, how often a test rejects. Planted effects: of
-a known size, how often it is found. Intervals: of nominal 95 %, how often they hold the true
-value. The robot is the paper's, postures scatter about the start of task ascending. Takes some
-three minutes.
+Every row simulates 2000 data sets and prints a share with its exact binomial interval. Nulls:
+nothing to find, tested at 5 %, how often a test rejects. Planted effects: of a known size, how
+often it is found. Intervals: of nominal 95 %, how often they hold the true value. The robot is
+the paper's, postures scatter about the start of task ascending. Takes some three minutes.
 """
 
 from __future__ import annotations
 
 import math
-import sys
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
+from analysis.calibration.simulation import Check, Draw, arguments, lines
 from analysis.signatures import intervals
 from analysis.signatures.context import lead_time, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
@@ -38,11 +37,10 @@ _JOINTS = movable(_TASK, "right")
 _POSTURE = _TASK.q0[_JOINTS] + np.array([0.0, 0.0, 0.3, -0.4, 0.5, 0.2])
 _WHOLE = np.array(_TASK.q0)
 _WHOLE[_JOINTS] = _POSTURE
-_JACOBIAN = _TASK.robot.jacobian(_WHOLE, "right")[:, _JOINTS]
-_NULLSPACE, _RANGE = subspaces(_JACOBIAN)
+JACOBIAN = _TASK.robot.jacobian(_WHOLE, "right")[:, _JOINTS]
+NULLSPACE, RANGE = subspaces(JACOBIAN)
 _SD = 0.05  # of a joint over runs
 
-Scatter = Callable[[np.random.Generator, int], Array]
 Family = Callable[[np.random.Generator], tuple[Array, Array]]
 
 
@@ -55,7 +53,7 @@ def correlated(rng: np.random.Generator, n: int) -> Array:
     """Unequal variances within either subspace, equal per dimension between them."""
     within = rng.standard_normal((n, 4)) * np.sqrt([2.5, 1.0, 0.4, 0.1])
     across = rng.standard_normal((n, 2)) * np.sqrt([1.8, 0.2])
-    return _SD * (within @ _NULLSPACE.T + across @ _RANGE.T)
+    return _SD * (within @ NULLSPACE.T + across @ RANGE.T)
 
 
 def heavy(rng: np.random.Generator, n: int) -> Array:
@@ -68,10 +66,9 @@ def skewed(rng: np.random.Generator, n: int) -> Array:
     return _SD * rng.standard_exponential((n, len(_JOINTS)))
 
 
-SCATTERS: tuple[Scatter, ...] = (normal, correlated, heavy, skewed)
-_PARTS = {"motor-equivalent part": _NULLSPACE, "non-motor-equivalent part": _RANGE}
-Ticks = Callable[[np.random.Generator, int], Array]
-TICKS: dict[str, Ticks] = {
+SCATTERS: tuple[Draw, ...] = (normal, correlated, heavy, skewed)
+_PARTS = {"motor-equivalent part": NULLSPACE, "non-motor-equivalent part": RANGE}
+TICKS: dict[str, Draw] = {
     "normal": lambda rng, n: 5.0 * rng.standard_normal(n),
     "skewed": lambda rng, n: 5.0 * (rng.standard_exponential(n) - 1.0),
     "skewed the other way": lambda rng, n: 5.0 * (1.0 - rng.standard_exponential(n)),
@@ -89,7 +86,7 @@ LOCI: dict[str, tuple[float, float, tuple[int, ...]]] = {
 }
 """What else there may be in a family of tasks: SD of what the runs of one task share and height
 of a parabola without slope, both in SDs of a joint, and runs of each task."""
-VALUES: dict[str, tuple[Callable[[np.random.Generator, int], Array], float]] = {
+VALUES: dict[str, tuple[Draw, float]] = {
     "normal": (lambda rng, n: rng.standard_normal(n), 0.0),
     "skewed (exponential)": (lambda rng, n: rng.standard_exponential(n), 1.0),
     "counts (Poisson, 0.5)": (lambda rng, n: rng.poisson(0.5, n).astype(np.float64), 0.5),
@@ -102,136 +99,89 @@ VALUES: dict[str, tuple[Callable[[np.random.Generator, int], Array], float]] = {
 """Values of one run as signatures have them, with their true mean."""
 
 
-@dataclass(frozen=True)
-class Simulation:
-    """One kind of data set and what is asked of it."""
+def tests(*, planted: bool) -> list[Check]:
+    """Every test of a signature on every kind of scatter: without an effect, or with one.
 
-    name: str
-    seen: Callable[[np.random.Generator], bool]
-    """Simulate once: whether the test rejects, or the interval holds the true value."""
-
-
-def nulls() -> list[Simulation]:
-    """Every test of a signature on every kind of scatter that it should stand."""
-    found = []
-    for scatter in SCATTERS:
-        kind = scatter.__name__
-        for first, second in ((20, 20), (20, 8)):
-            found.append(
-                Simulation(
-                    f"context dependence, {kind}, {first} and {second} runs",
-                    partial(_context, scatter, first, second, None, None),
-                )
-            )
-        for part, basis in _PARTS.items():
-            found.append(
-                Simulation(f"{part}, {kind}", partial(_context, scatter, 20, 20, basis, None))
-            )
-        found.append(Simulation(f"lead time, {kind}", partial(_lead, scatter, None)))
-        for runs in (10, 20):
-            found.append(
-                Simulation(f"ΔV z, {kind}, {runs} runs", partial(_synergy, scatter, runs, 1.0))
-            )
-        for what, (shared, curve, counts) in LOCI.items():
-            family = partial(_family, scatter, 0.0, shared, curve, counts)
-            found.append(Simulation(f"locus slope, {kind}{what}", partial(_locus, family)))
-            found.append(Simulation(f"locus slope norm, {kind}{what}", partial(_norm, family)))
-    for kind, draw in TICKS.items():
-        found.append(
-            Simulation(
-                f"sacrifice, {kind}, first at the threshold",
-                partial(_sacrifice, draw, ROUNDING, -30.0),
-            )
-        )
-        found.append(
-            Simulation(f"sacrifice, {kind}, whole as before", partial(_sacrifice, draw, 30.0, 0.0))
-        )
-    found.append(Simulation("sacrifice, no regard for later goals", _shortsighted))
-    return found
-
-
-def single() -> list[Simulation]:
-    """The yes or no of one run where there is nothing, and where there is something."""
-    return [
-        Simulation("first subtask sacrificed, other hands, ± a tick", _other_hands),
-        Simulation("first subtask sacrificed, no regard for later goals", _one_shortsighted),
-        Simulation("first subtask sacrificed, +7 of ± 5, -16 of ± 7 ticks", _one_sacrifice),
-    ]
-
-
-def planted() -> list[Simulation]:
-    """Every test of a signature on an effect of known size.
-
-    Shifts between contexts are of 1.25 SD of a joint, in a direction that leaves the hand in
-    place (non-motor-equivalent part: that moves it); the lead is of all 12 ticks or of the
+    Planted shifts between contexts are of 1.25 SD of a joint, in a direction that leaves the hand
+    in place (non-motor-equivalent part: that moves it); the lead is of all 12 ticks or of the
     last 6. ΔV z: standard deviations that move the hand are half, or twice, the others. Locus:
     1 SD of a joint per length unit (4 where a family is not plain, :data:`LOCI`). Sacrifice: the
     first subtask is 5 ticks longer, its SD, and the whole 7 shorter, its SD.
     """
-    found = []
+    found: list[Check] = []
+
+    def add(subject: str, data: str, seen: Callable[..., bool], *about: Any) -> None:
+        nominal = None if planted else ALPHA
+        found.append(Check(subject, data, partial(seen, *about), nominal))
+
+    away = {name: 1.25 * _SD * basis[:, 0] if planted else None for name, basis in _PARTS.items()}
+    still = away["motor-equivalent part"]
+    ratios = ((20, 0.5), (20, 2.0)) if planted else ((10, 1.0), (20, 1.0))
     for scatter in SCATTERS:
         kind = scatter.__name__
-        away = {name: 1.25 * _SD * basis[:, 0] for name, basis in _PARTS.items()}
         for first, second in ((20, 20), (20, 8)):
-            found.append(
-                Simulation(
-                    f"context dependence, {kind}, {first} and {second} runs",
-                    partial(_context, scatter, first, second, None, away["motor-equivalent part"]),
-                )
-            )
+            data = f"{kind}, {first} and {second} runs"
+            add("context dependence", data, _context, scatter, first, second, None, still)
         for part, basis in _PARTS.items():
-            found.append(
-                Simulation(
-                    f"{part}, {kind}", partial(_context, scatter, 20, 20, basis, away[part])
-                )
-            )
-        shift = away["motor-equivalent part"]
-        found.append(Simulation(f"lead time, any, {kind}", partial(_lead, scatter, shift)))
-        for ratio in (0.5, 2.0):
-            found.append(
-                Simulation(
-                    f"ΔV z, {kind}, 20 runs, {ratio:g} of the SD",
-                    partial(_synergy, scatter, 20, ratio),
-                )
-            )
+            add(part, kind, _context, scatter, 20, 20, basis, away[part])
+        add("lead time", f"any, {kind}" if planted else kind, _lead, scatter, still)
+        for runs, ratio in ratios:
+            size = f", {ratio:g} of the SD" if planted else ""
+            add("ΔV z", f"{kind}, {runs} runs{size}", _synergy, scatter, runs, ratio)
         for what, (shared, curve, counts) in LOCI.items():
-            slope = 4.0 * _SD if what else _SD
+            slope = (4.0 if what else 1.0) * _SD if planted else 0.0
             family = partial(_family, scatter, slope, shared, curve, counts)
-            found.append(Simulation(f"locus slope, {kind}{what}", partial(_locus, family)))
-            found.append(Simulation(f"locus slope norm, {kind}{what}", partial(_norm, family)))
+            add("locus slope", f"{kind}{what}", _locus, family)
+            add("locus slope norm", f"{kind}{what}", _norm, family)
     for kind, draw in TICKS.items():
-        found.append(Simulation(f"sacrifice, {kind}", partial(_sacrifice, draw, 5.0, -7.0)))
+        if planted:
+            add("sacrifice", kind, _sacrifice, draw, 5.0, -7.0)
+        else:
+            threshold = f"{kind}, first at the threshold"
+            add("sacrifice", threshold, _sacrifice, draw, ROUNDING, -30.0)
+            add("sacrifice", f"{kind}, whole as before", _sacrifice, draw, 30.0, 0.0)
+    if not planted:
+        add("sacrifice", "no regard for later goals", _shortsighted)
     return found
 
 
-def coverage() -> list[Simulation]:
+def single() -> list[Check]:
+    """The yes or no of one run where there is nothing, and where there is something."""
+    subject = "first subtask sacrificed"
+    return [
+        Check(subject, "other hands, ± a tick", _other_hands),
+        Check(subject, "no regard for later goals", _one_shortsighted),
+        Check(subject, "+7 of ± 5, -16 of ± 7 ticks", _one_sacrifice),
+    ]
+
+
+def coverage() -> list[Check]:
     """Every interval of a signature, by kind of value: whether it holds the true one."""
-    found = []
+    found: list[Check] = []
+
+    def add(subject: str, data: str, seen: Callable[..., bool], *about: Any) -> None:
+        found.append(Check(subject, data, partial(seen, *about), 1 - ALPHA))
+
     for name, (draw, mean) in VALUES.items():
         for runs in (10, 20):
-            found.append(
-                Simulation(f"mean, {name}, {runs} runs", partial(_mean_held, draw, mean, runs))
-            )
+            add("mean", f"{name}, {runs} runs", _mean_held, draw, mean, runs)
     for chance in (0.5, 0.9, 0.98):
         for runs in (10, 20):
-            found.append(
-                Simulation(
-                    f"share, of {chance:g}, {runs} runs", partial(_share_held, chance, runs)
-                )
-            )
+            add("share", f"of {chance:g}, {runs} runs", _share_held, chance, runs)
     for scatter in SCATTERS:
         kind = scatter.__name__
         for ratio in (1.0, 0.5):
-            found.append(
-                Simulation(
-                    f"ΔV z, {kind}, 20 runs, {ratio:g} of the SD",
-                    partial(_synergy_held, scatter, ratio),
-                )
-            )
+            data = f"{kind}, 20 runs, {ratio:g} of the SD"
+            add("ΔV z", data, _synergy_held, scatter, ratio)
         for what, (shared, curve, counts) in LOCI.items():
             family = partial(_family, scatter, _SD, shared, curve, counts)
-            found.append(Simulation(f"locus slope, {kind}{what}", partial(_slope_held, family)))
+            add("locus slope", f"{kind}{what}", _slope_held, family)
     return found
+
+
+def seed_of(number: int, check: Check, seed: int = SEED) -> list[int]:
+    """A seed of its own for each check, whatever else is simulated."""
+    return [seed, zlib.crc32(check.name.encode())]
 
 
 def entropies(simulations: int, runs: int = 20, seed: int = SEED) -> list[tuple[float, float]]:
@@ -249,7 +199,7 @@ def entropies(simulations: int, runs: int = 20, seed: int = SEED) -> list[tuple[
 
 
 def _mean_held(
-    draw: Callable[[np.random.Generator, int], Array],
+    draw: Draw,
     truth: float,
     runs: int,
     rng: np.random.Generator,
@@ -263,9 +213,9 @@ def _share_held(chance: float, runs: int, rng: np.random.Generator) -> bool:
     return low <= chance <= high
 
 
-def _synergy_held(scatter: Scatter, ratio: float, rng: np.random.Generator) -> bool:
+def _synergy_held(scatter: Draw, ratio: float, rng: np.random.Generator) -> bool:
     """Equal variances per dimension, those that move the hand times the ratio's square."""
-    found = synergy(_POSTURE + _squeezed(scatter(rng, 20), ratio), _JACOBIAN)
+    found = synergy(_POSTURE + _squeezed(scatter(rng, 20), ratio), JACOBIAN)
     return found.low <= found.neutral - math.log(ratio) <= found.high
 
 
@@ -277,12 +227,12 @@ def _slope_held(family: Family, rng: np.random.Generator) -> bool:
 
 def _squeezed(postures: Array, ratio: float) -> Array:
     """Deviations that move the hand, times a ratio."""
-    across: Array = postures @ _RANGE @ _RANGE.T
+    across: Array = postures @ RANGE @ RANGE.T
     return postures + (ratio - 1.0) * across
 
 
 def _context(
-    scatter: Scatter,
+    scatter: Draw,
     first: int,
     second: int,
     basis: Array | None,
@@ -295,7 +245,7 @@ def _context(
     return permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA
 
 
-def _lead(scatter: Scatter, shift: Array | None, rng: np.random.Generator) -> bool:
+def _lead(scatter: Draw, shift: Array | None, rng: np.random.Generator) -> bool:
     """Movements of 12 ticks from a common start: whether there is any lead at all."""
     way = np.linspace(0.0, 1.0, 12)[:, None]
     ends = [scatter(rng, 20), scatter(rng, 20)]
@@ -307,12 +257,12 @@ def _lead(scatter: Scatter, shift: Array | None, rng: np.random.Generator) -> bo
     return lead_time(first, second, rng, alpha=ALPHA, resamples=RESAMPLES) is not None
 
 
-def _synergy(scatter: Scatter, runs: int, ratio: float, rng: np.random.Generator) -> bool:
-    return synergy(_POSTURE + _squeezed(scatter(rng, runs), ratio), _JACOBIAN).p <= ALPHA
+def _synergy(scatter: Draw, runs: int, ratio: float, rng: np.random.Generator) -> bool:
+    return synergy(_POSTURE + _squeezed(scatter(rng, runs), ratio), JACOBIAN).p <= ALPHA
 
 
 def _family(
-    scatter: Scatter,
+    scatter: Draw,
     slope: float,
     shared: float,
     curve: float,
@@ -339,7 +289,7 @@ def _norm(family: Family, rng: np.random.Generator) -> bool:
     return slope_norm(*family(rng), rng).p <= ALPHA
 
 
-def _sacrifice(draw: Ticks, first: float, total: float, rng: np.random.Generator) -> bool:
+def _sacrifice(draw: Draw, first: float, total: float, rng: np.random.Generator) -> bool:
     """20 runs of two subtasks whose mean changes are known."""
     changes = np.stack([first + draw(rng, 20), total - first + draw(rng, 20)], axis=1)
     return _sacrificed(changes, rng)
@@ -394,33 +344,20 @@ def _one_sacrifice(rng: np.random.Generator) -> bool:
     return sacrifices(np.round([7.0 + first, -23.0 + rest]))
 
 
-def rate(simulation: Simulation, simulations: int, seed: int = SEED) -> tuple[float, float, float]:
-    """Share of data sets in which it is seen, and its exact 95 % interval."""
-    rng = np.random.default_rng([seed, zlib.crc32(simulation.name.encode())])
-    seen = sum(bool(simulation.seen(rng)) for _ in range(simulations))
-    low, high = stats.binomtest(seen, simulations).proportion_ci(0.95, method="exact")
-    return seen / simulations, float(low), float(high)
-
-
 def main() -> None:
-    """Print one line per simulation; what departs from its nominal rate is marked."""
-    simulations = int(sys.argv[1]) if len(sys.argv) > 1 else SIMULATIONS
-    print(f"{simulations} simulated data sets each; intervals at 95 %")
-    for title, rows, nominal in (
-        (f"Nulls: rejected at {ALPHA:.0%}", nulls(), ALPHA),
-        ("Planted effects: detected", planted(), None),
-        ("Yes or no of one run: yes", single(), None),
-        (f"Intervals of {1 - ALPHA:.0%}: hold the true value", coverage(), 1 - ALPHA),
-    ):
-        print(f"\n{title}")
-        for row in rows:
-            share, low, high = rate(row, simulations)
-            mark = ""
-            if nominal is not None:
-                mark = "  BELOW" if high < nominal else "  ABOVE" if low > nominal else ""
-            print(f"{row.name:60} {share:6.2%}  [{low:.2%}, {high:.2%}]{mark}", flush=True)
+    """Print one line per check; what departs from its nominal rate is marked."""
+    given = arguments(__doc__, SIMULATIONS, SEED)
+    sections = {
+        f"Nulls: rejected at {ALPHA:.0%}": tests(planted=False),
+        "Planted effects: detected": tests(planted=True),
+        "Yes or no of one run: yes": single(),
+        f"Intervals of {1 - ALPHA:.0%}: hold the true value": coverage(),
+    }
+    rule = partial(seed_of, seed=given.seed)
+    for line in lines(sections, given.simulations, rule, jobs=given.jobs):
+        print(line, flush=True)
     print("\nHand entropy of 20 runs, bit: true, mean estimate")
-    for truth, estimate in entropies(simulations):
+    for truth, estimate in entropies(given.simulations, seed=given.seed):
         print(f"{truth:.3f}  {estimate:.3f}")
 
 
