@@ -34,7 +34,7 @@ from analysis.report.pages.claims import claim_section
 from analysis.report.pages.frontier import cost_tables, optima_known
 from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
-from analysis.report.trace import FILE, trace_json
+from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
 from coartic import CoarticError
@@ -125,7 +125,7 @@ def write(report: Report, study: Study, folder: Path) -> None:
     about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
-        FILE: trace_json(study.results, report.document, report.numbers),
+        FILE: trace_json(study, report.document, report.numbers),
     }
     render = partial(rendered, endings=report.formats)
     write_report(report.document, report.plots, folder, extra, render=render)
