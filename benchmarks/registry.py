@@ -41,7 +41,8 @@ from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import read_text
 from coartic.learning import METHOD_PREFIX
 from coartic.method import Method
-from coartic.record import SEARCH, Values, problems
+from coartic.record import SEARCH
+from coartic.stored import Values, problems
 from coartic.text import LONGEST_LINE, plain
 
 ENTRY_POINTS = "coartic.methods"

@@ -18,7 +18,7 @@ from analysis.report.text import heads, texts
 from analysis.results.folder import Results
 from analysis.results.optima import SHIPPED, optima
 from coartic import CoarticError, builtin_tasks
-from coartic.record import content_hash
+from coartic.stored import content_hash
 from coartic.text import json_text, one_line, shell_line
 
 FILE = "trace.json"

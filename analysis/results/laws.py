@@ -20,7 +20,9 @@ from pydantic import ValidationError
 
 from coartic import PAPER, CoarticError, parse_task
 from coartic.inputs import read_bytes
-from coartic.record import Record, RecordError, problems, read_record, run_seed
+from coartic.codec import read_record
+from coartic.record import Record, RecordError, run_seed
+from coartic.stored import problems
 from coartic.tables import (
     BUILT_IN,
     FORMAT,
