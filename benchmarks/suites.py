@@ -52,6 +52,7 @@ from coartic.tables import (
     Plan,
     PlanLimits,
     PlannedCell,
+    label_of,
     trials_in,
     variant_of,
 )
@@ -198,7 +199,7 @@ class Cell:
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
 
 def suites() -> dict[str, Suite]:
