@@ -41,7 +41,7 @@ READING_OF_COST = (
     "`areas.csv` has them in full, `anytime.csv` the curves.",
     "**Pareto sets**: a method is on the front if none has a mean reward as high for as little "
     "spend, and one of them better. A method with a single run has nothing to resample. Counts "
-    f"are exact; solve times within {TIME_TOLERANCE:.0%} of each other count as ties, because "
+    f"are exact; solve times within {100 * TIME_TOLERANCE:.0f} % of each other count as ties, because "
     "they vary between machines and runs. Methods with a run that has no solution are left out; "
     "methods on no front are in `pareto.csv`.",
 )
@@ -86,7 +86,7 @@ def targets_table(
             "Runs that came within a share of the optimum, and the median spend to get there "
             "over all runs (Kaplan-Meier; runs stopped by their budget are censored at the "
             f"horizon).{' Planners need no trials.' if spend == 'trials' else ''}"
-            + (f" Never within {near[0][0].share:.0%}: {escaped(never)}." if never else ""),
+            + (f" Never within {100 * near[0][0].share:.0f} %: {escaped(never)}." if never else ""),
         ),
     )
 
