@@ -25,6 +25,7 @@ from analysis.study import Study
 from coartic import load_task
 from coartic.tables import PlanLimits
 from tests.support.made_up import manifest_for, replanned
+from tests.support.reports import shown
 from tests.support.strategies import tiny_task
 
 BEST = -465  # proven optimum of two-armed 1
@@ -68,12 +69,6 @@ def study(rows, tmp_path):
 def of(frame, method, spend="trials", other_arm="free"):
     found = frame[(frame.method == method) & (frame.spend == spend)]
     return found[found.other_arm == other_arm] if "other_arm" in frame else found
-
-
-def shown(table):
-    """By key and column name the values of a table."""
-    names = [column.name for column in table.columns]
-    return {row.key: dict(zip(names, row.values, strict=True)) for row in table.rows}
 
 
 def share(frame, method, spend, column="front_share"):
