@@ -10,7 +10,7 @@ from scipy import stats
 
 from analysis.results.folder import load_results
 from analysis.signatures.page import signatures_page
-from analysis.statistics.estimates import holm
+from analysis.statistics.hypotheses import holm
 from analysis.study import Study
 from tests.support.commands import call
 from tests.support.suites import run_and_write, suite_of

@@ -21,7 +21,8 @@ from analysis.claims import (
 )
 from analysis.claims.judges.reach import shortest_reach
 from analysis.results.folder import Results
-from analysis.statistics.estimates import Inference, bootstrap_test, mean
+from analysis.statistics.estimates import Inference, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.study import Study
 from analysis.table import interval
 from benchmarks.registry import registry

@@ -25,6 +25,7 @@ from scipy import stats
 
 from analysis.published import Summary
 from analysis.statistics import estimates as statistics
+from analysis.statistics import hypotheses
 from analysis.statistics.across_tasks import interquartile_mean
 from analysis.statistics.equivalence import bootstrap_equivalence, difference
 from analysis.statistics.estimates import LEVEL
@@ -118,10 +119,10 @@ def checks() -> list[Check]:
     return found
 
 
-_ONE_TAILED: tuple[statistics.Alternative, ...] = ("greater", "less")
+_ONE_TAILED: tuple[hypotheses.Alternative, ...] = ("greater", "less")
 _TESTS = {
-    "bootstrap test": statistics.bootstrap_test,
-    "permutation test": statistics.permutation_test,
+    "bootstrap test": hypotheses.bootstrap_test,
+    "permutation test": hypotheses.permutation_test,
 }
 
 
@@ -139,10 +140,10 @@ def _null_test(name: str, first: Population, second: Population) -> Check:
     return Check(f"{name}, one-tailed", f"{first.name} > {second.name}", LEVEL, errs)
 
 
-def _known_test(population: Population, tail: statistics.Alternative) -> Check:
+def _known_test(population: Population, tail: hypotheses.Alternative) -> Check:
     def errs(rng: np.random.Generator, seed: int) -> bool:
         values = population.draw(rng, RUNS)
-        found = statistics.bootstrap_test(
+        found = hypotheses.bootstrap_test(
             values, population.mean, tail, seed=seed, resamples=RESAMPLES
         )
         return found.p <= LEVEL
@@ -152,10 +153,10 @@ def _known_test(population: Population, tail: statistics.Alternative) -> Check:
     return Check(name, f"{population.name} {sign} value", LEVEL, errs)
 
 
-def _flip_test(first: Population, second: Population, tail: statistics.Alternative) -> Check:
+def _flip_test(first: Population, second: Population, tail: hypotheses.Alternative) -> Check:
     def errs(rng: np.random.Generator, seed: int) -> bool:
         a, b = _centred(first, rng), _centred(second, rng)
-        return statistics.sign_flip_test(a, b, tail, seed=seed, resamples=RESAMPLES).p <= LEVEL
+        return hypotheses.sign_flip_test(a, b, tail, seed=seed, resamples=RESAMPLES).p <= LEVEL
 
     sign = ">" if tail == "greater" else "<"
     return Check("sign-flip test, one-tailed", f"{first.name} {sign} {second.name}", LEVEL, errs)

@@ -10,7 +10,8 @@ from analysis.comparisons.methods import LEARNER
 from analysis.signatures.cell import Cell
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
-from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean, share_test
+from analysis.statistics.estimates import FEWEST, SEED, mean
+from analysis.statistics.hypotheses import bootstrap_test, share_test
 from analysis.table import interval
 from coartic.robot import Array
 

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from analysis.claims.data import Data, MissingError
-from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference, holm
+from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
+from analysis.statistics.hypotheses import holm
 from analysis.table import Table
 
 if TYPE_CHECKING:

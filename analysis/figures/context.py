@@ -30,7 +30,7 @@ from analysis.figures.style import (
 )
 from analysis.methods import short_name
 from analysis.signatures.register import CONTEXT
-from analysis.statistics.estimates import holm
+from analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study

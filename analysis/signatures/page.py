@@ -13,7 +13,7 @@ import pandas as pd
 from analysis.markup import escaped
 from analysis.page import Heading, Part, page
 from analysis.signatures.register import NO_RUN
-from analysis.statistics.estimates import holm
+from analysis.statistics.hypotheses import holm
 from analysis.table import NONE, Table
 from coartic import Task
 
