@@ -23,12 +23,11 @@ from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
 from analysis.statistics.estimates import (
     FEWEST,
     SEED,
-    bootstrap_test,
     difference_of_means,
-    holm,
     paired_by_seed,
     paired_difference,
 )
+from analysis.statistics.hypotheses import bootstrap_test, holm
 from analysis.study import CellKey, Study, load
 from coartic import CoarticError
 from coartic.robot import Array
