@@ -6,10 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from analysis.comparisons.methods import TOLD, MethodRow
-from analysis.comparisons.overall import NEAR
+from analysis.comparisons.overall import WITHIN
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
@@ -135,11 +134,12 @@ def _optimum(study: Study, task: str) -> str:
     return f"optimum, by the other arm: {true_minus(', '.join(known))}"
 
 
-def overall_table(study: Study, overall: pd.DataFrame, scores: pd.DataFrame) -> DataTable | None:
+def overall_table(study: Study) -> DataTable | None:
     """Every method over all tasks that have an optimum."""
     columns: list[tuple[Column, str | tuple[str, str, str]]] = [
         (Column("method", "method"), "method"),
         (_number_of("runs", "runs"), "runs"),
+        (_number_of("failed", "of them failed"), "failed"),
         (
             Column("score", "score", "number", digits=2, rests_on=("runs", "optimum")),
             ("score", "score_low", "score_high"),
@@ -149,8 +149,7 @@ def overall_table(study: Study, overall: pd.DataFrame, scores: pd.DataFrame) -> 
             ("gap", "gap_low", "gap_high"),
         ),
     ]
-    for share in NEAR:
-        near = f"within_{share:.0%}".rstrip("%")
+    for near, share in WITHIN.items():
         head = Column(
             near,
             f"within {100 * share:.0f} %",
@@ -161,7 +160,8 @@ def overall_table(study: Study, overall: pd.DataFrame, scores: pd.DataFrame) -> 
         )
         columns.append((head, (near, f"{near}_low", f"{near}_high")))
     rows = []
-    for row in overall.to_dict("records"):
+    scores = study.scores
+    for row in study.overall.to_dict("records"):
         own = scores[scores.method == row["method"]]
         rows.append(
             Row(
