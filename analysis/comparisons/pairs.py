@@ -53,7 +53,7 @@ SPENDS = {
     "evaluations": ("forward_kinematics", "jacobians"),
     "solve_s": ("solve_s",),
 }
-"""What a run spends: sums of columns of :func:`analysis.comparisons.methods.methods_frame`."""
+"""What a run spends: sums of columns of :class:`analysis.comparisons.methods.MethodRow`."""
 RUNS_FOR = {f"runs_{share:.0%}".removesuffix("%"): share for share in SHARES}
 """Differences, as shares of the optimum, for which so many runs are needed."""
 Kind = Literal["conditions", "variant", "method"]
