@@ -169,7 +169,7 @@ def _summary(study: Study) -> Section:
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         counted = Bullets((*counted.items, note))
     blocks.append(counted)
-    overall = tables.overall_table(study, study.overall, study.scores)
+    overall = tables.overall_table(study)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)

@@ -101,7 +101,7 @@ def _tasks(study: Study) -> Iterator[Section]:
 def _across(study: Study) -> Iterator[Block]:
     tasks = list(dict.fromkeys(study.scores.task))
     names = escaped(", ".join(tasks)) or "none"
-    table = overall_table(study, study.overall, study.scores)
+    table = overall_table(study)
     if len(tasks) < 2:
         yield Prose(
             (f"Needs at least two tasks with known optimum and initial solution; here: {names}.",)
