@@ -7,10 +7,11 @@ import shutil
 import pytest
 
 import analysis.report.build
-import analysis.report.numbers
+import analysis.report.headlines
 from analysis.figures import register
 from analysis.report.build import build, write
-from analysis.report.numbers import Names, headline_numbers, macro_names, words
+from analysis.report.headlines import headline_numbers
+from analysis.report.numbers import Names, macro_names, words
 from analysis.report.trace import find_report, trace
 from analysis.study import Study
 from analysis.words import slugs
@@ -111,7 +112,7 @@ def test_macros_that_run_together_are_told_apart(odd, monkeypatch):
     of = Study(odd)
     labels = macro_names(of).labels
     same = Names(dict.fromkeys(odd.tasks, "X"), labels)
-    monkeypatch.setattr(analysis.report.numbers, "macro_names", lambda of: same)
+    monkeypatch.setattr(analysis.report.headlines, "macro_names", lambda of: same)
     numbers = headline_numbers(of)
     names = [number.macro + suffix for number in numbers for suffix, _ in number.companions()]
     assert len(names) == len(set(names))
@@ -130,7 +131,8 @@ def test_failed_runs(tmp_path, undrawn):
         write(made, of, tmp_path / "report")
         page = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
         assert f"{rows} of 3 runs have no solution" in page
-        assert f"{rows} runs are crashed (exit code 9)" in page
+        crashed = "1 run is" if rows == 1 else f"{rows} runs are"
+        assert f"{crashed} crashed (exit code 9)" in page
         named = {number.macro: number for number in made.numbers}
         if rows == 1:
             assert named["coarticAscendingECOneReward"].n == 2

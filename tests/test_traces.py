@@ -504,7 +504,8 @@ def test_what_no_runs_are_behind(home):
 
 def test_a_cell_of_a_table_says_how(home):
     found = trace(home, "methods-ascending", ("dual-process/EC1", "reward"))
-    assert found.how.startswith("reward (ticks), SD, 95 % interval. Told: G goals")
+    assert found.how.startswith("reward (ticks), SD, 95 % interval. Reward: of the runs that")
+    assert "Told: G goals" in found.how
     assert "Reward: of the runs that have a solution" in found.how
     assert "Optimum of" not in found.how
     assert "how: reward (ticks)" in trace_text(found)

@@ -20,7 +20,7 @@ from analysis.claims.judges.presence import PRESENCE, shared_signatures
 from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.published import Summary, published_cell
 from analysis.report.document import Column, RestsOn, Row
 from analysis.statistics.equivalence import MARGIN, difference

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.claims.data import ONE, Data, MissingError
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
 from analysis.signatures.trajectories import Trajectories

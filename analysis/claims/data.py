@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import LEARNER, TOLD
+from analysis.comparisons.methods import TOLD
+from analysis.methods import LEARNER
 from analysis.published import TRIALS
 from analysis.results.folder import Results
 from analysis.signatures.recruitment import best_sequences

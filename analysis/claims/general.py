@@ -24,7 +24,7 @@ from analysis.claims.data import (
 from analysis.claims.judges.reach import shortest_reach
 from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.published import TRIALS
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.signatures.subtasks import postures_before

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
 from analysis.statistics.estimates import SEED, Inference, mean
 from analysis.statistics.hypotheses import bootstrap_test

@@ -19,7 +19,7 @@ from analysis.claims.judges.shares import (
     not_nearly_all,
 )
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
 from analysis.statistics.estimates import FEWEST, SEED, mean
 from analysis.statistics.hypotheses import bootstrap_test

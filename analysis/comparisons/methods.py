@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from analysis.methods import LEARNER as LEARNER
 from analysis.results.folder import CellRuns
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.results.optima import locks_base

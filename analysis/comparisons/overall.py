@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.across_tasks import (
     gap_share,

@@ -25,8 +25,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import LEARNER, TOLD
+from analysis.comparisons.methods import TOLD
 from analysis.comparisons.targets import SHARES
+from analysis.methods import LEARNER
 from analysis.results.folder import CellRuns
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import (

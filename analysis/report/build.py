@@ -27,9 +27,10 @@ from analysis.report.document import (
     Section,
 )
 from analysis.report.formats.csv import table_csv
+from analysis.report.headlines import headline_numbers
 from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
-from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
+from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
 from analysis.report.pages.claims import claim_section
 from analysis.report.pages.frontier import cost_tables, optima_known
 from analysis.report.player import player_json

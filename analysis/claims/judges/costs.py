@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 from analysis.claims.data import BEST, UNINFORMED, Data, MissingError
 from analysis.claims.evidence import by_optimum, measured, of_either_optimum
 from analysis.claims.register import Finding
-from analysis.comparisons.methods import LEARNER, TOLD
+from analysis.comparisons.methods import TOLD
+from analysis.methods import LEARNER
 from analysis.report.document import Column, RestsOn, Row, Value
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.words import NONE, short

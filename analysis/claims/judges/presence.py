@@ -11,7 +11,7 @@ from analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError,
 from analysis.claims.evidence import measured
 from analysis.claims.one_armed import context_distance, sacrifice
 from analysis.claims.register import Finding
-from analysis.comparisons.methods import LEARNER
+from analysis.methods import LEARNER
 from analysis.report.document import CellKey, Column, Row, Value
 from analysis.statistics.estimates import LEVEL
 from analysis.words import NONE

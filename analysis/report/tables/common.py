@@ -32,17 +32,6 @@ def table(
     return DataTable(name, caption, columns, tuple(rows), notes) if rows else None
 
 
-def value_of(row: dict[Any, Any], source: str | tuple[str, str, str], column: Column) -> Value:
-    """A row's entry as ``column`` takes it; of three names: value, low and high."""
-    if isinstance(source, tuple):
-        value, low, high = (float(row[name]) for name in source)
-        return with_interval(value, low, high)
-    value = row[source]
-    if column.kind == "text":
-        return None if pd.isna(value) or value == "" else str(value)
-    return None if pd.isna(value) else value.item() if hasattr(value, "item") else value
-
-
 def mean_of(rewards: Any) -> Estimate | None:
     """Mean with SD and BCa interval, as far as there are any."""
     if not len(rewards):

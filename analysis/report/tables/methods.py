@@ -10,8 +10,8 @@ import numpy as np
 from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.comparisons.overall import WITHIN
 from analysis.markup import escaped
-from analysis.report.document import Column, DataTable, Row
-from analysis.report.tables.common import marked, mean_of, table, table_ids, value_of
+from analysis.report.document import Column, DataTable, RestsOn, Row
+from analysis.report.tables.common import marked, mean_of, table, table_ids, with_interval
 from analysis.words import true_minus
 from coartic.method import Information
 from coartic.record import SEARCH
@@ -97,6 +97,28 @@ _METHODS = (
 )
 
 
+_ENDS = ("", "_low", "_high")
+_ON_OPTIMUM: tuple[RestsOn, ...] = ("runs", "optimum")
+_OVERALL = (
+    Column("method", "method"),
+    _number_of("runs", "runs"),
+    _number_of("failed", "of them failed"),
+    Column("score", "score", "number", digits=2, rests_on=_ON_OPTIMUM),
+    Column("gap", "gap", "share", digits=1, rests_on=_ON_OPTIMUM),
+    *(
+        Column(
+            near,
+            f"within {100 * share:.0f} %",
+            "share",
+            digits=0,
+            rests_on=_ON_OPTIMUM,
+            printed=share == 0.05,
+        )
+        for near, share in WITHIN.items()
+    ),
+)
+
+
 def _method_row(study: Study, row: MethodRow) -> Row:
     key = row.task, row.label
     values = (
@@ -136,46 +158,21 @@ def _optimum(study: Study, task: str) -> str:
 
 def overall_table(study: Study) -> DataTable | None:
     """Every method over all tasks that have an optimum."""
-    columns: list[tuple[Column, str | tuple[str, str, str]]] = [
-        (Column("method", "method"), "method"),
-        (_number_of("runs", "runs"), "runs"),
-        (_number_of("failed", "of them failed"), "failed"),
-        (
-            Column("score", "score", "number", digits=2, rests_on=("runs", "optimum")),
-            ("score", "score_low", "score_high"),
-        ),
-        (
-            Column("gap", "gap", "share", digits=1, rests_on=("runs", "optimum")),
-            ("gap", "gap_low", "gap_high"),
-        ),
-    ]
-    for near, share in WITHIN.items():
-        head = Column(
-            near,
-            f"within {100 * share:.0f} %",
-            "share",
-            digits=0,
-            rests_on=("runs", "optimum"),
-            printed=share == 0.05,
-        )
-        columns.append((head, (near, f"{near}_low", f"{near}_high")))
-    rows = []
-    scores = study.scores
-    for row in study.overall.to_dict("records"):
-        own = scores[scores.method == row["method"]]
-        rows.append(
-            Row(
-                str(row["method"]),
-                tuple(value_of(row, source, column) for column, source in columns),
-                tuple(dict.fromkeys(zip(own.task.map(str), own.label.map(str), strict=True))),
-            )
-        )
-    known, tasks = scores.task.nunique(), len(study.results.tasks)
+    rows, scores = [], study.scores
+    estimates = [column.name for column in _OVERALL[3:]]
+    for place, method in enumerate(study.overall.method):
+        found, own = study.overall.iloc[place], scores[scores.method == method]
+        intervals = ([float(found[f"{name}{end}"]) for end in _ENDS] for name in estimates)
+        counted = int(found.runs), int(found.failed)
+        values = (str(method), *counted, *(with_interval(*each) for each in intervals))
+        cells = zip(own.task.map(str), own.label.map(str), strict=True)
+        rows.append(Row(str(method), values, tuple(dict.fromkeys(cells))))
+    known, tasks = scores.task.nunique(), len(study.tasks)
     of = "All tasks" if known == tasks else f"The {known} of {tasks} tasks with a known optimum"
     return table(
         "across-tasks",
         f"{of} together, each counting the same.",
-        tuple(column for column, _ in columns),
+        _OVERALL,
         rows,
         (
             "Score: interquartile mean of normalised rewards, 0 the initial solution, 1 the "

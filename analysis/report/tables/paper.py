@@ -37,6 +37,40 @@ _PAPER = (
 )
 
 
+_PUBLISHED = (
+    Column("task", "task"),
+    Column("method", "method"),
+    Column("published", "paper", "number", "ticks", 1, rests_on=("paper",)),
+    Column("published_runs", "published runs", "number", rests_on=("paper",), printed=False),
+    _PUBLISHED_AS,
+    _OURS,
+    _RUNS,
+    _DIFFERENCE,
+    Column("verdict", "verdict", rests_on=("runs", "paper")),
+    Column("margin", "margin", "number", "ticks", 1, rests_on=("paper",), printed=False),
+    Column(
+        "margin_of_gain",
+        "of the gain",
+        "share",
+        digits=0,
+        rests_on=("paper",),
+        printed=False,
+    ),
+    Column("initial", "initial", "number", "ticks", 0, rests_on=("runs",), printed=False),
+    Column(
+        "published_initial",
+        "initial, published",
+        "number",
+        "ticks",
+        0,
+        rests_on=("paper",),
+        printed=False,
+    ),
+    Column("hands", "hands: runs", rests_on=("runs",), printed=False),
+    Column("published_hands", "hands, published", rests_on=("paper",), printed=False),
+)
+
+
 def published_table(study: Study) -> DataTable | None:
     """Learned rewards of the paper's cells, published and ours."""
     rows = paper_rows(study)
@@ -60,40 +94,7 @@ def published_table(study: Study) -> DataTable | None:
     return table(
         "published-and-ours",
         "Learned reward in the paper's cells, published and ours.",
-        (
-            Column("task", "task"),
-            Column("method", "method"),
-            Column("published", "paper", "number", "ticks", 1, rests_on=("paper",)),
-            Column(
-                "published_runs", "published runs", "number", rests_on=("paper",), printed=False
-            ),
-            _PUBLISHED_AS,
-            _OURS,
-            _RUNS,
-            _DIFFERENCE,
-            Column("verdict", "verdict", rests_on=("runs", "paper")),
-            Column("margin", "margin", "number", "ticks", 1, rests_on=("paper",), printed=False),
-            Column(
-                "margin_of_gain",
-                "of the gain",
-                "share",
-                digits=0,
-                rests_on=("paper",),
-                printed=False,
-            ),
-            Column("initial", "initial", "number", "ticks", 0, rests_on=("runs",), printed=False),
-            Column(
-                "published_initial",
-                "initial, published",
-                "number",
-                "ticks",
-                0,
-                rests_on=("paper",),
-                printed=False,
-            ),
-            Column("hands", "hands: runs", rests_on=("runs",), printed=False),
-            Column("published_hands", "hands, published", rests_on=("paper",), printed=False),
-        ),
+        _PUBLISHED,
         [_published_row(study, row) for row in rows],
         tuple(notes),
     )
