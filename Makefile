@@ -22,7 +22,7 @@ benchmark: $(READY)
 	done
 	@echo "Look at $(OUT)/comparison/report/report.html, and at $(OUT)/paper/comparison.md."
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses auto
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 check: $(READY)
 	$(BIN)/ruff format --check .

@@ -3,6 +3,18 @@
 ``analysis.load(folder)`` reads a results folder.
 """
 
-from analysis.study import Study, load
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from analysis.study import Study, load
 
 __all__ = ["Study", "load"]
+
+
+def __getattr__(name: str) -> Any:
+    """What is imported when it is asked for: not every command needs all of it."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from analysis import study
+
+    return getattr(study, name)

@@ -1,14 +1,14 @@
 """The conformance kit: what a contributor runs on a new method or task.
 
 Each law is checked by performing runs in processes of their own, with a time limit: one
-that lives through the whole check, and fresh ones. A law that cannot be checked fails;
+that lives through the whole check, and another one. A law that cannot be checked fails;
 it is never skipped silently.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.harness import record_of
 from benchmarks.registry import Entry, Registry
 from benchmarks.reproduce import differences, perform_once
-from benchmarks.sandbox import Keeper
+from benchmarks.sandbox import Keeper, keeper
 from benchmarks.specification import Limits, RunSpec
 from coartic import (
     CoarticError,
@@ -34,7 +34,7 @@ from coartic import (
 )
 from coartic.method import METERED
 from coartic.record import Record
-from coartic.text import plain
+from coartic.text import counted, plain
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
@@ -54,24 +54,24 @@ class _BrokenError(Exception):
     """A law does not hold; the message says what was seen."""
 
 
-def check_method(entry: Entry) -> list[Law]:
-    """Every law of a method, in order."""
-    checks = _MethodChecks(entry)
-    try:
-        return list(_run(checks.laws()))
-    finally:
-        checks.close()
+def check_method(
+    entry: Entry, *, laws: Collection[str] | None = None, tasks: Sequence[Task] | None = None
+) -> list[Law]:
+    """Every law of a method, in order, on the shipped tasks; or some laws, or on other tasks."""
+    with keeper() as own:
+        checks = _MethodChecks(entry, own, tasks or [load_task(name) for name in builtin_tasks()])
+        return list(_run(c for c in checks.laws() if laws is None or c[0] in laws))
 
 
 def check_task_file(path: Path, known: Registry) -> list[Law]:
     """Every law of a task file, in order."""
-    return list(_run(_task_laws(path, known)))
+    return list(_run(_TaskChecks(path, known).laws()))
 
 
 Check = tuple[str, Callable[[], str]]
 
 
-def _run(checks: Iterator[Check]) -> Iterator[Law]:
+def _run(checks: Iterable[Check]) -> Iterator[Law]:
     for name, check in checks:
         try:
             yield Law(name, True, check())
@@ -84,12 +84,10 @@ def _run(checks: Iterator[Check]) -> Iterator[Law]:
 
 
 class _MethodChecks:
-    def __init__(self, entry: Entry) -> None:
+    def __init__(self, entry: Entry, own: Keeper, tasks: Sequence[Task]) -> None:
         self.entry = entry
-        self._keeper = Keeper()
-
-    def close(self) -> None:
-        self._keeper.close()
+        self._keeper = own
+        self._tasks = tasks
 
     def laws(self) -> Iterator[Check]:
         yield "declaration", self.declaration
@@ -113,8 +111,7 @@ class _MethodChecks:
 
     @cached_property
     def tasks(self) -> list[Task]:
-        tasks = [load_task(name) for name in builtin_tasks()]
-        found = [task for task in tasks if self.entry.why_not(task, self.defaults) is None]
+        found = [task for task in self._tasks if self.entry.why_not(task, self.defaults) is None]
         if not found:
             raise _BrokenError(
                 "it applies to none of the shipped tasks, so nothing can be checked"
@@ -259,70 +256,80 @@ def _hopeless(like: Task) -> Task:
     )
 
 
-def _task_laws(path: Path, known: Registry) -> Iterator[Check]:
-    loaded: list[Task] = []
+class _TaskChecks:
+    def __init__(self, path: Path, known: Registry) -> None:
+        self.path = path
+        self.known = known
 
-    def task() -> Task:
-        if not loaded:
-            raise _BrokenError("the file cannot be read, so this cannot be checked")
-        return loaded[0]
+    def laws(self) -> Iterator[Check]:
+        yield "valid", self.valid
+        yield "serialisable", self.serialisable
+        yield "name", self.own_name
+        yield "distinct goals", self.distinct_goals
+        yield "solvable", self.solvable
+        yield "provenance", self.provenance
+        yield "methods", self.methods
 
-    def valid() -> str:
+    @cached_property
+    def loaded(self) -> Task | TaskError:
         try:
-            loaded.append(load_task(path))
+            return load_task(self.path)
         except TaskError as error:
-            raise _BrokenError(str(error)) from None
-        goals = len(loaded[0].goals)
-        return f"{loaded[0].name}, {goals} goals, {' and '.join(loaded[0].hands)} hand"
+            return error
 
-    def serialisable() -> str:
-        plain = json.loads(json.dumps(task().model_dump(mode="json")))
-        if parse_task(plain, str(path)) != task():
+    @property
+    def task(self) -> Task:
+        if isinstance(self.loaded, TaskError):
+            raise _BrokenError("the file cannot be read, so this cannot be checked")
+        return self.loaded
+
+    def valid(self) -> str:
+        if isinstance(self.loaded, TaskError):
+            raise _BrokenError(str(self.loaded))
+        goals = counted(len(self.task.goals), "goal")
+        return f"{self.task.name}, {goals}, {' and '.join(self.task.hands)} hand"
+
+    def serialisable(self) -> str:
+        content = json.loads(json.dumps(self.task.model_dump(mode="json")))
+        if parse_task(content, str(self.path)) != self.task:
             raise _BrokenError("it does not survive being written as JSON")
         return "survives being written as JSON"
 
-    def new() -> str:
-        if task().name in builtin_tasks() and load_task(task().name) != task():
-            raise _BrokenError(f"name {task().name!r} belongs to a different, shipped task")
-        return f"name {task().name!r} is its own"
+    def own_name(self) -> str:
+        name = self.task.name
+        if name in builtin_tasks() and load_task(name) != self.task:
+            raise _BrokenError(f"name {name!r} belongs to a different, shipped task")
+        return f"name {name!r} is its own"
 
-    def distinct() -> str:
-        goals = task().goal_array
+    def distinct_goals(self) -> str:
+        goals = self.task.goal_array
         for index in range(1, len(goals)):
             gap = float(np.hypot(*(goals[index] - goals[index - 1])))
-            if gap <= task().radius:
+            if gap <= self.task.radius:
                 raise _BrokenError(
                     f"goals {index} and {index + 1} lie within one radius of each other: "
                     "hitting the first nearly hits the second"
                 )
         return "successive goals lie apart"
 
-    def solvable() -> str:
+    def solvable(self) -> str:
         try:
-            hands = initial_hands(task())
+            hands = initial_hands(self.task)
         except NotApplicableError as error:
             raise _BrokenError(str(error)) from None
-        execution = corrective_trial(task(), hands)
+        execution = corrective_trial(self.task, hands)
         if not execution.completed:
             raise _BrokenError(f"initial hands {hands}: {execution.reason}")
         return f"initial hands {hands} complete it with {execution.reward}"
 
-    def provenance() -> str:
-        missing = [key for key in ("goals", "start") if key not in task().provenance]
+    def provenance(self) -> str:
+        missing = [key for key in ("goals", "start") if key not in self.task.provenance]
         if missing:
             raise _BrokenError(f"no source and status for {' and '.join(missing)} ([provenance])")
         return "goals and start have a source and a status"
 
-    def applicable() -> str:
-        names = [name for name, entry in known.items() if entry.why_not(task()) is None]
+    def methods(self) -> str:
+        names = [name for name, entry in self.known.items() if entry.why_not(self.task) is None]
         if not names:
             raise _BrokenError("no method applies to it")
         return ", ".join(names)
-
-    yield "valid", valid
-    yield "serialisable", serialisable
-    yield "name", new
-    yield "distinct goals", distinct
-    yield "solvable", solvable
-    yield "provenance", provenance
-    yield "methods", applicable

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from coartic import CoarticError, Task
+from coartic.inputs import problems_inline
 from coartic.method import Information, Method
 from coartic.record import Plain, Values
 from coartic.text import Line, plain
@@ -78,7 +79,7 @@ def declared(method: type[Method]) -> Declaration:
         }
         return Declaration.model_validate_json(json.dumps(content, allow_nan=False))
     except ValidationError as error:
-        raise MethodFileError(f"{method.__name__}: {_problems(error)}") from None
+        raise MethodFileError(f"{method.__name__}: {problems_inline(error)}") from None
     except (TypeError, ValueError, AttributeError) as error:
         raise MethodFileError(f"{method.__name__}: {brief(error)}") from None
 
@@ -95,11 +96,7 @@ def completed(method: type[Method], parameters: Mapping[str, Any]) -> dict[str, 
         )
     except ValidationError as error:
         known = ", ".join(method.Parameters.model_fields) or "none"
-        found = "; ".join(
-            f"{'.'.join(map(str, detail['loc']))}: {decapitalised(detail['msg'])} "
-            f"(found {plain(repr(detail['input']), 200)})"
-            for detail in error.errors()
-        )
+        found = problems_inline(error, method.Parameters.model_fields)
         raise CoarticError(f"method {method.name!r}: {found}. Its parameters: {known}.") from None
     return complete
 
@@ -157,19 +154,6 @@ def _json(value: Any) -> Any:
         return json.loads(json.dumps(value, allow_nan=False))
     except (TypeError, ValueError):
         return plain(str(value))
-
-
-def _problems(error: ValidationError) -> str:
-    return "; ".join(
-        f"{'.'.join(map(str, detail['loc']))}: {decapitalised(detail['msg'])} "
-        f"(found {plain(repr(detail['input']), 80)})"
-        for detail in error.errors()
-    )
-
-
-def decapitalised(text: str) -> str:
-    """A sentence as part of another."""
-    return text[:1].lower() + text[1:]
 
 
 def brief(error: BaseException) -> str:

@@ -14,6 +14,7 @@ from benchmarks.specification import RunSpec
 from benchmarks.store import Damage, Store
 from coartic import CoarticError, Movement
 from coartic.errors import IncompleteError
+from coartic.inputs import problems_inline
 from coartic.method import Information
 from coartic.record import (
     MOST_MOVEMENTS,
@@ -28,7 +29,6 @@ from coartic.record import (
     Status,
     Timing,
     Values,
-    problems,
     solved,
 )
 from coartic.text import plain
@@ -58,7 +58,7 @@ class Progress:
 Watcher = Callable[[Progress, RunSpec | None], None]
 
 
-def perform_plan(
+def perform_missing(
     specs: Sequence[RunSpec],
     store: Store,
     executor: Executor,
@@ -67,7 +67,7 @@ def perform_plan(
     redo: bool = False,
     watch: Watcher = lambda progress, spec: None,
 ) -> Progress:
-    """Perform every run that the store has no good record of.
+    """Perform every run that the store, which the caller has locked, has no good record of.
 
     A record is good where it is as it was written and agrees with itself
     (:meth:`coartic.record.Record.check`). One that timed out under a shorter limit than now
@@ -75,18 +75,6 @@ def perform_plan(
     everything anew. ``watch`` is called before the first run and after each. Raises CoarticError
     where records cannot be written or runs keep getting lost.
     """
-    with store.locked():
-        return _perform(specs, store, executor, retry_failed, redo, watch)
-
-
-def _perform(
-    specs: Sequence[RunSpec],
-    store: Store,
-    executor: Executor,
-    retry_failed: bool,
-    redo: bool,
-    watch: Watcher,
-) -> Progress:
     by_id = {spec.run_id: spec for spec in specs}
     progress = Progress(total=len(by_id))
     progress.stale = store.stale(list(by_id))
@@ -167,7 +155,7 @@ def record_of(answer: Answer, spec: RunSpec) -> Record:
         said = _Said.model_validate_json(answer["outcome"])
     except ValidationError as error:
         return _failure(
-            spec, "solver-failed", f"what it handed over cannot be kept: {problems(error)}"
+            spec, "solver-failed", f"what it handed over cannot be kept: {problems_inline(error)}"
         )
     if said.foreign_code and spec.entry.foreign is None:
         raise CoarticError(plain(said.error or "other code"))

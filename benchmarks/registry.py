@@ -6,7 +6,6 @@ code is run in sandboxes alone, to describe them and to perform their runs.
 
 from __future__ import annotations
 
-import difflib
 import json
 import threading
 import warnings
@@ -38,11 +37,11 @@ from benchmarks.declaration import (
 from benchmarks.sandbox import Failure, Sandbox
 from coartic import CoarticError, Task, tables
 from coartic.dual_process import DUAL_PROCESS
-from coartic.inputs import read_text
+from coartic.inputs import problems_inline, read_text
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Method
-from coartic.record import SEARCH, Values, problems
-from coartic.text import LONGEST_LINE, plain
+from coartic.record import SEARCH, Values
+from coartic.text import LONGEST_LINE, did_you_mean, plain
 
 ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)
@@ -162,8 +161,7 @@ def read_method_file(path: Path) -> Foreign:
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     """An error for a name that is not among the known ones, with the nearest of them."""
     names = list(known)
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else "."
+    hint = did_you_mean(name, names) or "."
     return CoarticError(f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}.")
 
 
@@ -176,7 +174,9 @@ def _complete(foreign: Foreign | None, name: str, parameters: str) -> dict[str, 
     try:
         return _VALUES.validate_python(found)
     except ValidationError as error:
-        raise MethodFileError(f"method {name!r}: its parameters: {problems(error)}") from None
+        raise MethodFileError(
+            f"method {name!r}: its parameters: {problems_inline(error)}"
+        ) from None
 
 
 @cache

@@ -11,19 +11,14 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 
-from benchmarks.executors import Local
-from benchmarks.harness import perform_plan
 from benchmarks.registry import registry
-from benchmarks.specification import Limits
-from benchmarks.store import Store
-from benchmarks.suites import Suite, load_suite, manifest_of, run_specs, select_cells
-from benchmarks.tables import write_tables
+from benchmarks.run import plan_suite
+from benchmarks.suites import Suite, load_suite, select_cells
 from coartic import CONDITIONS, Robot, learn, reference
 from coartic.compiled import entry, inner, joint_chain
 from coartic.learner import METHOD_PREFIX, TRIALS, warm_up
@@ -76,11 +71,10 @@ def main() -> None:
 
 def _suite(suite: Suite, trials: int) -> tuple[float, float]:
     """Seconds for the whole suite: kernels on threads, and everything the harness does."""
-    chosen = select_cells(suite, registry())
-    planned = run_specs(chosen, runs=suite.runs, seed=0, trials=trials, limits=Limits(600.0))
+    plan = plan_suite(suite, trials=trials)
     work = [
         (spec.task, CONDITIONS[spec.method.removeprefix(METHOD_PREFIX)], spec.seed)
-        for _, spec in planned
+        for _, spec in plan.planned
     ]
     clock = time.perf_counter()
     runs = Parallel(n_jobs=-1, prefer="threads")(
@@ -88,12 +82,10 @@ def _suite(suite: Suite, trials: int) -> tuple[float, float]:
     )
     bare = time.perf_counter() - clock
     with tempfile.TemporaryDirectory() as folder:
-        store = Store(Path(folder))
         clock = time.perf_counter()
-        perform_plan([spec for _, spec in planned], store, Local())
-        records = write_tables(store, manifest_of(suite, suite.runs, 0, planned))
+        report = plan.perform(folder)
         harness = time.perf_counter() - clock
-    for run, record in zip(runs, records.values(), strict=True):
+    for run, record in zip(runs, report.records.values(), strict=True):
         if record.solution is None or record.solution.reward != run.reward:
             raise SystemExit(f"{record.run_id}: the two sides disagree")
     return bare, harness

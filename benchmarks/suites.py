@@ -17,9 +17,8 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
-from benchmarks.declaration import decapitalised
 from benchmarks.provenance import surroundings
 from benchmarks.registry import Entry, Registry, unknown
 from benchmarks.specification import UNLIMITED, Limits, RunSpec
@@ -38,7 +37,6 @@ from coartic.inputs import (
     MOST_RUNS,
     MOST_SECONDS,
     MOST_TRIALS,
-    brief,
     brief_value,
     problems,
     read_toml,
@@ -224,15 +222,8 @@ def _read(path: Path) -> Suite:
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
-        details = error.errors(include_url=False)
-        raise CoarticError(problems(str(path), details, _explain)) from None
-
-
-def _explain(detail: ErrorDetails) -> str:
-    key = ".".join(brief(str(part)) for part in detail["loc"])
-    if detail["type"] == "string_pattern_mismatch":
-        return f"{key} is {brief_value(detail['input'])}; use letters, digits, '.', '_' and '-'"
-    return f"{key}: {decapitalised(detail['msg'])} (found {brief_value(detail['input'])})"
+        keys = [*Suite.model_fields, *_Block.model_fields, *_Move.model_fields]
+        raise CoarticError(problems(str(path), error, keys)) from None
 
 
 def select_cells(
@@ -252,18 +243,12 @@ def select_cells(
     does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
     by one name, and where nothing is left to run.
     """
-    methods = [
-        f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name for name in methods
-    ]
-    for name in methods:
-        if name not in known:
-            raise unknown("method", name, known)
+    methods = [_full_name(name, known) for name in methods]
     own = _own_tasks(task_files)
     _check_size(suite, known, own)
     cells = [cell for block in suite.cells for cell in _block_cells(suite, block, known, own)]
     added, refused = _added_cells(cells, known, methods, own)
     cells = distinct([*cells, *added])
-
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
     for name in tasks:
         if name not in known_tasks:
@@ -282,6 +267,14 @@ def select_cells(
         what = f"task {idle[0]!r}" if idle else "what was asked for"
         raise CoarticError(f"no method to run on {what}: {why}.")
     return chosen
+
+
+def _full_name(name: str, known: Registry) -> str:
+    """The id of a method; a condition of the learner goes by its own name as well."""
+    name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
+    if name not in known:
+        raise unknown("method", name, known)
+    return name
 
 
 def _own_tasks(paths: Iterable[Path]) -> dict[str, Task]:

@@ -5,18 +5,22 @@ Coarticulation in Motor Skill Acquisition*, and everything its alternatives shar
 with it: robot, tasks, movement, corrective process, execution and scoring.
 """
 
-from coartic.corrective import Correction, correct
-from coartic.errors import CoarticError, NotApplicableError, TaskError
-from coartic.exploration import CONDITIONS, VARIANTS, ExplorationCondition
-from coartic.frames import learning_frame, runs_frame, solutions_frame
-from coartic.initial import corrective_trial, hand_sequences, initial_hands
-from coartic.learner import Counters, LearningRun, learn, learn_many
-from coartic.model import PAPER, MotionModel
-from coartic.movement import MoveResult, move
-from coartic.robot import Arm, Hand, Robot
-from coartic.solution import Execution, Movement, execute
-from coartic.task import Provenance, Start, Task, builtin_tasks, load_task, parse_task
-from coartic.trajectory import Trajectory, trajectory
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from coartic.corrective import Correction, correct
+    from coartic.errors import CoarticError, NotApplicableError, TaskError
+    from coartic.exploration import CONDITIONS, VARIANTS, ExplorationCondition
+    from coartic.frames import learning_frame, runs_frame, solutions_frame
+    from coartic.initial import corrective_trial, hand_sequences, initial_hands
+    from coartic.learner import Counters, LearningRun, learn, learn_many
+    from coartic.model import PAPER, MotionModel
+    from coartic.movement import MoveResult, move
+    from coartic.robot import Arm, Hand, Robot
+    from coartic.solution import Execution, Movement, execute
+    from coartic.task import Provenance, Start, Task, builtin_tasks, load_task, parse_task
+    from coartic.ticks import Trajectory, trajectory
 
 __version__ = "0.1.0"
 
@@ -58,3 +62,31 @@ __all__ = [
     "solutions_frame",
     "trajectory",
 ]
+
+_HOMES = {
+    "corrective": ("Correction", "correct"),
+    "errors": ("CoarticError", "NotApplicableError", "TaskError"),
+    "exploration": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
+    "frames": ("learning_frame", "runs_frame", "solutions_frame"),
+    "initial": ("corrective_trial", "hand_sequences", "initial_hands"),
+    "learner": ("Counters", "LearningRun", "learn", "learn_many"),
+    "model": ("PAPER", "MotionModel"),
+    "movement": ("MoveResult", "move"),
+    "robot": ("Arm", "Hand", "Robot"),
+    "solution": ("Execution", "Movement", "execute"),
+    "task": ("Provenance", "Start", "Task", "builtin_tasks", "load_task", "parse_task"),
+    "ticks": ("Trajectory", "trajectory"),
+}
+_HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for, when it is: the compiler takes a while, and few need it."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

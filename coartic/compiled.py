@@ -31,7 +31,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 _PRESENTATION = {
     "__init__.py",
     "__main__.py",
-    "cli.py",
     "files.py",
     "frames.py",
     "inputs.py",
@@ -39,7 +38,7 @@ _PRESENTATION = {
     "reference.py",
     "tables.py",
     "text.py",
-    "trajectory.py",
+    "ticks.py",
 }
 
 

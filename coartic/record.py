@@ -30,7 +30,7 @@ from pydantic import (
 )
 
 from coartic.errors import CoarticError, IncompleteError, SolutionError
-from coartic.inputs import MOST_BYTES, read_bytes
+from coartic.inputs import MOST_BYTES, problems_inline, read_bytes
 from coartic.learner import METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
@@ -447,7 +447,7 @@ def decode(data: bytes, source: Path) -> Record:
     try:
         return Record.model_validate_json(body)
     except ValidationError as error:
-        raise RecordError(f"{source}: is damaged: {problems(error)}") from None
+        raise RecordError(f"{source}: is damaged: {problems_inline(error)}") from None
 
 
 def read_record(path: Path) -> Record:
@@ -459,15 +459,3 @@ def read_record(path: Path) -> Record:
     if record.run_id != path.stem:
         raise RecordError(f"{path}: holds the record of run {record.run_id}")
     return record
-
-
-def problems(error: ValidationError, most: int = 3) -> str:
-    """What is wrong with stored data, as part of a sentence."""
-    found = [
-        f"{'.'.join(map(str, detail['loc'])) or 'the whole'}: "
-        + detail["msg"][:1].lower()
-        + detail["msg"][1:]
-        for detail in error.errors(include_url=False, include_input=False)
-    ]
-    more = f" and {len(found) - most} more" if len(found) > most else ""
-    return "; ".join(found[:most]) + more

@@ -7,7 +7,6 @@ the key and what would be right.
 
 from __future__ import annotations
 
-import difflib
 import math
 from functools import cache, cached_property
 from pathlib import Path
@@ -25,10 +24,10 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import TaskError
-from coartic.inputs import brief, brief_value, problems, read_toml
+from coartic.inputs import brief_value, key_of, problems, read_toml
 from coartic.model import PAPER
 from coartic.robot import HANDS, LARGEST, MOST_LINKS, Array, Finite, Hand, Length, Robot
-from coartic.text import Line
+from coartic.text import Line, did_you_mean
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
@@ -215,7 +214,7 @@ class Task(_Frozen):
     def _check_provenance(self) -> tuple[str, str] | None:
         for key in self.provenance:
             if key not in type(self).model_fields:
-                return f"provenance.{key}", f"is not a key of a task{_hint(key)}"
+                return f"provenance.{key}", f"is not a key of a task{did_you_mean(key, _keys())}"
         return None
 
 
@@ -233,8 +232,7 @@ def load_task(name_or_path: str | Path) -> Task:
         for task in _shipped():
             if task.name == name_or_path:
                 return task
-        close = difflib.get_close_matches(name_or_path, builtin_tasks(), n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else "."
+        hint = did_you_mean(name_or_path, builtin_tasks()) or "."
         raise TaskError(
             f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
             "A task file's name ends in .toml."
@@ -260,84 +258,28 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        raise TaskError(problems(source, _causes(error), _explain)) from None
+        raise TaskError(problems(source, error, _keys(), _explain)) from None
 
 
-def _causes(error: ValidationError) -> list[ErrorDetails]:
-    """The errors, without a list counted too short because of its bad entries."""
-    details = error.errors()
-    return [
-        detail
-        for detail in details
-        if detail["type"] != "too_short"
-        or not any(
-            other["loc"] != detail["loc"] and other["loc"][: len(detail["loc"])] == detail["loc"]
-            for other in details
-        )
-    ]
+def _keys() -> list[str]:
+    """All keys of a task file, whatever table they belong to."""
+    robot = ("left_links", "right_links", "left_shoulder", "right_shoulder", "base_size")
+    return [*Task.model_fields, *Start.model_fields, *robot, *Provenance.model_fields]
 
 
-def _hint(key: str) -> str:
-    known = [*Task.model_fields, *Start.model_fields, "left_links", "right_links"]
-    known += ["left_shoulder", "right_shoulder", "base_size", *Provenance.model_fields]
-    close = difflib.get_close_matches(key, known, n=1)
-    return f"; did you mean {close[0]!r}?" if close else ""
-
-
-def _key(location: tuple[int | str, ...]) -> str:
-    text = ""
-    for part in location:
-        name = brief(str(part))
-        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
-    return text or "the file"
-
-
-def _explain(detail: ErrorDetails) -> str:
-    """One sentence for one validation error."""
-    context = detail.get("ctx", {})
-    if detail["type"] == "task":
-        return f"{context['key']} {context['text']}"
-    key, value = _key(detail["loc"]), detail["input"]
-    shown = brief_value(value)
+def _explain(detail: ErrorDetails) -> str | None:
+    """In the words of a task, where it has some of its own."""
+    context, key = detail.get("ctx", {}), key_of(detail["loc"])
     match detail["type"]:
-        case "missing":
-            return f"{key} is missing"
-        case "extra_forbidden" | "unexpected_keyword_argument":
-            last = str(detail["loc"][-1])
-            table = str(detail["loc"][0])
-            if len(detail["loc"]) > 1 and last in Task.model_fields:
+        case "task":
+            return f"{context['key']} {context['text']}"
+        case "extra_forbidden" | "unexpected_keyword_argument" if len(detail["loc"]) > 1:
+            table, last = str(detail["loc"][0]), str(detail["loc"][-1])
+            if last in Task.model_fields:
                 return f"{key} is an unknown key; {last!r} belongs above the line [{table}]"
-            return f"{key} is an unknown key{_hint(last)}"
-        case "finite_number":
-            return f"{key} is {shown}; it must be a finite number"
-        case "float_type":
-            return f"{key} is {shown} ({type(value).__name__}); it must be a number"
-        case "greater_than":
-            return f"{key} is {shown}; it must be greater than 0"
         case "greater_than_equal" | "less_than_equal":
+            shown = brief_value(detail["input"])
             return f"{key} is {shown}; its size must be at most {LARGEST:g}"
-        case "literal_error":
-            return f"{key} is {shown}; it must be {context['expected']}"
-        case "string_type":
-            return f"{key} is {shown} ({type(value).__name__}); it must be a text"
-        case "string_pattern_mismatch":
-            return f"{key} is {shown}; use letters, digits, '.', '_' and '-' only"
-        case "string_too_long":
-            return f"{key} has {len(value)} characters; it takes {context['max_length']}"
-        case "not_plain":
-            return f"{key} {detail['msg']}"
         case "too_short" if key == "goals":
             return "goals is empty; a task needs at least one goal"
-        case "too_short":
-            return f"{key} has too few entries; it needs at least {context['min_length']}"
-        case "too_long":
-            return (
-                f"{key} has {context['actual_length']} entries; it takes {context['max_length']}"
-            )
-        case "tuple_type":
-            return f"{key} is {shown} ({type(value).__name__}); it must be a list"
-        case "model_type" | "model_attributes_type" | "dataclass_type" | "dict_type":
-            return f"{key} is {shown}; it must be a table"
-        case _:
-            message = detail["msg"]
-            return f"{key}: {message[0].lower()}{message[1:]} (found {shown})"
+    return None

@@ -8,11 +8,13 @@ through :func:`one_line` wherever it comes from: each language escapes its own m
 
 from __future__ import annotations
 
+import difflib
 import json
 import os
 import re
 import shlex
 import unicodedata
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -64,6 +66,17 @@ def json_text(content: Any, *, indent: int | None = None, allow_nan: bool = True
         return match[0] if _prints(match[0]) or match[0] == "\n" else json.dumps(match[0])[1:-1]
 
     return _DOUBTFUL.sub(shown, text)
+
+
+def counted(count: int, thing: str) -> str:
+    """``1 run``, ``2 runs``."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """``; did you mean 'a'?`` with the known name that is nearest; empty where none is near."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def shell_line(*arguments: str | Path) -> str:

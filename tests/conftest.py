@@ -3,10 +3,11 @@
 import os
 
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 import analysis.report.build
-from analysis.study import Study
+from analysis import load
 from tests.support.reports import SVG
 from tests.support.suites import run_and_write, traced_cells, with_environment
 
@@ -29,6 +30,28 @@ def undrawn(monkeypatch):
 @pytest.fixture(scope="session")
 def traced(tmp_path_factory):
     """A results folder that nobody writes into: the paper's cells beside other methods."""
-    folder = tmp_path_factory.mktemp("traces") / "results"
-    run_and_write(folder, traced_cells(), runs=4, trials=150)
-    return Study(with_environment(folder))
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:  # the first worker makes it for all
+        shared = shared.parent
+    folder = shared / "traced" / "results"
+    with FileLock(shared / "traced.lock"):
+        if not (shared / "traced.made").exists():
+            run_and_write(folder, traced_cells(), runs=4, trials=150)
+            with_environment(folder)
+            (shared / "traced.made").touch()
+    return load(folder)
+
+
+LONGEST = (
+    "tests/attacks/test_attacks.py",
+    "tests/test_attack_inputs.py",
+    "tests/test_conformance.py",
+    "tests/test_sandbox.py",
+)
+"""Modules that begin, so that no worker is left with one of them alone at the end."""
+
+
+def pytest_collection_modifyitems(items):
+    """The modules that take longest, then the others."""
+    rank = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))

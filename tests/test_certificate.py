@@ -106,11 +106,11 @@ def test_a_box_around_one_path_bounds_it_tightly():
     assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(bound, abs=1e-4)
 
 
-@pytest.mark.parametrize(("name", "ticks"), [("ascending", 292), ("descending", 304)])
-def test_optima_of_the_one_armed_tasks_are_proven(name, ticks):
-    found = certify(load_task(name), ticks, still=True, model=PAPER, most_nodes=3000)
+def test_the_optimum_of_a_one_armed_task_is_proven():
+    """That of the other one is proven by the method that asks for proofs, in test_optimum."""
+    found = certify(load_task("ascending"), 292, still=True, model=PAPER, most_nodes=3000)
     assert found.proven
-    assert found.ticks == ticks
+    assert found.ticks == 292
     assert found.open_nodes == 0
 
 
@@ -125,7 +125,7 @@ def test_nothing_false_is_proven():
 def test_bounds_only_grow_with_the_nodes():
     bounds = [
         certify(load_task("two-armed-1"), 465, still=False, model=PAPER, most_nodes=nodes).ticks
-        for nodes in (60, 300, 900)
+        for nodes in (60, 300)
     ]
     assert bounds == sorted(bounds)
     assert bounds[0] > 400

@@ -5,32 +5,29 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from analysis.claims import (
     CLAIMS,
     Claim,
     Finding,
     MissingError,
-    beyond,
-    claims_frame,
-    claims_page,
     general,
     judge,
 )
+from analysis.claims.judges.presence import REPRESENTATIVES
 from analysis.claims.judges.reach import shortest_reach
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.claims import claims_document
 from analysis.results.folder import Results
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import Inference, bootstrap_test, mean
 from analysis.study import Study
-from analysis.table import interval
-from benchmarks.registry import registry
+from analysis.words import interval
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
-from coartic.cli import app
-from tests.support.made_up import manifest_for, row
+from tests.support.made_up import MadeUp, manifest_for, row
 from tests.support.strategies import changed
-from tests.support.suites import run_and_write
+from tests.support.suites import KNOWN, run_and_write
 
 NOTHING = Results(None, manifest_for([]), pd.DataFrame(), pd.DataFrame())
 
@@ -470,14 +467,13 @@ def test_judges_beside_planted_plans(claim, rows, verdict, tmp_path):
         assert judged.verdict == verdict, judged.evidence
 
 
-def with_paths(results, paths):
+def with_paths(results, paths, **parts):
     """A study whose solutions are planted: runs by task and label."""
-    study = Study(results)
-    study.__dict__["trajectories"] = {
+    trajectories = {
         (task, label): Trajectories(load_task(task), label, "", tuple(runs))
         for (task, label), runs in paths.items()
     }
-    return study
+    return MadeUp(results, trajectories=trajectories, **parts)
 
 
 def at(q):
@@ -543,6 +539,12 @@ def test_the_other_arm_gets_ready(part, verdict, tmp_path):
     assert "goal 2 +0.26" in judged.evidence.split("under EC4")[-1]  # where EC3's hand is
 
 
+def by_key(table):
+    """Values of a table's rows by column, by the rows' keys."""
+    names = [column.name for column in table.columns]
+    return {row.key: dict(zip(names, row.values, strict=True)) for row in table.rows}
+
+
 def signature(task, label, name, where="", value=0.0, **more):
     return {
         "task": task, "label": label, "signature": name, "where": where, "value": value,
@@ -565,7 +567,6 @@ def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrifice
     if ready is not None:
         rows += [row(label, -480, task=T1)]
         paths[T1, label] = [waiting(ready)]
-    study = with_paths(planted_results(rows, tmp_path), paths)
     goal = "goal 1, right hand, against descending"
     planted = [
         signature("ascending", label, "context distance", goal, apart),
@@ -576,12 +577,12 @@ def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrifice
         signature("ascending", label, "total against the same hands", "", -5.0),
         signature("ascending", label, "first subtask sacrificed", "", **sacrificed),
     ]
-    study.__dict__["signatures"] = pd.DataFrame(planted)
+    results = planted_results(rows, tmp_path)
+    study = with_paths(results, paths, signatures=pd.DataFrame(planted))
     judged = verdict_of("shared-signatures", study)
-    (name,) = [name for name, *labels in beyond.REPRESENTATIVES if label in labels]
-    (found,) = [found for found in judged.table.rows if found[0] == name]
-    assert learned in {one for _, one, _ in beyond.REPRESENTATIVES}
-    return judged, dict(zip(judged.table.columns, found, strict=True))
+    (name,) = [name for name, *labels in REPRESENTATIVES if label in labels]
+    assert learned in {one for _, one, _ in REPRESENTATIVES}
+    return judged, by_key(judged.table)[name]
 
 
 PLAN = "trajectory-optimisation/path-length"
@@ -593,8 +594,8 @@ PLAN = "trajectory-optimisation/path-length"
 )
 def test_context_is_ten_steps_apart_and_no_chance(apart, p, says, tmp_path):
     _, found = shown(tmp_path, PLAN, 1, apart=apart, p=p, value=1.0)
-    assert found["context"].startswith(says)
-    assert found["motor-equivalent"].startswith(says)
+    assert (found["context"], found["context_distance"]) == (says, apart)
+    assert found["motor_equivalent"] == says
 
 
 @pytest.mark.parametrize(
@@ -608,14 +609,16 @@ def test_context_is_ten_steps_apart_and_no_chance(apart, p, says, tmp_path):
 )
 def test_a_sacrifice_is_one_of_most_runs(runs, sacrificed, says, tmp_path):
     """However long the first movement is in the mean."""
-    _, found = shown(tmp_path, "cma-es/bandit", runs, **sacrificed)
-    assert found["sacrifice (first, all)"] == f"{says}, +5.0, -5.0"
+    judged, found = shown(tmp_path, "cma-es/bandit", runs, **sacrificed)
+    names = ("sacrifice", "first_change", "total_change")
+    assert [found[name] for name in names] == [says, 5.0, -5.0]
+    assert f"sacrifice (first, all) {says}, +5.0, -5.0" in judged.rows
 
 
-@pytest.mark.parametrize(("ready", "says"), [(0.6, "yes"), (0.1, "no"), (None, "–")])
+@pytest.mark.parametrize(("ready", "says"), [(0.6, "yes"), (0.1, "no"), (None, None)])
 def test_preshaping_is_a_tenth_of_the_way(ready, says, tmp_path):
     judged, found = shown(tmp_path, PLAN, 1, value=1.0, ready=ready)
-    assert found["preshaping"].startswith(says)
+    assert found["preshaping"] == says
     if ready is None:
         assert "preshaping: not judged; " in judged.evidence
         assert "lead: not judged; turning: not judged" in judged.evidence
@@ -631,13 +634,18 @@ def test_learned_rewards_beside_the_printed_ones(tmp_path):
             entry = {**entry, "reward": shift + entry["reward"] + 670}
         rows.append(entry)
     study = Study(planted_results(rows, tmp_path))
-    table = verdict_of("learned-rewards-as-printed", study).table
-    found = {row[:3]: row for row in table.rows}
-    assert found[T1, "EC3", "all"][3:5] == ("-502.0 (20)", "-502.0 (20)")
-    assert found[T1, "EC3", "all"][-1] == "equivalent"
-    assert found[T1, "EC4", "all"][-1] == "different"
-    assert (T2, "EC4", "all") not in found  # not printed
-    assert (T1, "EC2", "RRRR") not in found  # these runs learned other hands
+    judged = verdict_of("learned-rewards-as-printed", study)
+    found = by_key(judged.table)
+    ec3 = found["two-armed-1 EC3 all"]
+    names = ("printed", "printed_runs", "ours", "our_runs")
+    assert [ec3[name] for name in names] == [-502, 20, -502, 20]
+    assert ec3["difference"].value == 0
+    assert ec3["difference"].low < 0 < ec3["difference"].high
+    assert ec3["verdict"] == "equivalent"
+    assert found["two-armed-1 EC4 all"]["verdict"] == "different"
+    assert "two-armed-2 EC4 all" not in found  # not printed
+    assert "two-armed-1 EC2 RRRR" not in found  # these runs learned other hands
+    assert "printed (runs) -502.0 (20), ours (runs) -502.0 (20)" in judged.rows
 
 
 def test_runs_of_other_hands_are_no_basis(tmp_path):
@@ -692,17 +700,13 @@ def test_context_is_more_than_the_spread_and_no_chance(apart, p, verdict, tmp_pa
         for task in ("ascending", "descending")
         for entry in learner(task, "EC1", MIDDLE, "RRR")
     ]
-    study = Study(planted_results(rows, tmp_path))
     goal = "goal 1, right hand, against descending"
-    study.__dict__["signatures"] = pd.DataFrame(
-        [
-            signature("ascending", "dual-process/EC1", name, goal, apart, p=p)
-            for name in (
-                "context distance", "context dependence", "motor-equivalent part",
-                "non-motor-equivalent part",
-            )
-        ]
-    )  # fmt: skip
+    parts = ("motor-equivalent part", "non-motor-equivalent part")
+    planted = [
+        signature("ascending", "dual-process/EC1", name, goal, apart, p=p)
+        for name in ("context distance", "context dependence", *parts)
+    ]
+    study = MadeUp(planted_results(rows, tmp_path), signatures=pd.DataFrame(planted))
     assert verdict_of("context", study).verdict == verdict
 
 
@@ -739,29 +743,31 @@ def test_no_spread_is_no_certainty():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    known = registry()
+def study(tmp_path_factory):
+    """The paper's cells as far as its claims need them, beside a plan and the initial solution."""
     cells = [
-        Cell(load_task(task), known[f"dual-process/{condition}"])
+        (task, f"dual-process/{condition}")
         for task, conditions in (
             ("ascending", ["EC1"]),
             ("descending", ["EC1"]),
-            ("two-armed-1", ["EC2", "EC3", "EC4"]),
-            ("two-armed-2", ["EC3", "EC4"]),
+            (T1, ["EC2", "EC3", "EC4"]),
+            (T2, ["EC3", "EC4"]),
         )
         for condition in conditions
     ]
-    cells.append(Cell(load_task("ascending"), known["trajectory-optimisation/squared-changes"]))
-    cells.append(Cell(load_task("descending"), known["trajectory-optimisation/squared-changes"]))
     cells += [
-        Cell(load_task(task), known["corrective-alone/given"])
+        (task, method)
+        for method in ("trajectory-optimisation/squared-changes", "corrective-alone/given")
         for task in ("ascending", "descending")
     ]
-    return run_and_write(tmp_path_factory.mktemp("claims"), cells, runs=4, trials=10_000)
+    planned = [Cell(load_task(task), KNOWN[method]) for task, method in cells]
+    results = run_and_write(tmp_path_factory.mktemp("claims"), planned, runs=4, trials=1500)
+    results.runs["trials"] = results.runs.trials.replace(1500, 10_000)  # as long as the paper's
+    return Study(results)
 
 
-def test_the_register_on_runs(folder):
-    judged = {entry.claim.id: entry for entry in judge(Study(folder))}
+def test_the_register_on_runs(study):
+    judged = {entry.claim.id: entry for entry in study.judged}
     assert len(judged) == len(CLAIMS)
     # Few runs, yet these are never in doubt.
     for name in ("first-movement-sacrificed", "ec3-beats-exhaustive"):
@@ -772,37 +778,87 @@ def test_the_register_on_runs(folder):
     assert "corrective-alone/given: first +0.0, all +0.0" in sacrificed.evidence
     assert "one-goal" not in sacrificed.evidence  # not in this folder
     assert len(sacrificed.run_ids) == 9
-    assert set(sacrificed.run_ids) <= set(folder.runs.run_id)
+    assert set(sacrificed.run_ids) <= set(study.runs.run_id)
     assert judged["distance-to-optimum"].verdict == "measured"
-    assert judged["distance-to-optimum"].table.rows[0][:3] == ("ascending", "EC1", "-292")
-    signatures = {row[0]: row[1:] for row in judged["shared-signatures"].table.rows}
-    assert set(signatures) == {"learner", "corrective alone", "least squared changes"}
-    assert signatures["learner"][1].startswith("yes")
-    assert signatures["corrective alone"][:3] == ("-319.0", "no, 0.00", "no, +0.0, +0.0")
-    spent = {row[0]: row[1:] for row in judged["computation"].table.rows}
-    assert set(spent) >= {"dual-process/EC3", "corrective-alone/given"}
-    assert spent["dual-process/EC3"][:3] == ("AT", "–", "–")
-    assert spent["corrective-alone/given"][1].endswith(" (-319.0)")
-    reached = {row[0]: row[2] for row in judged["reward-by-experience"].table.rows}
-    assert reached["corrective-alone/given"] == "0/1, never (-319.0)"
     # What was not run is not judged.
     for name in (
-        "less-experience-two-armed", "resembles-jerk", "beats-inaccurate-one-armed", "proposals",
-    ):  # fmt: skip
+        "less-experience-two-armed",
+        "resembles-jerk",
+        "beats-inaccurate-one-armed",
+        "proposals",
+    ):
         assert judged[name].verdict == "cannot tell"
         assert judged[name].evidence.startswith("not judged: this folder has no runs of")
     assert judged["resembles-squared-changes"].run_ids
 
 
-def test_independent_claims_rest_on_printed_tasks(folder):
+def test_tables_of_evidence_are_recomputed_from_their_cells(study):
+    tables = {entry.claim.id: entry.table for entry in study.judged if entry.table}
+
+    def values(claim, key):
+        return by_key(tables[claim])[key]
+
+    def runs(line):
+        (cell,) = line.cells
+        return study.cells[cell].runs
+
+    gap = values("distance-to-optimum", "ascending EC1")
+    reward = study.cells["ascending", "dual-process/EC1"].runs.reward.astype(float).mean()
+    assert (gap["optimum_still"], gap["optimum_free"], gap["gap_free"]) == (-292, None, None)
+    assert gap["gap_still"].value == pytest.approx(-292 - reward)
+    assert gap["gap_share_still"] == pytest.approx((-292 - reward) / 292)
+    for column in tables["distance-to-optimum"].columns:
+        assert (column.other_arm == "still") == column.name.endswith("_still")
+    for line in tables["computation"].rows:
+        own, shown = runs(line), values("computation", line.key)
+        spent = own.forward_kinematics.median() + own.jacobians.median()
+        assert shown["evaluations"] == spent
+        assert shown["reward"] == pytest.approx(own.reward.astype(float).mean())
+        trials = own.trials.median()
+        assert shown["evaluations_a_trial"] == (spent / trials if trials > 1 else None)
+    given = values("reward-by-experience", "corrective-alone/given on ascending")
+    assert (given["reached_free"], given["median_trials_free"]) in [(0, None), (None, None)]
+    assert (given["runs"], given["reward"]) == (1, -319.0)
+    for line in tables["reward-by-experience"].rows:
+        shown, (task, _) = values("reward-by-experience", line.key), line.cells[0]
+        for arm in ("free", "still"):
+            if shown[f"reached_{arm}"] is not None:
+                near = 1.05 * study.optima[task, arm].reward
+                assert shown[f"reached_{arm}"] == (runs(line).reward >= near).sum()
+    signatures = by_key(tables["shared-signatures"])
+    assert set(signatures) == {"learner", "corrective alone", "least squared changes"}
+    assert signatures["learner"]["sacrifice"] == "yes"
+    alone = signatures["corrective alone"]
+    assert (alone["reward"], alone["context"], alone["context_distance"]) == (-319.0, "no", 0.0)
+    assert (alone["sacrifice"], alone["first_change"], alone["total_change"]) == ("no", 0.0, 0.0)
+
+
+def test_evidence_says_what_it_rests_on(study):
+    for entry in study.judged:
+        if entry.table is None:
+            continue
+        assert entry.table.id == f"evidence-{entry.claim.id}"
+        for column in entry.table.columns:
+            assert column.rests_on or column.kind == "text", (entry.claim.id, column.name)
+        for line in entry.table.rows:
+            for column, value in zip(entry.table.columns, line.values, strict=True):
+                cells = line.cells_by_column.get(column.name, line.cells)
+                runs = {run for cell in cells for run in study.run_ids[cell]}
+                assert runs <= set(entry.run_ids)
+                assert runs or value is None or column.rests_on == ()
+
+
+def test_independent_claims_rest_on_printed_tasks(study):
     """The others rest on a task whose goals were chosen for results like theirs."""
-    task_of = dict(zip(folder.runs.run_id, folder.runs.task, strict=True))
-    chosen = {name for name, task in folder.tasks.items() if task.reconstructed}
+    task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
+    chosen = {name for name, task in study.tasks.items() if task.reconstructed}
     assert chosen == {T1, T2}
     seen = 0
-    for entry in judge(Study(folder), [claim for claim in CLAIMS if claim.place]):
+    for entry in study.judged:
+        if not entry.claim.place:
+            continue
         tasks = {task_of[run] for run in entry.run_ids}
-        tasks |= {name for name in folder.tasks for text in entry.sources if text.endswith(name)}
+        tasks |= {name for name in study.tasks for text in entry.sources if text.endswith(name)}
         if tasks:
             seen += 1
             assert bool(tasks & chosen) == entry.claim.fitted, entry.claim.id
@@ -816,36 +872,29 @@ def test_a_place_can_be_found_by_a_few_words():
         assert "Methods" not in claim.place  # the paper's heading is Method
 
 
-def test_the_register_is_the_same_every_time(folder):
-    first, second = judge(Study(folder)), judge(Study(folder))
+def test_the_register_is_the_same_every_time(study):
+    first, second = study.judged, judge(Study(study.results))
     assert [(j.verdict, j.evidence) for j in first] == [(j.verdict, j.evidence) for j in second]
     np.testing.assert_array_equal([j.p for j in first], [j.p for j in second])
 
 
-def test_the_command_writes_page_and_frame(folder):
-    done = CliRunner().invoke(app, ["analyse", str(folder.folder)])
-    assert done.exit_code == 0, done.output
-    frame = pd.read_csv(folder.folder / "claims.csv")
-    assert list(frame.id) == [claim.id for claim in CLAIMS]
-    assert (folder.folder / "claims.md").read_text(encoding="utf-8").startswith("# Claims")
-
-
-def test_page_and_frame_hold_every_claim(folder):
-    judged = judge(Study(folder))
-    page, frame = claims_page(folder, judged), claims_frame(judged)
+def test_page_and_table_hold_every_claim(study):
+    page, found = markdown(claims_document(study)), study.claims
     assert page.startswith("# Claims")
-    assert list(frame.id) == [claim.id for claim in CLAIMS]
-    assert frame.id.is_unique
-    for entry, kept in zip(judged, frame.to_dict("records"), strict=True):
-        assert f"### {entry.claim.id}\n\n{entry.claim.statement}" in page
+    assert list(found.id) == [claim.id for claim in CLAIMS]
+    for entry, kept in zip(study.judged, found.to_dict("records"), strict=True):
+        heading = f"### {entry.claim.id}: {entry.verdict}{' †' * entry.claim.fitted}"
+        assert f"{heading}\n\n{entry.claim.statement}" in page
         assert entry.evidence in page
         assert kept["verdict"] == entry.verdict
         assert tuple(kept["runs"].split()) == entry.run_ids
         assert kept["evidence"].startswith(entry.evidence)
-    assert not any(run in page for run in folder.runs.run_id)
-    paper = [entry for entry in judged if entry.claim.place]
+    assert not any(run in page for run in study.runs.run_id)
+    paper = [entry for entry in study.judged if entry.claim.place]
     independent = [entry for entry in paper if not entry.claim.fitted]
     supported = sum(entry.verdict == "supported" for entry in independent)
-    assert f"**Independent tests**: {len(independent)} claims, {supported} supported" in page
+    counts = f"{len(independent)} claims of the paper, independent tests: {supported} supported"
+    assert counts in page
     sections = [line[3:] for line in page.splitlines() if line.startswith("## ")]
-    assert sections == ["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
+    groups = ["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
+    assert sections == ["Verdicts", *groups]

@@ -1,6 +1,7 @@
 """The command line as a user meets it."""
 
 import json
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -8,12 +9,13 @@ from pathlib import Path
 
 import pandas as pd
 
+from benchmarks import executors
 from benchmarks.store import Store
 from coartic import __version__
 from coartic.files import LISTING
 from coartic.record import run_seed
 from tests.support.commands import call
-from tests.support.suites import BROKEN, ROOT
+from tests.support.suites import BROKEN, ROOT, InProcess
 
 from .attacks.inputs import GOOD
 
@@ -51,7 +53,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     code, text, error = call(monkeypatch, capsys, *command)
     assert code == 0
     assert "14 runs: 14 were there, 0 done in" in text
-    assert "14 of 14 runs are already there" in error
+    assert "already there: 14 of 14 runs" in error
     assert tables == {path: path.read_bytes() for path in out.glob("*.parquet")}
     # A larger one does what is missing; a damaged record is reported and done again.
     record = next(iter(out.glob("records/*.json")))
@@ -80,8 +82,6 @@ def test_run_own_task(monkeypatch, capsys, tmp_path):
 
 
 def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
-    from benchmarks import executors
-
     asked = []
     real = executors.Local
 
@@ -159,6 +159,34 @@ def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):
     assert code == 1
     assert "2 runs of ascending x test/dies are crashed: the worker process ended" in text
     assert "2 failed" in text
+
+
+def test_an_interrupt_that_gets_lost_is_raised_again(monkeypatch, capsys, tmp_path):
+    """What a signal raises in a destructor, Python drops; the run that was done is kept."""
+
+    class Fragile:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    class Interrupted(InProcess):
+        def perform(self, jobs):
+            for answer in super().perform(jobs):
+                Fragile()
+                yield answer
+
+    dropped = []
+    monkeypatch.setattr(executors, "Local", lambda jobs: Interrupted())
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: dropped.append(lost.exc_type))
+    before = signal.getsignal(signal.SIGINT)
+    code, _, error = call(
+        monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 3, "--trials", 2,
+        "--out", tmp_path,
+    )  # fmt: skip
+    assert dropped == [KeyboardInterrupt]
+    assert code == 130
+    assert f"interrupted; 1 run done now is kept in {tmp_path}" in error
+    assert len(list(tmp_path.glob("records/*.json"))) == 1
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_trial_budget(monkeypatch, capsys, tmp_path):
@@ -319,3 +347,35 @@ def test_analyse(monkeypatch, capsys, tmp_path):
     code, _, error = call(monkeypatch, capsys, "analyse", tmp_path)
     assert code == 2
     assert "not a results folder" in error
+
+
+def completed(monkeypatch, capsys, *words):
+    """What a shell offers for the last of these words."""
+    monkeypatch.setenv("_COARTIC_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", " ".join(["coartic", *words]))
+    monkeypatch.setenv("COMP_CWORD", str(len(words)))
+    code, text, _ = call(monkeypatch, capsys)
+    assert code == 0
+    return text.split()
+
+
+def test_completion(monkeypatch, capsys):
+    assert completed(monkeypatch, capsys, "r") == ["run", "reproduce", "report"]
+    assert completed(monkeypatch, capsys, "run", "p") == ["paper"]
+    assert completed(monkeypatch, capsys, "run", "paper", "--tr") == ["--trials", "--trial-budget"]
+    command = ("run", "paper", "--out", "x")
+    offered = completed(monkeypatch, capsys, *command, "--tasks", "ascending,d")
+    assert offered == ["ascending,descending"]
+    offered = completed(monkeypatch, capsys, *command, "--methods", "EC")
+    assert {"EC1", "EC4"} <= set(offered)
+    offered = completed(monkeypatch, capsys, *command, "--methods", "corr")
+    assert offered[0].startswith("corrective-alone/")
+
+
+def test_completion_is_offered_where_the_shell_is_not_known(monkeypatch, capsys):
+    code, text, _ = call(monkeypatch, capsys, "--show-completion")
+    assert code in (0, 1)  # by the shell around the tests
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    code, text, error = call(monkeypatch, capsys, "--show-completion", "zsh")
+    assert (code, error) == (0, "")
+    assert "_COARTIC_COMPLETE=complete_zsh" in text

@@ -1,11 +1,10 @@
 """The comparison with the paper: its statistics against independent ones."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from scipy import stats
 
-from analysis.comparisons.paper import Comparison, Table, compare
+from analysis.comparisons.paper import paper_rows, sequence_rows
 from analysis.markup import words
 from analysis.published import (
     Summary,
@@ -14,10 +13,27 @@ from analysis.published import (
     published_exhaustive,
     published_initial,
 )
+from analysis.report.comparison import comparison_document, notes_of
+from analysis.report.formats.markdown import markdown
+from analysis.report.tables import published_table, sequences_table
+from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import load_suite, select_cells
-from coartic import load_task
-from tests.support.made_up import fake_results, manifest_for
+from tests.support.made_up import fake_results
+
+MIXED = {
+    "run": [0, 1, 2],
+    "status": ["ok", "ok", "infeasible"],
+    "reason": ["", "", "planted"],
+    "reward": [-520, -610, None],
+    "hands": ["RRLR", "RRRR", None],
+    "initial_reward": [-671, -671, None],
+}
+
+
+def rows_of(table):
+    names = [column.name for column in table.columns]
+    return [dict(zip(names, row.values, strict=True)) for row in table.rows]
 
 
 def test_published_numbers():
@@ -48,34 +64,56 @@ def test_pooling_groups_gives_mean_and_sd_of_all():
     assert summary.derived
 
 
-def test_cells_and_sequences(tmp_path):
-    page = compare(
-        fake_results(
-            tmp_path,
-            {
-                "run": [0, 1, 2],
-                "status": ["ok", "ok", "infeasible"],
-                "reason": ["", "", "planted"],
-                "reward": [-520, -610, None],
-                "hands": ["RRLR", "RRRR", None],
-                "initial_reward": [-671, -671, None],
-            },
-        )
-    )
-    cells, sequences, methods = page.tables
-    assert methods.title.startswith("two-armed-1 †: all methods; optimum")
-    row = dict(zip(cells.columns, cells.rows[0], strict=True))
-    assert row["published"] == "-560.0 ± 47.1 (20)*"
-    assert row["ours: mean ± SD (n)"] == "-565.0 ± 63.6 (2)"
-    assert row["initial (published)"] == "-671 (-675)"
-    assert row["hands: runs (published)"] == "RRLR 1, RRRR 1 (RRLR 11, RRRR 9)"
-    assert [r[2] for r in sequences.rows] == ["RRLR", "RRRR"]
-    assert any("1 runs of two-armed-1 x dual-process/EC2 are infeasible: planted" in note
-               for note in page.notes)  # fmt: skip
-    assert "commit abc4567 with changes" in page.to_markdown()
-    assert any("7 of 30000 trials failed" in note for note in page.notes)
+def test_a_cell_beside_the_papers(tmp_path):
+    study = Study(fake_results(tmp_path, MIXED))
+    (cell,) = paper_rows(study)
+    # Twenty values with the printed mean and SD, whichever.
+    theirs = stats.zscore(np.arange(20.0), ddof=1) * cell.paper.summary.sd - 560.05
+    welch = stats.ttest_ind([-520, -610], theirs, equal_var=False).confidence_interval()
+    assert cell.difference.estimate == pytest.approx(-4.95)
+    assert (cell.difference.low, cell.difference.high) == pytest.approx((welch.low, welch.high))
+    assert cell.margin == pytest.approx(5.6005)
+    assert cell.margin_of_gain == pytest.approx(5.6005 / (675 - 560.05))
+    (row,) = rows_of(published_table(study))
     assert row["task"] == "two-armed-1 †"
-    assert any(note.startswith("† Reconstructed: goals and start") for note in page.notes)
+    assert (row["published"].value, row["published"].sd) == pytest.approx((-560.05, 47.1), abs=0.1)
+    assert (row["published_runs"], row["published_as"]) == (20, "derived")
+    assert (row["ours"].value, row["runs"]) == (-565.0, 2)
+    assert row["ours"].sd == pytest.approx(90 / 2**0.5)
+    assert row["verdict"] == "undecided"
+    assert (row["initial"], row["published_initial"]) == (-671, -675)
+    assert (row["hands"], row["published_hands"]) == ("RRLR 1, RRRR 1", "RRLR 11, RRRR 9")
+
+
+def test_hand_sequences_beside_the_papers(tmp_path):
+    study = Study(fake_results(tmp_path, MIXED | {"hands": ["RRLR", "LLLR", None]}))
+    found = [(r.hands, r.published_runs, list(r.rewards)) for r in sequence_rows(study)]
+    # As the runs of both printed ones are printed, there was none of another.
+    assert found == [("RRLR", 11, [-520.0]), ("RRRR", 9, []), ("LLLR", 0, [-610.0])]
+    apart = [None if r.difference is None else r.difference.estimate for r in sequence_rows(study)]
+    assert apart == [0.0, None, None]
+    first = rows_of(sequences_table(study))[0]
+    assert (first["hands"], first["published"].value, first["ours"].value) == ("RRLR", -520, -520)
+
+
+def test_the_page_says_what_failed_and_where_it_was_made(tmp_path):
+    document = comparison_document(Study(fake_results(tmp_path, MIXED)))
+    page = markdown(document, tables="")
+    assert [section.id for section in document.sections] == ["paper", "methods", "limitations"]
+    assert "two-armed-1: 1 run is infeasible (planted): `dual-process/EC2` (1 of 3)" in page
+    assert "commit abc4567 with changes" in page
+    assert "*Reconstructed.* two-armed-1" in page
+    notes = notes_of(document)
+    assert len(notes) == len(set(notes))
+    assert not any(mark in note for note in notes for mark in ("`", "\\*"))
+
+
+def test_what_is_said_of_several_tables_is_said_once(tmp_path):
+    page = markdown(comparison_document(Study(fake_results(tmp_path, MIXED))), tables="")
+    lines = [line for line in page.splitlines() if len(line) > 40]
+    assert len(lines) == len(set(lines))
+    for start in ("Published: Shah", "Told: ", "† Reconstructed"):
+        assert sum(line.startswith(start) for line in lines) == 1
 
 
 def test_notes_for_a_terminal():
@@ -90,20 +128,18 @@ def test_hands_the_paper_does_not_print(tmp_path):
             "run": [0, 1], "status": ["ok", "ok"], "reason": ["", ""], "reward": [-330, -350],
             "hands": ["RLRR", "RRRR"], "initial_reward": [-357, -357],
         },
+        task="two-armed-2", method="dual-process/EC4",
     )  # fmt: skip
-    runs = results.runs.assign(task="two-armed-2", method="dual-process/EC4")
-    results = replace(results, manifest=manifest_for([load_task("two-armed-2")], runs), runs=runs)
-    sequences = compare(results).tables[1]
-    assert [row[2:5] for row in sequences.rows] == [("RLRR", "–", "–"), ("RRRR", "–", "–")]
+    study = Study(results)
+    found = [(r.hands, r.published, r.published_runs) for r in sequence_rows(study)]
+    assert found == [("RLRR", None, None), ("RRRR", None, None)]
+    (row,) = rows_of(published_table(study))
+    assert row["published_as"] == "not printed, higher than EC3"
+    assert row["verdict"] is row["margin"] is row["published_hands"] is None
 
 
 def test_no_run_at_all(tmp_path):
     columns = {"status": ["crashed"], "reason": ["x"], "run": [0]}
     nothing = {"reward": [None], "hands": [None], "initial_reward": [None]}
-    cells = compare(fake_results(tmp_path, columns | nothing)).tables[0]
-    assert cells.rows[0][3:5] == ("– (0)", "–")
-
-
-def test_markdown():
-    page = Comparison("T", (Table("A", ("x", "y"), (("1", "a|b"),)),), ("note",)).to_markdown()
-    assert page == "# T\n\n## A\n\n| x | y |\n| --- | --- |\n| 1 | a\\|b |\n\n## Notes\n\n- note\n"
+    (row,) = rows_of(published_table(Study(fake_results(tmp_path, columns | nothing))))
+    assert (row["ours"], row["runs"], row["difference"], row["verdict"]) == (None, 0, None, None)

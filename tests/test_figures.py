@@ -10,9 +10,10 @@ import pytest
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from analysis.figures import all_figures
+from analysis.figures import REGISTER, Figures, register
 from analysis.figures.bars import bars, stars
 from analysis.figures.configurations import (
+    PAPER,
     common_sequences,
     configurations,
     paper_configurations,
@@ -30,10 +31,12 @@ from analysis.figures.style import RC, amount, looks, number, on
 from analysis.figures.svg import compact, relative
 from analysis.figures.tasks import tasks_plot
 from analysis.methods import METHODS, short_name
+from analysis.published import TRIALS
 from analysis.study import Study
 from benchmarks.suites import load_suite, select_cells
 from coartic import CoarticError, corrective_trial, execute, load_task
 from coartic.frames import movements_from
+from tests.support.made_up import MadeUp
 from tests.support.suites import KNOWN, run_and_write
 
 
@@ -53,7 +56,7 @@ def alone(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def figures(study):
-    return all_figures(study)
+    return Figures(study)
 
 
 def test_every_figure_of_the_papers_cells(figures):
@@ -78,8 +81,40 @@ def test_every_figure_of_the_papers_cells(figures):
         assert plot.figure.get_size_inches()[1] * 25.4 <= 240
 
 
+def test_each_is_drawn_when_it_is_asked_for(study, monkeypatch):
+    drawn = []
+    rows = [
+        row._replace(draw=lambda *of, row=row, **by: drawn.append(row.name) or row.draw(*of, **by))
+        for row in REGISTER
+    ]
+    monkeypatch.setattr(register, "REGISTER", tuple(rows))
+    figures = Figures(study)
+    for _ in range(2):
+        assert figures["learned-reward"].axes
+        assert drawn == ["learned-reward"]
+    with pytest.raises(KeyError, match=f"no figure published: .*{TRIALS} trials"):
+        figures["published"]
+    assert "nothing" not in figures
+    assert drawn[:2] == ["learned-reward", "published"]
+    assert sorted(drawn) == sorted(row.name for row in REGISTER)
+    assert list(figures) == [plot.id for plot in figures.plots]
+
+
+def test_every_figure_has_its_row_and_its_section(figures):
+    rows = {plot.id: [row for row in REGISTER if plot.id.startswith(row.name)]
+            for plot in figures.plots}  # fmt: skip
+    for name, own in rows.items():
+        assert len(own) == 1, name
+        assert name in [plot.id for plot in figures.of_section(own[0].section)]
+
+
+def test_there_may_be_too_many_tasks(study):
+    with pytest.raises(KeyError, match="there would be one for each of 4 tasks"):
+        Figures(study, most_tasks=3)["signatures-ascending"]
+
+
 def test_a_folder_without_the_learner(alone):
-    figures = all_figures(alone)
+    figures = Figures(alone)
     assert {"learned-reward", "published", "recruitment", "context"} <= set(figures.skipped)
     assert any(name.startswith("configurations") for name in figures.skipped)
     assert all(figures.skipped.values())
@@ -124,8 +159,7 @@ def test_stars():
 
 
 def test_configurations_are_those_of_the_stored_run(study):
-    plots, skipped = paper_configurations(study)
-    assert not skipped
+    plots = [paper_configurations(name, study) for name in PAPER]
     solutions, paths = study.results.solutions(), study.results.paths()
     for plot in plots:
         for (name, run_id), rows in plot.data.groupby(["task", "run_id"]):
@@ -173,7 +207,7 @@ def test_the_typical_run(study):
 
 def test_a_row_for_each_common_hand_sequence(study):
     runs, several = study.results.runs, 0
-    for plot in paper_configurations(study)[0]:
+    for plot in [paper_configurations(name, study) for name in PAPER]:
         titles = [text.get_text() for text in plot.figure.texts]
         learned = plot.data[plot.data.run_id != ""].drop_duplicates("run_id")
         for (task, label), rows in learned.groupby(["task", "method"], sort=False):
@@ -207,7 +241,7 @@ def test_common_hand_sequences_are_a_fifth_of_the_runs(tmp_path):
 
 def test_any_methods_side_by_side(study):
     asked = ["dual-process/EC4", "dual-process/EC1"]
-    found = all_figures(study, methods=asked)
+    found = Figures(study, methods=asked)
     assert {"recruitment", "learning-curves", "frontier-trials", "signatures-two-armed-1"} <= {
         plot.id for plot in found.plots
     }
@@ -220,7 +254,7 @@ def test_any_methods_side_by_side(study):
     assert set(shown["frontier-trials"].method) == set(asked)
     assert "no runs on every one" in found.skipped["profiles"]
     with pytest.raises(CoarticError, match="no method 'dual-proces/EC4'; did you mean 'dual-pr"):
-        all_figures(study, methods=["dual-proces/EC4"])
+        Figures(study, methods=["dual-proces/EC4"])
 
 
 def test_learning_curves_against_a_loop(study):
@@ -283,11 +317,9 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
         ],
         ignore_index=True,
     )
-    of = Study(study.results)
-    of.__dict__["signatures"] = planted
-    of.__dict__["cells"] = study.cells | {
-        ("ascending", label): study.cells["ascending", "dual-process/EC1"] for label in labels
-    }
+    own = study.cells["ascending", "dual-process/EC1"]
+    cells = study.cells | {("ascending", label): own for label in labels}
+    of = MadeUp(study.results, signatures=planted, cells=cells)
     plot = context(of, methods=labels)
     data = plot.data.set_index("method").loc[labels]
     # Smallest of six times six, the next times five, and so on, never falling.

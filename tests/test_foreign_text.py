@@ -24,13 +24,13 @@ import analysis.study
 import benchmarks.registry
 import benchmarks.reproduce
 from analysis.citations import MethodSource, bibliography
-from analysis.comparisons.methods import methods_frame
-from analysis.comparisons.paper import compare
+from analysis.comparisons.methods import method_rows
 from analysis.comparisons.versions import compare_versions
 from analysis.figures.plot import svg_text
 from analysis.figures.tasks import tasks_plot
 from analysis.markup import code, escaped, markdown, markdown_text, words
 from analysis.report.build import build, write
+from analysis.report.comparison import comparison_document
 from analysis.report.document import Bullets, Column, DataTable, Document, Prose, Row, Section
 from analysis.report.formats.latex import latex_text
 from analysis.report.formats.markdown import markdown as to_markdown
@@ -283,7 +283,7 @@ def test_text_in_bibtex():
             [(EVIL, EVIL, False), ("{", "}}", False), (EVIL, "", False), ("a", "b\n@x", True)]
         )
     ]
-    ours = MethodSource(f"posture-based/{EVIL}", "", "", True)
+    ours = MethodSource("posture-based/one-goal", "", "", True)
     commit = {"id": EVIL, "dirty": False}
     text = bibliography([*own, ours], environment={"coartic": EVIL, "commit": commit})
     found = entries(text)
@@ -425,10 +425,10 @@ SIGN = "alert(1)</script>"  # of EVIL: it must be seen as what it is
 
 
 def test_comparison_page(hostile, monkeypatch):
-    frame = methods_frame(hostile).assign(beaten=1, corrections=2, told="G")
-    monkeypatch.setattr("analysis.comparisons.methods.methods_frame", lambda results: frame)
-    page = compare(hostile).to_markdown()
-    assert page.count("are better than the optimum") == len(frame)
+    rows = [replace(row, beaten=1, corrections=2, told="G") for row in method_rows(Study(hostile))]
+    monkeypatch.setattr("analysis.study.method_rows", lambda study: rows)
+    page = to_markdown(comparison_document(Study(hostile)), tables="")
+    assert page.count("are better than the optimum") == len(rows)
     words_alone(page)
     text = "".join(token.content for tokens in inlines(page) for token in tokens)
     assert text.count(SIGN) >= 5  # tasks, methods, variant, reason, suite, platform
@@ -528,7 +528,9 @@ def test_report_in_latex(report):
         text = path.read_text(encoding="utf-8")
         found = set(COMMANDS.findall(text))
         assert found <= ours, (path.name, found - ours)
-        assert set(re.findall(r"\\begin\{(\w+)\}", text)) <= {"table", "tabular", "longtable"}
+        assert set(re.findall(r"\\begin\{(\w+)\}", text)) <= {
+            *("table", "tabular", "tabularx", "xltabular"),
+        }
         assert balanced(text)
         assert "{evil}" not in text
         assert all(

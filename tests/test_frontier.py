@@ -27,6 +27,7 @@ from analysis.comparisons.frontier_page import (
 )
 from analysis.comparisons.progress import SPENDS, by_trial, progress
 from analysis.results.folder import Results
+from analysis.study import Study
 from coartic import load_task
 from coartic.tables import PlanLimits
 from tests.support.made_up import manifest_for, replanned
@@ -350,7 +351,7 @@ def test_a_locked_base_is_another_problem(tmp_path):
     results = folder(rows, tmp_path)
     for frame in (targets_frame, area_frame, anytime_frame, pareto_frame):
         assert set(frame(results).method) == {"free", "learner"}
-    assert of(pareto_frame(results), "free", "information").front.item()
+    assert of(pareto_frame(Study(results)), "free", "information").front.item()
 
 
 def test_both_optima_in_one_frame(tmp_path):
@@ -378,7 +379,7 @@ def test_the_page(tmp_path):
     rows += [run("p", reward=-466), run("none", [-900.0, -900.0])]
     results = folder(rows, tmp_path)
     frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
-    page = frontier_page(results, *frames, pareto_frame(results))
+    page = frontier_page(results, *frames, pareto_frame(Study(results)))
     for arm in ("free", "still"):
         for what in ("trials to come", "kinematics to come", "area under"):
             assert page.count(f"### two-armed-1: {what}") == 2
@@ -393,12 +394,12 @@ def test_a_page_has_no_empty_tables(tmp_path):
     rows = [run("m", [-600.0, -470.0], number=i, other_arm_travel=0.5) for i in range(3)]
     results = folder(rows, tmp_path)
     frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
-    page = frontier_page(results, *frames, pareto_frame(results))
+    page = frontier_page(results, *frames, pareto_frame(Study(results)))
     for block in page.split("\n\n"):
         assert not block.startswith("|") or len(block.splitlines()) > 2
     far = folder([run("m", [-900.0, -900.0], number=i) for i in range(3)], tmp_path)
     frames = [for_both_arms(frame, far) for frame in (targets_frame, area_frame)]
-    page = frontier_page(far, *frames, pareto_frame(far))
+    page = frontier_page(far, *frames, pareto_frame(Study(far)))
     assert "trials to come near" not in page
     assert "No run within the widest: m." in page
 
@@ -416,7 +417,7 @@ def test_an_optimum_by_search_alone_is_marked(tmp_path):
         content = {task.name: task.model_dump(mode="json")}
         results = replace(results, manifest=replanned(results.manifest, tasks=content))
         frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
-        assert words in frontier_page(results, *frames, pareto_frame(results))
+        assert words in frontier_page(results, *frames, pareto_frame(Study(results)))
 
 
 def test_medians_are_censored_at_the_least_end(tmp_path):
@@ -442,7 +443,7 @@ def test_a_front_is_as_sure_as_its_runs(tmp_path):
     least 6 in 42 of 64; ties are on the front."""
     rows = [run("noisy", reward=-500 + 12 * (i % 2), number=i) for i in range(6)]
     rows += [run("sure", reward=-494), run("worse", reward=-501)]
-    frame = pareto_frame(folder(rows, tmp_path))
+    frame = pareto_frame(Study(folder(rows, tmp_path)))
     kept = of(frame, "noisy", "information")
     assert kept.front.item()
     assert of(frame, "sure", "information").front.item()
@@ -461,7 +462,7 @@ def test_reward_and_spend_are_resampled_together(tmp_path):
         for i in range(3)
     ]
     rows += [run("point", reward=-490, forward_kinematics=110)]
-    frame = pareto_frame(folder(rows, tmp_path))
+    frame = pareto_frame(Study(folder(rows, tmp_path)))
     found = share(frame, "point", "forward_kinematics")
     draws = np.stack(np.meshgrid(*[range(3)] * 3), axis=-1).reshape(-1, 3)  # all 27 resamples
     mean, middle = draws.mean(axis=1), np.median(draws, axis=1)
@@ -476,7 +477,7 @@ def test_twins_stay_tied(tmp_path):
         for name in ("a", "b")
         for i in range(8)
     ]
-    frame = pareto_frame(folder(rows, tmp_path))
+    frame = pareto_frame(Study(folder(rows, tmp_path)))
     assert (frame.front_share == 1).all()
 
 
@@ -490,7 +491,7 @@ def test_times_that_are_about_the_same_are_ties(tmp_path):
     ]
     for row, ticks in zip(rows, (109, 100, 98, 119, 130), strict=True):
         row["forward_kinematics"] = ticks
-    frame = pareto_frame(folder(rows, tmp_path))
+    frame = pareto_frame(Study(folder(rows, tmp_path)))
     times = frame[frame.spend == "solve_s"].set_index("method").front
     assert set(times.index[times]) == {"best", "quicker", "slower twin"}
     counts = frame[frame.spend == "forward_kinematics"].set_index("method").front
@@ -502,7 +503,7 @@ def test_cold_runs_count_for_reward_but_not_for_time(tmp_path):
         run("m", reward=-480, number=i, warm=i > 0, solve_s=5.0 if i == 0 else 0.5)
         for i in range(4)
     ]
-    frame = pareto_frame(folder(rows, tmp_path))
+    frame = pareto_frame(Study(folder(rows, tmp_path)))
     assert of(frame, "m", "solve_s").amount.item() == 0.5
     # Where only the cold run is drawn there is no time: 1 of 256 resamples.
     assert 0.98 < share(frame, "m", "solve_s") < 1
@@ -537,7 +538,7 @@ def test_fronts(tmp_path):
         run("lucky", reward=-465, told="goals", forward_kinematics=1),
         run("lucky", told="goals", number=1, forward_kinematics=1),
     ]
-    frame = pareto_frame(folder(rows, tmp_path))
+    frame = pareto_frame(Study(folder(rows, tmp_path)))
     assert "lucky" not in set(frame.method)
     found = frame[frame.spend == "forward_kinematics"].set_index("method")
     assert set(found.index[found.front]) == {"cheap", "twin", "good"}

@@ -129,7 +129,7 @@ def test_mixed_versions(clean):
     assert "Mixed versions" not in dirty
     assert "`aaaaaaaaaaaa`" in dirty["Uncommitted changes"]
     assert (
-        "1 runs were made outside"
+        "1 run was made outside"
         in said(changed(clean, "commit", {rows[0]: pd.NA}))["Unknown commit"]
     )
     assert (

@@ -6,33 +6,37 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparisons.methods import TOLD, methods_frame, methods_notes, methods_tables
+from analysis.comparisons.methods import TOLD
+from analysis.report.tables import methods_table, reading_of_methods
 from analysis.results.folder import Results
-from analysis.results.optima import optima
+from analysis.study import Study
 from coartic import load_task
 from coartic.method import Information
 from tests.support.made_up import manifest_for, row
 from tests.support.strategies import changed
 
 
-def results(rows, tmp_path, task=None):
+def study_of(rows, tmp_path, task=None):
     task = task or load_task("two-armed-1")
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    return Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame())
+    return Study(Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame()))
+
+
+def shown(study):
+    """The one row of the table of the one task, by its columns' names."""
+    table = methods_table(study, *study.tasks)
+    (row,) = table.rows
+    return dict(zip([column.name for column in table.columns], row.values, strict=True))
 
 
 def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):
-    found = methods_frame(
-        results(
-            [
-                row("moving", -475, travel=0.3),
-                row("still", -500, run=0),
-                row("still", -510, run=1),
-                row("still", None, run=2, status="infeasible"),
-            ],
-            tmp_path,
-        )
-    ).set_index("method")
+    rows = [
+        row("moving", -475, travel=0.3),
+        row("still", -500, run=0),
+        row("still", -510, run=1),
+        row("still", None, run=2, status="infeasible"),
+    ]
+    found = study_of(rows, tmp_path).methods.set_index("method")
     assert found.loc["moving", "gap"] == 10
     assert np.isnan(found.loc["moving", "gap_still"])
     assert found.loc["still", "gap"] == 40
@@ -45,45 +49,49 @@ def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):
 
 
 def test_what_is_shown(tmp_path):
-    (table,) = methods_tables(results([row("m", -475, travel=0.3)], tmp_path))
-    assert table.title == (
-        "two-armed-1 †: all methods; optimum, by the other arm: "
-        "free -465 LRLR (proven), still -490 LRLR (proven)"
+    study = study_of([row("m", -475, travel=0.3, jacobians=0)], tmp_path)
+    assert methods_table(study, "two-armed-1").caption == (
+        "All methods on two-armed-1 †; optimum, by the other arm: "
+        "free −465 LRLR (proven), still −490 LRLR (proven)."
     )
-    shown = dict(zip(table.columns, table.rows[0], strict=True))
-    assert shown["told"] == "AT"
-    assert shown["reward: mean ± SD (n)"] == "-475 (1)"
-    assert shown["gap"] == "10 (2.2%)"
-    assert shown["kinematics"] == "1.23 M"
-    assert (shown["Jacobians"], shown["ticks"], shown["iterations"]) == ("950", "5 k", "–")
+    found = shown(study)
+    assert found["told"] == "AT"
+    assert (found["reward"].value, found["reward"].low, found["solved"]) == (-475, None, 1)
+    assert (found["gap"], found["gap_share"]) == (10, pytest.approx(10 / 465))
+    assert (found["forward_kinematics"], found["movement_ticks"]) == (1_234_567, 5000)
+    assert found["jacobians"] is None  # of what was not used nothing was spent
+    assert (found["hands"], found["other_arm"]) == ("LRLR", "moves")
 
 
 def test_a_reward_above_the_optimum_is_shouted(tmp_path):
-    folder = results([row("miracle", -464, travel=1.0)], tmp_path)
-    assert methods_frame(folder).beaten.sum() == 1
-    assert any("better than the optimum: it is not one" in note for note in methods_notes(folder))
-    folder = results([row("good", -465, travel=1.0)], tmp_path)
-    assert methods_frame(folder).beaten.sum() == 0
+    study = study_of([row("miracle", -464, travel=1.0)], tmp_path)
+    assert study.methods.beaten.sum() == 1
+    shouted = reading_of_methods(study)[0]
+    assert "better than the optimum: it is not one" in shouted
+    study = study_of([row("good", -465, travel=1.0)], tmp_path)
+    assert study.methods.beaten.sum() == 0
+    assert shouted not in reading_of_methods(study)
 
 
 def test_a_method_that_only_crashed_has_a_row(tmp_path):
     nothing = dict.fromkeys(("trials", "build_s", "solve_s", "jacobians", "hands"))
     rows = [row("m", None, status="crashed", **nothing)]
-    (table,) = methods_tables(results(rows, tmp_path))
-    assert table.rows[0][1:3] == ("– (0)", "–")
+    found = shown(study_of(rows, tmp_path))
+    assert (found["reward"], found["solved"], found["runs"]) == (None, 0, 1)
+    assert np.isnan(found["gap"])
 
 
 def test_times_are_of_warm_runs(tmp_path):
     rows = [row("m", -500, run=0, solve_s=9.0), row("m", -500, run=1, solve_s=0.2)]
-    assert methods_frame(results(rows, tmp_path)).solve_s.item() == 0.2
+    assert study_of(rows, tmp_path).methods.solve_s.item() == 0.2
     unmarked = [row("m", -500, run=1, solve_s=0.0, wall_s=0.7)]
-    assert methods_frame(results(unmarked, tmp_path)).solve_s.item() == 0.7
+    assert study_of(unmarked, tmp_path).methods.solve_s.item() == 0.7
 
 
 def test_a_task_of_the_users_own_has_the_optimum_of_its_own_runs(tmp_path):
     task = changed("two-armed-1", goals=[[2.1, 3.6], [4.4, 3.5]], initial_hands="RR", name="own")
     rows = [row("m", -400, task="own")]
-    assert methods_frame(results(rows, tmp_path, task)).gap.isna().all()
+    assert study_of(rows, tmp_path, task).methods.gap.isna().all()
     parameters = json.dumps({"other_arm": "still", "base": "task"})
     rows += [
         row("optimum/multistart", -390, task="own", parameters=parameters),
@@ -92,15 +100,15 @@ def test_a_task_of_the_users_own_has_the_optimum_of_its_own_runs(tmp_path):
         row("optimum/multistart", -350, task="own", run=1,
             parameters=json.dumps({"other_arm": "free", "base": "y"})),
     ]  # fmt: skip
-    folder = results(rows, tmp_path, task)
-    found = optima(folder)["own", "still"]
+    study = study_of(rows, tmp_path, task)
+    found = study.optima["own", "still"]
     assert (found.reward, found.bound, found.proven) == (-390, -380, False)
-    assert ("own", "free") not in optima(folder)
+    assert ("own", "free") not in study.optima
 
 
 def test_a_task_that_only_shares_a_name_has_no_gap(tmp_path):
     task = changed("two-armed-1", radius=0.2)
-    assert optima(results([row("m", -475)], tmp_path, task)) == {}
+    assert study_of([row("m", -475)], tmp_path, task).optima == {}
 
 
 def test_an_optimum_of_no_ticks_has_no_share(tmp_path):
@@ -108,23 +116,21 @@ def test_an_optimum_of_no_ticks_has_no_share(tmp_path):
     task = changed("two-armed-1", goals=[[0, 4.07]], initial_hands="R", name="there")
     parameters = json.dumps({"other_arm": "free", "base": "task"})
     rows = [row("optimum/multistart", 0, task="there", parameters=parameters)]
-    found = methods_frame(results(rows, tmp_path, task))
+    study = study_of(rows, tmp_path, task)
+    found = study.methods
     assert (found.gap.item(), np.isnan(found.gap_share.item())) == (0, True)
-    (table,) = methods_tables(results(rows, tmp_path, task))
-    assert table.rows[0][2].startswith("0")
+    assert (shown(study)["gap"], study.method_rows["there", "optimum/multistart"].gap) == (0, 0)
 
 
 def test_a_base_locked_by_a_parameter_has_no_gap(tmp_path):
     parameters = json.dumps({"other_arm": "free", "base": "y"})
-    found = methods_frame(
-        results([row("optimum/multistart", -500, parameters=parameters)], tmp_path)
-    )
-    assert found.gap.isna().all()
+    study = study_of([row("optimum/multistart", -500, parameters=parameters)], tmp_path)
+    assert study.methods.gap.isna().all()
 
 
 def test_a_still_arm_above_its_optimum_is_shouted_too(tmp_path):
-    folder = results([row("still", -480)], tmp_path)  # above -490, below -465
-    assert methods_frame(folder).beaten.sum() == 1
+    study = study_of([row("still", -480)], tmp_path)  # above -490, below -465
+    assert study.methods.beaten.sum() == 1
 
 
 def test_every_kind_of_information_has_a_letter():

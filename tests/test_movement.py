@@ -54,7 +54,7 @@ def assert_equals_every_step(
         position, np.array(target), arm, *map(float, goal), radius, stop_on_arrival, model, xs, ys
     )
     assert (fast.ticks, fast.hit) == (ticks, hit)
-    np.testing.assert_array_equal(fast.q, position)
+    assert (fast.q == position).all()
     return fast
 
 
@@ -81,14 +81,22 @@ def assert_same(fast, slow):
     assert fast.evaluations <= slow.evaluations
 
 
+def random_movements(rng, robot, hand, count):
+    """Movements, each with a goal that is anywhere, near its path, or near its end.
+
+    Shapes (count, dof), (count, dof), (count, 2).
+    """
+    q = rng.uniform(-3, 3, (count, robot.dof))
+    target = q + rng.normal(size=q.shape) * rng.choice([0.01, 0.1, 0.5], (count, 1))
+    place = rng.random((count, 1))
+    point = np.where(place < 0.7, q + place * (target - q), target)
+    spread = rng.choice([0.02, 0.1, 0.15, 1.0], (count, 1))
+    goals = robot.forward_kinematics(point, hand) + rng.normal(size=(count, 2)) * spread
+    return q, target, goals
+
+
 def random_movement(rng, robot, hand):
-    """A movement with a goal that is, in turn, anywhere, near its path, or near its end."""
-    q = rng.uniform(-3, 3, robot.dof)
-    target = q + rng.normal(size=robot.dof) * rng.choice([0.01, 0.1, 0.5])
-    place = rng.random()
-    point = q + place * (target - q) if place < 0.7 else target
-    spread = rng.choice([0.02, 0.1, 0.15, 1.0])
-    goal = robot.forward_kinematics(point, hand) + rng.normal(size=2) * spread
+    (q,), (target,), (goal,) = random_movements(rng, robot, hand, 1)
     return q, target, tuple(goal)
 
 
@@ -109,14 +117,15 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
     assert 200 < hits < 900  # both outcomes are well represented
 
 
-def test_equals_every_step_a_hundred_thousand_times():
+@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 40_000), (UNEVEN, 10_000)])
+@pytest.mark.parametrize("hand", HANDS)
+def test_equals_every_step_a_hundred_thousand_times(robot, count, hand):
     rng = np.random.default_rng(15)
-    for _ in range(100_000):
-        hand = HANDS[int(rng.integers(2))]
-        robot = ROBOT if rng.random() < 0.8 else UNEVEN
-        q, target, goal = random_movement(rng, robot, hand)
-        model = MotionModel(step=float(rng.choice([0.01, 0.003, 0.1])))
-        assert_equals_every_step(robot, q, target, hand, goal, 0.1, rng.random() < 0.5, model)
+    drawn = random_movements(rng, robot, hand, count)
+    models = [MotionModel(step=step) for step in (0.01, 0.003, 0.1)]
+    others = rng.integers(3, size=count), rng.random(count) < 0.5
+    for q, target, goal, model, stops in zip(*drawn, *others, strict=True):
+        assert_equals_every_step(robot, q, target, hand, goal, 0.1, stops, models[model])
 
 
 @settings(max_examples=300, deadline=None)

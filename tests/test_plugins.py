@@ -3,54 +3,64 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tomllib
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from benchmarks.registry import registry
-from coartic import CoarticError
+from benchmarks.suites import Cell, run_specs
+from coartic import CoarticError, load_task
+from tests.support.commands import call
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "tests" / "example_plugin"
 METHOD = EXAMPLE / "coartic_example" / "__init__.py"
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """The example package, installed by pip into a folder of its own."""
-    target = tmp_path_factory.mktemp("site")
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
-    source = tmp_path_factory.mktemp("source") / "plugin"
-    subprocess.run(["cp", "-r", EXAMPLE, source], check=True)
-    subprocess.run(
-        [*pip, "--no-build-isolation", "--target", str(target), str(source)], check=True
+@pytest.fixture
+def coartic(monkeypatch, capsys):
+    """The command line: exit code, standard output, standard error."""
+    monkeypatch.setenv("COLUMNS", "200")
+    return partial(call, monkeypatch, capsys)
+
+
+@pytest.fixture
+def installed(monkeypatch, tmp_path):
+    """The example package, where and as an installer would leave it."""
+    site = tmp_path / "site"
+    shutil.copytree(METHOD.parent, site / METHOD.parent.name)
+    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    about = site / f"{METHOD.parent.name}-{project['version']}.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
     )
-    return {**os.environ, "PYTHONPATH": str(target), "COLUMNS": "200"}
+    ((group, points),) = project["entry-points"].items()
+    lines = [f"[{group}]", *(f"{name} = {where}" for name, where in points.items())]
+    (about / "entry_points.txt").write_text("\n".join(lines))
+    monkeypatch.syspath_prepend(site)
 
 
-def coartic(*arguments, env=None):
-    return subprocess.run(
-        [sys.executable, "-m", "coartic", *map(str, arguments)],
-        capture_output=True, text=True, env=env, cwd=ROOT,
-    )  # fmt: skip
-
-
-def test_a_package_brings_a_method(installed, tmp_path):
-    listed = coartic("list", env=installed)
-    assert "nearest-hand" in listed.stdout
-    assert "(plug-in" in listed.stdout
-    checked = coartic("check", "nearest-hand", env=installed)
-    assert checked.returncode == 0, checked.stdout
-    assert "nearest-hand: 8 of 8 laws hold." in checked.stdout
+@pytest.mark.usefixtures("installed")
+def test_a_package_brings_a_method(coartic, tmp_path):
+    listed = coartic("list")[1]
+    assert "nearest-hand" in listed
+    assert "(plug-in" in listed
+    code, checked, _ = coartic("check", "nearest-hand")
+    assert code == 0, checked
+    assert "nearest-hand: 8 of 8 laws hold." in checked
     out = tmp_path / "out"
-    done = coartic(
+    code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", "--tasks", "shelf",
-        "--task-file", EXAMPLE / "shelf.toml", "--out", out, env=installed,
+        "--task-file", EXAMPLE / "shelf.toml", "--out", out,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert code == 0, error
     (run,) = pd.read_parquet(out / "runs.parquet").to_dict("records")
     assert (run["method"], run["task"], run["status"]) == ("nearest-hand", "shelf", "ok")
     assert run["told"] == "corrective process, forward kinematics, goals"
@@ -58,40 +68,40 @@ def test_a_package_brings_a_method(installed, tmp_path):
     assert run["forward_kinematics"] > run["jacobians"] > 0
 
 
-def test_a_file_brings_a_method(tmp_path):
+def test_a_file_brings_a_method(coartic, tmp_path):
     out = tmp_path / "out"
-    done = coartic(
+    code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", "--method-file", METHOD,
         "--tasks", "two-armed-1,two-armed-2", "--out", out,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert code == 0, error
     runs = pd.read_parquet(out / "runs.parquet")
     assert list(runs.status) == ["ok", "ok"]
     assert (runs.solution_corrections == 0).all()
     run_id = runs.run_id[0]
-    shown = coartic("show", run_id[:9], "--in", tmp_path)
-    assert '"nearest-hand"' in shown.stdout
-    assert f"coartic reproduce {run_id} --in {out} --method-file {METHOD}" in shown.stdout
+    shown = coartic("show", run_id[:9], "--in", tmp_path)[1]
+    assert '"nearest-hand"' in shown
+    assert f"coartic reproduce {run_id} --in {out} --method-file {METHOD}" in shown
     again = ("reproduce", run_id, "--in", tmp_path)
-    assert coartic(*again, "--method-file", METHOD).stdout.endswith("identical.\n")
-    without = coartic(*again)
-    assert without.returncode == 2
-    assert "unknown method 'nearest-hand'" in without.stderr
+    assert coartic(*again, "--method-file", METHOD)[1].endswith("identical.\n")
+    code, _, error = coartic(*again)
+    assert code == 2
+    assert "unknown method 'nearest-hand'" in error
 
 
-def test_a_changed_file_makes_its_records_stale(tmp_path):
+def test_a_changed_file_makes_its_records_stale(coartic, tmp_path):
     method = tmp_path / "mine.py"
     method.write_text(METHOD.read_text(encoding="utf-8"), encoding="utf-8")
     command = (
         "run", "paper", "--methods", "nearest-hand", "--method-file", method,
         "--tasks", "ascending", "--out", tmp_path / "out",
     )  # fmt: skip
-    assert "0 were there, 1 done" in coartic(*command).stdout
-    assert "1 were there, 0 done" in coartic(*command).stdout
+    assert "0 were there, 1 done" in coartic(*command)[1]
+    assert "1 were there, 0 done" in coartic(*command)[1]
     method.write_text(method.read_text(encoding="utf-8") + "\nCHANGED = 1\n", encoding="utf-8")
-    changed = coartic(*command)
-    assert "0 were there, 1 done" in changed.stdout
-    assert "1 records were made by other code and are not used" in changed.stderr
+    _, text, error = coartic(*command)
+    assert "0 were there, 1 done" in text
+    assert "not used, made by other code: 1 record" in error
 
 
 def test_a_changed_helper_makes_records_stale_too(tmp_path, monkeypatch):
@@ -107,19 +117,72 @@ def test_a_changed_helper_makes_records_stale_too(tmp_path, monkeypatch):
     assert codes[0] == codes[1] != codes[2]
 
 
+def test_a_helper_in_another_encoding_counts_as_python_reads_it(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    helper = tmp_path / "coartic_test_latin.py"
+    method = tmp_path / "mine.py"
+    text = METHOD.read_text(encoding="utf-8")
+    method.write_text("import coartic_test_latin\n" + text, encoding="utf-8")
+    codes = []
+    for encoding, word in (("latin-1", "é"), ("utf-8", "é"), ("latin-1", "è")):
+        helper.write_bytes(f"# coding: {encoding}\nNAME = {word!r}\n".encode(encoding))
+        codes.append(registry([method])["nearest-hand"].code)
+    assert codes[0] == codes[1] != codes[2]
+
+
+def test_what_a_helper_imports_is_read_as_well(tmp_path, monkeypatch):
+    """An import that is not there may be meant so; one that is no Python is not."""
+    monkeypatch.syspath_prepend(tmp_path)
+    helper, second = tmp_path / "coartic_test_first.py", tmp_path / "coartic_test_second.py"
+    method = tmp_path / "mine.py"
+    text = METHOD.read_text(encoding="utf-8")
+    method.write_text("import coartic_test_first\n" + text, encoding="utf-8")
+    helper.write_text("try:\n    import coartic_test_second\nexcept ImportError:\n    pass\n")
+    codes = [registry([method])["nearest-hand"].code]
+    second.write_text("x = 1")
+    codes.append(registry([method])["nearest-hand"].code)
+    assert codes[0] != codes[1]
+    second.write_text("def (")
+    with pytest.raises(CoarticError, match=r"cannot be run: SyntaxError.*coartic_test_second"):
+        registry([method])
+
+
+def test_what_a_validator_makes_of_a_parameter_is_what_counts(tmp_path):
+    """A value that is clamped is the same run as the value it is clamped to."""
+    path = tmp_path / "mine.py"
+    text = METHOD.read_text(encoding="utf-8").replace(
+        "reluctance: float = Field(default=0.0, ge=0)",
+        "reluctance: Annotated[float, AfterValidator(lambda x: min(x, 1.0))] = 0.0",
+    )
+    head = "from typing import Annotated\nfrom pydantic import AfterValidator\n"
+    path.write_text(head + text, encoding="utf-8")
+    entry = registry([path])["nearest-hand"]
+    assert entry.complete({"reluctance": 5.0}) == {"reluctance": 1.0}
+    task = load_task("ascending")
+    clamped, stated = (
+        run_specs([Cell(task, entry, (("reluctance", x),))], runs=1, seed=0, trials=5)[0][1]
+        for x in (5.0, 1.0)
+    )
+    assert clamped.job()["specification"]["parameters"] == {"reluctance": 1.0}
+    assert clamped.run_id == stated.run_id
+
+
 def test_a_broken_plugin_is_a_warning(tmp_path):
     """One bad package does not take the command line with it."""
     info = tmp_path / "bad-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bad\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[coartic.methods]\nbad = no_such_module:Method\n")
-    done = coartic("list", env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    done = subprocess.run(
+        [sys.executable, "-m", "coartic", "list"],
+        capture_output=True, text=True, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
     assert done.returncode == 0
     assert "warning: plug-in bad: entry point 'bad' cannot be used" in done.stderr
     assert "dual-process/EC1" in done.stdout
 
 
-def test_a_method_that_cannot_say_where_it_applies(tmp_path):
+def test_a_method_that_cannot_say_where_it_applies(coartic, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(
         "from coartic.method import Method\nclass A(Method):\n    name = 'a'\n"
@@ -128,13 +191,11 @@ def test_a_method_that_cannot_say_where_it_applies(tmp_path):
         "    def solve(self, session): ...",
         encoding="utf-8",
     )
-    listed = coartic("list", "--method-file", path)
-    assert listed.returncode == 0
-    ran = coartic(
-        "run", "paper", "--methods", "a", "--method-file", path, "--out", tmp_path / "out"
-    )
-    assert ran.returncode == 2
-    assert "cannot say whether it applies to task 'ascending': ZeroDivisionError" in ran.stderr
+    assert coartic("list", "--method-file", path)[0] == 0
+    out = tmp_path / "out"
+    code, _, error = coartic("run", "paper", "--methods", "a", "--method-file", path, "--out", out)
+    assert code == 2
+    assert "cannot say whether it applies to task 'ascending': ZeroDivisionError" in error
 
 
 @pytest.mark.parametrize(
@@ -152,7 +213,7 @@ def test_a_method_that_cannot_say_where_it_applies(tmp_path):
             "from coartic.method import Method\nclass A(Method):\n    name = 'a b'\n"
             "    title = citation = 'x'\n    told = frozenset()\n"
             "    def solve(self, session): ...",
-            "A: name: string should match pattern",
+            "A: name is ",
         ),
         (
             "from coartic.method import Method\nclass A(Method):\n    name = 'dual-process/EC1'\n"
@@ -178,7 +239,9 @@ def test_method_file_that_is_not_there(tmp_path):
 def test_parameters_are_validated():
     entry = registry([METHOD])["nearest-hand"]
     assert entry.complete({"reluctance": 0.5}) == {"reluctance": 0.5}
-    with pytest.raises(CoarticError, match="'nearest-hand': reluctance: input should be greater"):
+    with pytest.raises(
+        CoarticError, match="'nearest-hand': reluctance is -1.0; it must be at least 0"
+    ):
         entry.complete({"reluctance": -1.0})
     with pytest.raises(CoarticError, match="Its parameters: reluctance"):
         entry.complete({"reluctant": 1.0})

@@ -1,5 +1,6 @@
 """The report: what its renderers make of a document, checked by other readers."""
 
+import ast
 import csv
 import io
 import itertools
@@ -376,11 +377,25 @@ def test_latex_escapes():
     assert latex_text("λΛ漢") == r"$\lambda$$\Lambda$[U+6F22]"
 
 
+def test_every_character_of_ours_has_an_escape():
+    home = files("analysis")
+    texts = [path.read_text(encoding="utf-8") for path in home.rglob("*.toml")]
+    for path in home.rglob("*.py"):
+        if path.name != "latex.py":
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            constants = (node.value for node in ast.walk(tree) if isinstance(node, ast.Constant))
+            texts += [text for text in constants if isinstance(text, str)]
+    characters = set("".join(texts)) - set("\n")
+    assert len(characters) > 100
+    assert {c for c in characters if latex_text(c).startswith("[U+")} == set()
+
+
 def test_latex_columns_are_as_wide_as_their_numbers():
     text = latex_tables(document())["methods-shelf"]
     assert (
-        r"\begin{tabular}{@{}lS[table-format=-3.1]S[table-format=1.1]rS[table-format=1.1]"
-        r"S[table-format=7.0]S[table-format=1.3]>{\raggedright\arraybackslash}p{"
+        r"\begin{tabularx}{\linewidth}{@{}lS[table-format=-3.1]S[table-format=1.1]r"
+        r"S[table-format=1.1]S[table-format=7.0]S[table-format=1.3]"
+        r">{\raggedright\arraybackslash}X@{}}"
     ) in text
     assert r"-483.2 & 5.0 & {[\num{-490.1}, \num{-477.0}]} & 3.9 & 20" in text
 
@@ -414,7 +429,7 @@ LONG = DataTable(
 
 def test_tables_longer_than_a_page_are_continued():
     text = latex_table(LONG)
-    assert r"\begin{longtable}" in text
+    assert r"\begin{xltabular}{\linewidth}" in text
     assert r"\begin{table}" not in text
     assert text.count("{method}") == 2  # the second is for the pages that follow
     assert text.count("squared changes (other arm still") == 90  # as figures name them
@@ -422,6 +437,10 @@ def test_tables_longer_than_a_page_are_continued():
     assert "unseen" not in text
     short = replace(LONG, rows=LONG.rows[:MOST_LATEX])
     assert r"\begin{table}" in latex_table(short)
+    assert r"\begin{tabularx}" in latex_table(short)
+    few = latex_table(replace(short, columns=LONG.columns[1:2], rows=(Row("a", (1.0,)),)))
+    assert r"\begin{tabular}{@{}S[table-format=1.1]@{}}" in few
+    assert r"\resizebox{\ifdim\width>\linewidth" in few
     head = next(line for line in text.splitlines() if line.startswith("{method}"))
     assert head.replace(r" \\ ", " ").startswith(
         r"{method} & {\shortstack[c]{difference to what was there before (ticks)}} & {SD} & "
@@ -454,7 +473,7 @@ def test_latex_compiles(tmp_path):
     write(tmp_path / "report", several)
     (tmp_path / "report" / "paper.tex").write_text(
         r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}"
-        r"\usepackage{booktabs,siunitx,graphicx,longtable}\begin{document}\input{tables.tex}\end{document}",
+        r"\usepackage{booktabs,siunitx,graphicx,tabularx,xltabular}\begin{document}\input{tables.tex}\end{document}",
         encoding="utf-8",
     )
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]

@@ -8,6 +8,7 @@ import pytest
 
 import analysis.report.build
 import analysis.report.numbers
+from analysis.figures import register
 from analysis.report.build import build, write
 from analysis.report.numbers import Names, headline_numbers, macro_names, words
 from analysis.report.trace import find_report, trace
@@ -15,11 +16,17 @@ from analysis.study import Study
 from analysis.words import slugs
 from benchmarks.suites import Cell, load_suite, select_cells
 from coartic import CoarticError, builtin_tasks
-from coartic.cli import _labels
+from coartic.cli.arguments import labels_in
 from tests.support.commands import call
 from tests.support.reports import compiled, report_of
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, Failing, run_and_write, with_environment
+
+
+@pytest.fixture
+def few_figures(undrawn, monkeypatch):
+    """Reports with the first figure alone: drawing all of them takes most of the time."""
+    monkeypatch.setattr(register, "REGISTER", register.REGISTER[:1])
 
 
 def test_letters_alone():
@@ -131,7 +138,7 @@ def test_failed_runs(tmp_path, undrawn):
             assert "coarticAscendingECOneReward" not in named
 
 
-def test_the_commands(monkeypatch, capsys, tmp_path, odd, undrawn):
+def test_the_commands(monkeypatch, capsys, tmp_path, odd, few_figures):
     folder = tmp_path / "res ults"
     shutil.copytree(odd.folder, folder)
     code, out, _ = call(monkeypatch, capsys, "report", folder)
@@ -173,10 +180,10 @@ def refused(monkeypatch, capsys, *arguments):
 
 def test_labels_with_commas_are_quoted():
     text = ' a/b , "a/b x=1, y=2",a/c,a/b'
-    assert _labels(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
+    assert labels_in(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
 
 
-def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):
+def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, few_figures):
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").write_text("x")
     assert "not a results folder" in refused(monkeypatch, capsys, "report", tmp_path / "empty")
@@ -186,7 +193,7 @@ def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, undrawn):
     near = refused(monkeypatch, capsys, "report", odd.folder, "--methods", "dual-process/EC44")
     assert "did you mean 'dual-process/EC4'" in near
     assert "empty name" in refused(monkeypatch, capsys, "report", odd.folder, "--methods", "a,,b")
-    assert "choose of .pdf" in refused(
+    assert "svg must be among them" in refused(
         monkeypatch, capsys, "report", odd.folder, "--formats", "png"
     )
     # Somebody's folder, whose page has the name of ours.
@@ -219,7 +226,7 @@ def everything(folder):
 
 
 def test_a_report_is_made_again_where_nobody_changed_it(
-    monkeypatch, capsys, tmp_path, odd, undrawn
+    monkeypatch, capsys, tmp_path, odd, few_figures
 ):
     home = tmp_path / "report"
     command = ("report", odd.folder, "--out", home, "--formats", "svg")

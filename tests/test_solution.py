@@ -13,6 +13,8 @@ from coartic import (
     learn,
     load_task,
 )
+from coartic.errors import SolutionError
+from coartic.record import MOST_STEPS, solved
 from tests.support.strategies import PAPER_CELLS, tiny_task
 
 
@@ -45,6 +47,16 @@ def test_corrective_process_alone():
     assert corrective_trial(task, "LRLR").reward == -533
     assert corrective_trial(task, "RRRR").reward == -671
     assert corrective_trial(task, "LLLL").reward == -727
+
+
+def test_no_way_is_followed_without_end():
+    """Nobody waits for a hand that is sent to the end of the world and back."""
+    far = 0.9 * MOST_STEPS * PAPER.step
+    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
+    assert solved(task, planned(posture(far), posture(far)), PAPER).reward == -192  # on the way
+    back = planned(posture(far), posture(0.0))
+    with pytest.raises(SolutionError, match="1800000 steps long; at most 1000000 are made"):
+        solved(task, back, PAPER)
 
 
 def test_first_printed_initial_solution_step_by_step():

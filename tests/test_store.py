@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.harness import perform_plan, record_of
+from benchmarks.harness import record_of
 from benchmarks.specification import Limits
 from benchmarks.store import Damage, RecordError, Store
 from benchmarks.suites import run_specs
 from coartic import CoarticError, files
-from tests.support.suites import InProcess, paper_cells
+from tests.support.suites import InProcess, paper_cells, perform_plan
 
 ROOT = Path(__file__).parent.parent
 
@@ -233,6 +233,20 @@ def test_a_checksum_that_fits_no_record(body, tmp_path):
     progress, performed = perform_counting(store, planned)
     assert (len(progress.damaged), len(performed)) == (1, 1)
     assert len(list(store.records.glob("damaged-*"))) == 1  # kept, out of the way
+
+
+@pytest.mark.parametrize("number", [b"NaN", b"Infinity", b"-Infinity"])
+def test_a_record_holds_numbers_alone(number, tmp_path):
+    """Python's JSON reads words that no number is written with."""
+    store, (spec,) = Store(tmp_path), specs(runs=1)
+    perform_counting(store, [spec])
+    body = store.path(spec.run_id).read_bytes().partition(b"\n")[2].rstrip(b"\n")
+    body = re.sub(rb'"wall_s":[-+.e0-9]+', b'"wall_s":' + number, body, count=1)
+    assert number in body
+    head = b"sha256:" + hashlib.sha256(body).hexdigest().encode() + b"\n"
+    store.path(spec.run_id).write_bytes(head + body + b"\n")
+    with pytest.raises(RecordError, match=spec.run_id):
+        store.read(spec.run_id)
 
 
 def test_something_else_in_place_of_a_record(tmp_path):

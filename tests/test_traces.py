@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.report.trace import FILE, trace, trace_text
+from analysis.report.trace import trace, trace_text
+from analysis.report.trace_file import FILE
 from analysis.results import optima as shipped
 from analysis.results.folder import load_results
 from analysis.statistics import estimates as statistics
@@ -439,8 +440,14 @@ def test_what_a_report_does_not_have(home, tmp_path):
     ):
         with pytest.raises(CoarticError, match=re.escape(words)):
             trace(home, *arguments)
-    for text in ("", "[]", "{}", '{"format":2}', '{"format":2,"macros":{"a":1},"tables":{}}'):
-        (tmp_path / FILE).write_text(text)
+    whole = json.loads((home / FILE).read_text(encoding="utf-8"))
+    table = next(iter(whole["tables"].values()))
+    next(iter(table["rows"].values()))["cells"] = [10_000]
+    for text in (
+        "", "[]", "{}", '{"format":3}', '{"format":4,"macros":{"a":1},"tables":{}}', "\ud800",
+        json.dumps(whole),
+    ):  # fmt: skip
+        (tmp_path / FILE).write_bytes(text.encode(errors="surrogatepass"))
         with pytest.raises(CoarticError, match=re.escape(FILE)):
             trace(tmp_path, "a")
 
@@ -487,7 +494,7 @@ def test_what_no_runs_are_behind(home):
          "tion 4)"),
         (("exhaustive", ("two-armed-1", "published")), f"{paper})"),
         (("exhaustive", ("two-armed-1", "sequences")), "computed from the corrective process "
-         "alone on two-armed-1 (sequences.parquet)"),
+         "alone (sequences.parquet)"),
     ):  # fmt: skip
         name, *rest = where
         found = trace(home, name, *rest)
@@ -507,9 +514,9 @@ def test_a_cell_of_a_table_says_how(home):
     content = json.loads((home / FILE).read_text(encoding="utf-8"))
     for name, table in content["tables"].items():
         row, column = next(iter(table["rows"])), table["columns"][-1]
-        how = trace(home, name, (row, column)).how
+        how = trace(home, name, (row, column["name"])).how
         assert all(note in how for note in table["notes"])
-        assert how.startswith(table["heads"][-1])
+        assert how.startswith(column["head"])
 
 
 def test_what_the_command_makes(home, records):

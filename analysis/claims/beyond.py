@@ -2,137 +2,43 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
 
-from analysis.claims.coarticulation import prepared_by_waiting
 from analysis.claims.data import (
-    ASCENDING,
     BEST,
     CELLS,
-    DESCENDING,
-    ONE,
     SMOOTH,
-    UNINFORMED,
     Data,
     MissingError,
     rewards_of,
 )
+from analysis.claims.evidence import Arm, by_optimum, estimate_of, measured, of_either_optimum
+from analysis.claims.judges.costs import NEAR, computation, experience
+from analysis.claims.judges.presence import PRESENCE, shared_signatures
 from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Claim, Finding
-from analysis.comparisons.frontier import targets_frame
-from analysis.comparisons.methods import LEARNER, TOLD
-from analysis.published import published_cell
-from analysis.results.optima import METHODS as OPTIMUM
+from analysis.comparisons.methods import LEARNER
+from analysis.published import Summary, published_cell
+from analysis.report.document import Column, RestsOn, Row
 from analysis.statistics.equivalence import MARGIN, difference
-from analysis.statistics.estimates import LEVEL, SEED, Inference, difference_of_means, mean
-from analysis.table import NONE, Table, interval, short
-from coartic.method import Information
+from analysis.statistics.estimates import SEED, difference_of_means, mean
+from analysis.words import NONE, interval
 
-_TASKS = tuple(task for task, _ in BEST)
-NEAR = 0.05
-"""Share of the optimum within which a run has come near it."""
+_EQUIVALENT = f"within ± {MARGIN:.0%}"
 
 
-def _labels(data: Data, wanted: Callable[[str], bool]) -> list[str]:
-    """Labels whose row of the methods' table on any task is wanted, in the order of the plan."""
-    return list(
-        dict.fromkeys(
-            label
-            for task, label in data.study.cells
-            if task in _TASKS
-            and not label.startswith(OPTIMUM)
-            and wanted(data.study.methods[task, label]["told"])
-        )
-    )
-
-
-def _by_task(data: Data, labels: list[str], what: str, cell: Callable[[str, str], str]) -> Table:
-    """A row per method: what it is told, and a column per task; a dash where it has no runs."""
-    rows = []
-    for label in labels:
-        shown, told = [], ""
-        for task in _TASKS:
-            try:
-                data.runs(task, label)
-            except MissingError:
-                shown.append(NONE)
-            else:
-                shown.append(cell(task, label))
-                told = data.study.methods[task, label]["told"]
-        if set(shown) != {NONE}:
-            rows.append((label, told, *shown))
-    return Table(what, ("method", "told", *_TASKS), tuple(rows))
-
-
-def _uninformed(told: str) -> bool:
-    return TOLD[Information.REWARD_BY_TRIAL] in told and set(told) <= UNINFORMED
-
-
-def _experience(data: Data) -> Finding:
-    # Methods that keep the other arm still, to the optimum with it still.
-    reached = {
-        (row["task"], row["method"]): row
-        for arm in ("free", "still")
-        for row in targets_frame(data.results, data.study.progress, other_arm=arm, shares=(NEAR,))
-        .query("spend == 'trials'")
-        .to_dict("records")
-    }
-
-    def cell(task: str, label: str) -> str:
-        row = reached.get((task, label))
-        if row is None:
-            return NONE
-        median = "never" if math.isinf(row["median"]) else f"{row['median']:.0f}"
-        reward = data.study.methods[task, label]["reward"]
-        return f"{row['reached']}/{row['runs']}, {median} ({reward:.1f})"
-
-    for task, condition in BEST:
-        data.runs(task, LEARNER + condition)
-    table = _by_task(data, _labels(data, _uninformed), "Experience", cell)
-    return Finding(
-        None,
-        f"runs within {NEAR:.0%} of the optimum (of that with the other arm still, for methods "
-        "that keep it so), median trials until then, and in brackets the mean reward at the end; "
-        "every method that is told no more than the learner",
-        table=table,
-    )
-
-
-def _computation(data: Data) -> Finding:
-    for task, condition in BEST:
-        data.runs(task, LEARNER + condition)
-
-    def cell(task: str, label: str) -> str:
-        row = data.study.methods[task, label]
-        spent = row["forward_kinematics"] + row["jacobians"]
-        each = f", {short(spent / row['trials'])} a trial" if row["trials"] > 1 else ""
-        return f"{short(spent)}{each} ({row['reward']:.1f})"
-
-    uninformed = _labels(data, _uninformed)
-    informed = [
-        label
-        for label in _labels(data, lambda told: not _uninformed(told))
-        if " " not in label and not label.startswith(LEARNER)
-    ]
-    table = _by_task(data, [*uninformed, *informed], "Computation", cell)
-    return Finding(
-        None,
-        "evaluations of forward kinematics and Jacobian in a run (median), and per trial; in "
-        "brackets the mean reward they buy; letters of what is told: docs/methods.md. First "
-        "methods that are told no more than the learner, then informed search in its default form",
-        table=table,
-    )
+_CELL = (Column("task", "task"), Column("condition", "condition"))
 
 
 def _as_printed(data: Data) -> Finding:
-    rows, verdicts = [], []
+    rows, words, verdicts = [], [], []
     for task, condition in CELLS:
         printed = published_cell(task, condition)
         assert printed is not None
-        groups: list[tuple[str, Any, str | None]] = [("all", printed.summary, None)]
+        groups: list[tuple[str, Summary | None, str | None]] = [("all", printed.summary, None)]
         if len(printed.sequences) > 1:
             groups += [(s.hands, s.summary, s.hands) for s in printed.sequences]
         for name, summary, hands in groups:
@@ -140,62 +46,101 @@ def _as_printed(data: Data) -> Finding:
             if summary is None or not len(own):
                 continue
             apart = difference(own, summary)
-            known = not math.isnan(apart.low)
-            rows.append(
-                (
-                    task, condition, name, f"{summary.mean:.1f} ({summary.runs})",
-                    f"{own.mean():.1f} ({len(own)})", interval(apart, "+.1f"),
-                    f"{apart.estimate / -summary.mean:+.1%}", apart.verdict if known else NONE,
-                )
-            )  # fmt: skip
+            verdict = None if math.isnan(apart.low) else apart.verdict
+            share = apart.estimate / -summary.mean
+            values = (
+                *(task, condition, name, summary.mean, summary.runs),
+                *(float(own.mean()), len(own), estimate_of(apart), share, verdict),
+            )
+            key = (task, LEARNER + condition)
+            rows.append(Row(f"{task} {condition} {name}", values, (key,)))
+            words.append(
+                f"task {task}, condition {condition}, hands {name}, "
+                f"printed (runs) {summary.mean:.1f} ({summary.runs}), "
+                f"ours (runs) {own.mean():.1f} ({len(own)}), "
+                f"difference {interval(apart, '+.1f')}, share of the printed {share:+.1%}, "
+                f"{_EQUIVALENT} {verdict or NONE}"
+            )
             if hands is None:
-                verdicts.append(f"{task} {condition} {apart.verdict if known else NONE}")
+                verdicts.append(f"{task} {condition} {verdict or NONE}")
+    both: tuple[RestsOn, ...] = ("runs", "paper")
     columns = (
-        "task", "condition", "hands", "printed (runs)", "ours (runs)", "difference",
-        "share of the printed", f"within ± {MARGIN:.0%}",
-    )  # fmt: skip
-    table = Table("Learned rewards as printed", columns, tuple(rows))
-    return Finding(None, "; ".join(verdicts), table=table)
+        *_CELL,
+        Column("hands", "hands"),
+        Column("printed", "printed", "number", digits=1, rests_on=("paper",)),
+        Column("printed_runs", "runs", "number", rests_on=("paper",)),
+        Column("ours", "ours", "number", digits=1, rests_on=("runs",)),
+        Column("our_runs", "runs", "number", rests_on=("runs",)),
+        Column("difference", "difference", "number", digits=1, rests_on=both),
+        Column("share", "of the printed", "share", digits=1, rests_on=both),
+        Column("verdict", _EQUIVALENT, rests_on=both),
+    )
+    evidence = "; ".join(verdicts)
+    title = "Learned rewards as printed"
+    return measured("learned-rewards-as-printed", evidence, title, columns, rows, words)
 
 
 def _to_the_optimum(data: Data) -> Finding:
-    known, rows = data.study.optima, []
+    rows, words, shares = [], [], []
     for task, condition in CELLS:
-        gap = mean(data.rewards(task, condition), seed=SEED)
-        arm = "free" if condition in ("EC2", "EC4") else "still"
-        best = known.get((task, arm))
+        reward = mean(data.rewards(task, condition), seed=SEED)
+        arm: Arm = "free" if condition in ("EC2", "EC4") else "still"
+        best = data.study.optima.get((task, arm))
         if best is None:
             raise MissingError(f"no optimum of {task} is known")
-        left = Inference(
-            best.reward - gap.estimate, gap.n, gap.method, best.reward - gap.high,
-            best.reward - gap.low, gap.confidence,
-        )  # fmt: skip
-        share = f"{left.estimate / -best.reward:.1%}"
-        rows.append((task, condition, str(best.reward), interval(left), share))
-    columns = ("task", "condition", "optimum", "ticks from it", "share")
-    return Finding(
-        None,
-        "; ".join(f"{task} {condition} {share}" for task, condition, _, _, share in rows),
-        table=Table("Distance to the optimum", columns, tuple(rows)),
+        gap = replace(
+            reward,
+            estimate=best.reward - reward.estimate,
+            low=best.reward - reward.high,
+            high=best.reward - reward.low,
+        )
+        share = gap.estimate / -best.reward
+        values = by_optimum(arm, best.reward, estimate_of(gap), share)
+        key = (task, LEARNER + condition)
+        rows.append(Row(f"{task} {condition}", (task, condition, *values), (key,)))
+        shares.append(f"{task} {condition} {share:.1%}")
+        words.append(
+            f"task {task}, condition {condition}, optimum {best.reward}, "
+            f"ticks from it {interval(gap)}, share {share:.1%}"
+        )
+    both: tuple[RestsOn, ...] = ("runs", "optimum")
+    columns = of_either_optimum(
+        Column("optimum", "optimum", "number", rests_on=("optimum",)),
+        Column("gap", "from it", "number", "ticks", digits=1, rests_on=both),
+        Column("gap_share", "of it", "share", digits=1, rests_on=both),
     )
+    evidence, title = "; ".join(shares), "Distance to the optimum"
+    return measured("distance-to-optimum", evidence, title, (*_CELL, *columns), rows, words)
+
+
+_PROPOSALS = {
+    "nullspace": "secondary objective in the corrective process's nullspace",
+    "biased": "noise biased towards the corrective process's suggestion",
+}
+"""The paper's proposals for the learner, by what they add to a condition's name."""
 
 
 def _proposals(data: Data) -> Finding:
-    rows = []
-    for task, condition in BEST:
+    rows, words, gains = [], [], []
+    for (task, condition), (proposal, change) in itertools.product(BEST, _PROPOSALS.items()):
         own = data.rewards(task, condition)
-        for variant, what in (
-            ("nullspace", "secondary objective in the corrective process's nullspace"),
-            ("biased", "noise biased towards the corrective process's suggestion"),
-        ):
-            other = rewards_of(data.learned(task, f"{condition}-{variant}"))
-            apart = difference_of_means(other, own, seed=SEED)
-            rows.append((task, condition, what, interval(apart)))
-    return Finding(
-        None,
-        "; ".join(f"{task} {what.split()[0]} {apart}" for task, _, what, apart in rows),
-        table=Table("Proposals", ("task", "condition", "change", "gain in reward"), tuple(rows)),
+        other = rewards_of(data.learned(task, f"{condition}-{proposal}"))
+        gain = difference_of_means(other, own, seed=SEED)
+        cells = tuple(
+            (task, f"{LEARNER}{name}") for name in (condition, f"{condition}-{proposal}")
+        )
+        values = (task, condition, change, estimate_of(gain))
+        rows.append(Row(f"{task} {condition} {proposal}", values, cells))
+        words.append(
+            f"task {task}, condition {condition}, change {change}, gain in reward {interval(gain)}"
+        )
+        gains.append(f"{task} {change.split()[0]} {interval(gain)}")
+    columns = (
+        *_CELL,
+        Column("change", "change"),
+        Column("gain", "gain in reward", "number", digits=1, rests_on=("runs",)),
     )
+    return measured("proposals", "; ".join(gains), "Proposals", columns, rows, words)
 
 
 def _absent_without_looking_ahead(data: Data) -> Finding:
@@ -209,162 +154,6 @@ def _absent_without_looking_ahead(data: Data) -> Finding:
             f"all {change[1]:+.1f} ticks against the initial solution"
         )
     return Finding(None, "; ".join(parts))
-
-
-REPRESENTATIVES = (
-    ("learner", f"{LEARNER}EC1", f"{LEARNER}EC4"),
-    ("CMA-ES", "cma-es/bandit", "cma-es/bandit"),
-    (
-        "shortest path",
-        "trajectory-optimisation/path-length",
-        "trajectory-optimisation/path-length",
-    ),
-    (
-        "least squared changes",
-        "trajectory-optimisation/squared-changes",
-        "trajectory-optimisation/squared-changes",
-    ),
-    ("least jerk", "trajectory-optimisation/jerk", "trajectory-optimisation/jerk"),
-    (
-        "two-goal planning",
-        "posture-based/two-goals",
-        "posture-based/two-goals hands=every, other_arm=free",
-    ),
-    (
-        "one-goal planning",
-        "posture-based/one-goal",
-        "posture-based/one-goal hands=every, other_arm=free",
-    ),
-    ("nullspace control", "nullspace-qp/next-goal", "nullspace-qp/next-goal"),
-    ("corrective alone", "corrective-alone/given", "corrective-alone/every"),
-)
-"""Name, label on the one-armed tasks, label on the two-armed ones."""
-STEP_APART = 0.1
-"""Ten steps of movement: postures (length unit, rad) or shares of a way this far apart count."""
-TURN_APART = 0.05
-"""Turning angles this far apart count, rad."""
-PRESENCE = (
-    "presence: *context*, mean postures at goal 1 of the ascending and the descending task "
-    "lie more than 0.1 apart (ten steps), with p < 5 % where there are several runs; "
-    "*sacrifice*, most runs sacrifice the first subtask of the ascending task (Wilson's interval "
-    "lies above one half, where there are several), shown are the mean ticks of the first "
-    "movement and of all against the corrective process with the same hands; "
-    "*motor-equivalent*, context is present and its motor-equivalent part (per root of dimension) "
-    "exceeds the other; *preshaping*, on two-armed task 1 the waiting arm brings its hand nearer "
-    "to its next goal, since its own last hit, by more than 0.1 of the initial distance, mean "
-    "over goals and runs; *lead*, the contexts are "
-    "distinguishable before goal 1 is hit; *turning*, the turning angles of the ascending task "
-    "sum to at least 0.05 rad less than the initial solution's. A dash: cannot be said of the "
-    "runs in this folder, and not judged where that is so of every method"
-)
-
-
-def _shared_signatures(data: Data) -> Finding:
-    data.runs(ASCENDING, f"{LEARNER}EC1")
-    data.runs(DESCENDING, f"{LEARNER}EC1")
-    rows = []
-    for name, one, two in REPRESENTATIVES:
-        shown = (
-            _context(data, one), _sacrifice(data, one), _equivalence(data, one),
-            _preshaping(data, two), _lead(data, one), _turning(data, one),
-        )  # fmt: skip
-        if set(shown) != {NONE}:
-            rows.append((name, _reward(data, one), *shown))
-    columns = (
-        "method", "reward (ascending)", "context", "sacrifice (first, all)", "motor-equivalent",
-        "preshaping", "lead", "turning",
-    )  # fmt: skip
-    present = (
-        f"{column}: {_present([(row[0], row[k]) for row in rows])}"
-        for k, column in enumerate(columns[2:], 2)
-    )
-    table = Table("Signatures", columns, tuple(rows))
-    return Finding(None, "; ".join(present), table=table)
-
-
-def _present(shown: list[tuple[str, str]]) -> str:
-    """Methods that show a signature."""
-    if all(cell == NONE for _, cell in shown):
-        return "not judged"
-    return ", ".join(name for name, cell in shown if cell.startswith("yes")) or "none"
-
-
-def _reward(data: Data, label: str) -> str:
-    try:
-        return f"{rewards_of(data.runs(ASCENDING, label)).mean():.1f}"
-    except MissingError:
-        return NONE
-
-
-def _said(present: bool, numbers: str) -> str:
-    return f"{'yes' if present else 'no'}, {numbers}"
-
-
-def _context_present(data: Data, label: str) -> tuple[bool, float] | None:
-    apart = context_distance(data, label)
-    if apart is None:
-        return None
-    try:
-        p = data.signature(ASCENDING, label, "context dependence", 1).p
-    except MissingError:
-        p = math.nan
-    return apart > STEP_APART and not p >= LEVEL, apart
-
-
-def _context(data: Data, label: str) -> str:
-    found = _context_present(data, label)
-    return NONE if found is None else _said(found[0], f"{found[1]:.2f}")
-
-
-def _sacrifice(data: Data, label: str) -> str:
-    try:
-        runs = data.signature(ASCENDING, label, "first subtask sacrificed")
-    except MissingError:
-        return NONE
-    ticks = sacrifice(data, label)
-    assert ticks is not None
-    low = runs.value if math.isnan(runs.low) else runs.low
-    return _said(low > 0.5, f"{ticks[0]:+.1f}, {ticks[1]:+.1f}")
-
-
-def _equivalence(data: Data, label: str) -> str:
-    found = _context_present(data, label)
-    if found is None:
-        return NONE
-    same, other = (
-        data.signature(ASCENDING, label, name, 1).value
-        for name in ("motor-equivalent part", "non-motor-equivalent part")
-    )
-    return _said(found[0] and same > other, f"{same:.3f} and {other:.3f}")
-
-
-def _preshaping(data: Data, label: str) -> str:
-    try:
-        own = prepared_by_waiting(data.cell(ONE, label))
-    except MissingError:
-        return NONE
-    return _said(own.mean() > STEP_APART, f"{own.mean():+.2f}") if len(own) else NONE
-
-
-def _lead(data: Data, label: str) -> str:
-    try:
-        data.runs(ASCENDING, label)
-        several = len(data.runs(DESCENDING, label)) > 1
-        lead = data.signature(ASCENDING, label, "lead time", 1)
-    except MissingError:
-        return "no" if context_distance(data, label) is not None and several else NONE
-    return _said(lead.value > 0, f"{lead.value:.0f} ticks")
-
-
-def _turning(data: Data, label: str) -> str:
-    try:
-        own, initial = (
-            sum(data.signature(ASCENDING, name, "turning angle", goal).value for goal in (1, 2))
-            for name in (label, "corrective-alone/given")
-        )
-    except MissingError:
-        return NONE
-    return _said(own <= initial - TURN_APART, f"{own:.2f} rad")
 
 
 BEYOND: tuple[Claim, ...] = (
@@ -410,14 +199,14 @@ BEYOND: tuple[Claim, ...] = (
         "Beyond the paper",
         f"trials to come within {NEAR:.0%} of the optimum: Kaplan-Meier median, runs that never "
         "do counted as censored",
-        _experience,
+        experience,
     ),
     Claim(
         "computation",
         "How much each method evaluates.",
         "Beyond the paper",
         "forward kinematics and Jacobians",
-        _computation,
+        computation,
     ),
     Claim(
         "proposals",
@@ -431,6 +220,6 @@ BEYOND: tuple[Claim, ...] = (
         "Which signatures of coarticulation informed and uninformed search share.",
         "Beyond the paper",
         PRESENCE,
-        _shared_signatures,
+        shared_signatures,
     ),
 )

@@ -11,7 +11,7 @@ from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean, share_test
-from analysis.table import interval
+from analysis.words import interval
 from coartic.robot import Array
 
 _CONTROLS = ("corrective-alone/every", "posture-based/one-goal hands=every, other_arm=free")

@@ -16,7 +16,7 @@ from analysis.statistics.estimates import (
     difference_of_means,
     probability_of_improvement,
 )
-from analysis.table import interval, tally
+from analysis.words import interval, tally
 from coartic.robot import Array
 
 

@@ -29,7 +29,7 @@ from analysis.published import TRIALS
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.signatures.subtasks import postures_before
 from analysis.statistics.estimates import SEED, bootstrap_test, mean
-from analysis.table import interval, short
+from analysis.words import interval, short
 from coartic.task import hands_of
 
 CLOSE = 0.10
@@ -96,18 +96,18 @@ def _less_experience(data: Data, cells: Cells) -> Finding:
     parts, holds = [], True
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
-        learner = data.study.methods[task, LEARNER + condition]
+        learner = data.study.method_rows[task, LEARNER + condition]
         better, best = [], False
         for cost in ("path-length", *SMOOTH):
             data.runs(task, _PLAN + cost)
-            plan = data.study.methods[task, _PLAN + cost]
-            holds &= plan["trials"] == 0 and len(plan["told"]) > len(learner["told"])
-            if plan["reward"] >= learner["reward"]:
-                better.append(f"{cost} ({plan['told']})")
+            plan = data.study.method_rows[task, _PLAN + cost]
+            holds &= plan.trials == 0 and len(plan.told) > len(learner.told)
+            if plan.reward >= learner.reward:
+                better.append(f"{cost} ({plan.told})")
                 best = best or cost == "path-length"
         parts.append(
-            f"{task}: learner {learner['reward']:.1f} after {learner['trials']:.0f} trials, told "
-            f"{learner['told']}; as good or better without any: {', '.join(better) or 'none'}"
+            f"{task}: learner {learner.reward:.1f} after {learner.trials:.0f} trials, told "
+            f"{learner.told}; as good or better without any: {', '.join(better) or 'none'}"
         )
         holds &= best
     return Finding(holds, "; ".join(parts))
@@ -140,8 +140,7 @@ def _low_computation(data: Data, cells: Cells) -> Finding:
 
 
 def _evaluations(data: Data, task: str, label: str) -> float:
-    row = data.study.methods[task, label]
-    return float(row["forward_kinematics"] + row["jacobians"])
+    return data.study.method_rows[task, label].evaluations
 
 
 def _informed(data: Data, task: str) -> list[str]:
@@ -153,7 +152,7 @@ def _informed(data: Data, task: str) -> list[str]:
         and " " not in label
         and not label.startswith((LEARNER, OPTIMUM))
         and len(cell.good) == len(cell.runs) > 0
-        and set(data.study.methods[task, label]["told"]) - UNINFORMED
+        and set(data.study.method_rows[task, label].told) - UNINFORMED
     ]
 
 
@@ -164,7 +163,7 @@ def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
         shown = []
         for cost in SMOOTH:
             data.runs(task, _PLAN + cost)
-            plan = float(data.study.methods[task, _PLAN + cost]["reward"])
+            plan = data.study.method_rows[task, _PLAN + cost].reward
             tests.append(bootstrap_test(rewards, plan, seed=SEED))
             shown.append(f"{cost} {plan:.0f}")
         parts.append(f"{task}: learner {interval(mean(rewards, seed=SEED))}, {', '.join(shown)}")

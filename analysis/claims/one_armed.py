@@ -9,7 +9,7 @@ from analysis.claims.register import Claim, Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
 from analysis.statistics.estimates import SEED, Inference, bootstrap_test, mean
-from analysis.table import interval
+from analysis.words import interval
 
 CONTROLS = ("posture-based/one-goal", "corrective-alone/given")
 """Methods that do not look beyond the current goal."""

@@ -1,14 +1,4 @@
-"""What a claim is, and the rules of its verdict.
-
-*Supported*: what the claim says is seen, and the largest p-value of the tests it rests on
-(they must all hold: an intersection-union test) stays below 5 % after Holm's correction.
-*Not supported*: it is not seen, and the contrary of one of its tests is significant (the
-smallest p-value of the contrary times their number, below 5 % after Holm's correction). What
-is counted exactly, or shows no spread over runs, needs no test and is supported or not as it
-is. *Cannot tell*: neither, or the folder lacks the runs. Each of the two corrections is over
-all of the paper's claims that the folder can test. Comparisons that the paper does not make
-are *measured*, not judged.
-"""
+"""What a claim is, and the rules of its verdict (:data:`RULES`)."""
 
 from __future__ import annotations
 
@@ -18,14 +8,31 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from analysis.claims.data import Data, MissingError
+from analysis.report.document import DataTable
 from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference, holm
-from analysis.table import Table
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
 Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
+
+RULES = (
+    "*Supported*: what the claim says is seen, and the largest p-value of the tests it rests on "
+    "(they must all hold: an intersection-union test) stays below 5 % after Holm's correction. "
+    "*Not supported*: it is not seen, and the contrary of one of its tests is significant (the "
+    "smallest p-value of the contrary times their number, below 5 % after Holm's correction). "
+    "What is counted exactly, or shows no spread over runs, needs no test and is supported or not "
+    "as it is. *Cannot tell*: neither, or the folder lacks the runs. Each of the two corrections "
+    "is over all of the paper's claims that the folder can test. Comparisons that the paper does "
+    "not make are *measured*, not judged."
+)
+"""How verdicts are reached, in inline markup."""
+FITTED = (
+    "† rests on the two-armed tasks. Their goals are a reconstruction, chosen so that printed "
+    "rewards and hand sequences come out (docs/model.md): a reproduction, no independent test."
+)
+"""What the mark of a fitted claim means."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +46,10 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Inference, ...] | None = None
     """Tests of the contrary, any of which refutes it; None: the other tails of ``tests``."""
-    table: Table | None = None
-    """Numbers that are more than a sentence can hold."""
+    table: DataTable | None = None
+    """Numbers that are more than a sentence can hold; its id is ``evidence-`` and the claim's."""
+    rows: str = ""
+    """What the table's rows say, in words."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +91,14 @@ class Judged:
     run_ids: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()
     """What it rests on beside runs."""
-    table: Table | None = None
+    table: DataTable | None = None
+    rows: str = ""
+    """What the table's rows say, in words."""
+
+    @property
+    def marked(self) -> str:
+        """The verdict, with † where the claim is fitted."""
+        return self.verdict + (" †" if self.claim.fitted else "")
 
 
 def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
@@ -112,6 +128,7 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
             run_ids,
             sources,
             finding.table,
+            finding.rows,
         )
         for (claim, finding, run_ids, sources), p, adjusted, against, refuted in zip(
             found, largest, holm(largest), contrary, holm(contrary), strict=True

@@ -22,7 +22,7 @@ from analysis.claims.register import Claim, Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
 from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean
-from analysis.table import interval, tally
+from analysis.words import interval, tally
 from coartic.robot import Array
 
 # Before learning

@@ -9,7 +9,7 @@ from analysis.claims.judges.hands import better_hands
 from analysis.claims.judges.shares import AS_OFTEN, as_often
 from analysis.claims.register import Claim, Finding
 from analysis.published import published_exhaustive
-from analysis.table import tally
+from analysis.words import tally
 
 
 def _best_is_rrrr(data: Data) -> Finding:

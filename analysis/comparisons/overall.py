@@ -9,29 +9,93 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
 
 from analysis.comparisons.methods import LEARNER
 from analysis.results.optima import METHODS as OPTIMUM
-from analysis.statistics.across_tasks import by_task, interquartile_mean, profile, task_mean
+from analysis.statistics.across_tasks import (
+    gap_share,
+    interquartile_mean,
+    normalised,
+    profile,
+    task_mean,
+)
 from analysis.statistics.estimates import FEWEST, SEED, Inference
+from coartic.initial import initial_hands
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 NEAR = (0.01, 0.02, 0.05, 0.1)
 """Gaps, as shares of the optimum, that count as near."""
+WITHIN = {f"within_{near:.0%}".rstrip("%"): near for near in NEAR}
+"""The same by the columns that say how many runs came so near."""
 THRESHOLDS = {"gap": np.arange(81) / 200, "score": np.arange(-10, 51) / 50}
 """Of the profiles: gaps from 0 to 40 %, normalised scores from −0.2 to 1."""
+REACHED: Mapping[str, Literal["above", "at most"]] = {"gap": "at most", "score": "above"}
+"""Which side of a threshold a profile counts."""
 _CONDITION = re.compile(re.escape(LEARNER) + r"(EC\d)(.*)")
 _ONE_ARMED, _TWO_ARMED = "EC1", ("EC4", "EC3")
+
+
+def normalised_scores(study: Study) -> pd.DataFrame:
+    """One row a run of every task whose optimum and initial solution are known.
+
+    Columns ``task``, ``method`` (with its variant), ``label`` (the cell's, whatever becomes
+    of ``method``), ``run``, ``seed``, ``reward``;
+    ``score`` (:func:`~analysis.statistics.across_tasks.normalised`) and ``gap``
+    (:func:`~analysis.statistics.across_tasks.gap_share`), both against the optimum
+    with all joints free and the corrective process alone with the task's initial hands. A
+    run without a solution has NaN for all three.
+    """
+    best, parts = study.optima, []
+    alone = study.results.sequences.set_index(["task", "hands"]).reward
+    for cell in study.cells.values():
+        task = study.tasks[cell.task]
+        start = alone.get((cell.task, initial_hands(task)))
+        if (cell.task, "free") not in best or start is None or pd.isna(start):
+            continue
+        rewards = cell.runs.reward.where(cell.runs.status == "ok")
+        values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
+        top = best[cell.task, "free"].reward
+        if top in (0, start):  # nothing to fall short of, or to gain
+            continue
+        parts.append(
+            pd.DataFrame(
+                {
+                    "task": cell.task,
+                    "method": cell.label,
+                    "label": cell.label,
+                    "run": cell.runs.run.to_numpy(),
+                    "seed": cell.runs.seed.to_numpy(),
+                    "reward": values,
+                    "score": normalised(values, float(start), top),
+                    "gap": gap_share(values, top),
+                }
+            )
+        )
+    columns = ["task", "method", "label", "run", "seed", "reward", "score", "gap"]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
+
+
+def by_task(scores: pd.DataFrame, method: str, column: str = "score") -> dict[str, Array]:
+    """One method's column of :func:`normalised_scores`, by task, NaN included."""
+    rows = scores[scores.method == method]
+    return {
+        str(task): group[column].to_numpy(dtype=np.float64)
+        for task, group in rows.groupby("task", sort=False)
+    }
 
 
 def combined(scores: pd.DataFrame) -> pd.DataFrame:
     """``scores`` with rows of the learner over one-armed and two-armed tasks.
 
-    ``scores`` is of :func:`analysis.statistics.across_tasks.scores_frame`. Where EC4 (likewise
+    ``scores`` is of :func:`normalised_scores`. Where EC4 (likewise
     EC3) ran, its runs, elsewhere those of EC1, both as method ``dual-process (EC1, EC4)``;
     likewise variants of the two with the same name and parameters.
     """
@@ -64,8 +128,8 @@ def everywhere(scores: pd.DataFrame) -> list[str]:
     ]
 
 
-def overall_frame(scores: pd.DataFrame) -> pd.DataFrame:
-    """One row a method of :func:`everywhere`, the highest interquartile mean first.
+def over_tasks(scores: pd.DataFrame) -> pd.DataFrame:
+    """One row a method of :func:`everywhere` of ``scores``, the highest interquartile mean first.
 
     ``tasks``, ``runs`` (of all tasks), ``failed`` (without a solution); ``score``:
     interquartile mean of the normalised scores; ``gap``: mean gap as a share of the optimum;
@@ -77,34 +141,37 @@ def overall_frame(scores: pd.DataFrame) -> pd.DataFrame:
     for method in everywhere(scores):
         score, gap = (by_task(scores, method, column) for column in ("score", "gap"))
         failed = int(sum(np.isnan(runs).sum() for runs in gap.values()))
-        row: dict[str, Any] = {
-            "method": method,
-            "tasks": len(gap),
-            "runs": sum(map(len, gap.values())),
-            "failed": failed,
+        unknown = Inference(math.nan, (), "", note=f"{failed} runs without a solution")
+        measures = {
+            "score": unknown if failed else interquartile_mean(score, seed=SEED),
+            "gap": unknown if failed else task_mean(gap, seed=SEED),
+            **{name: _share(gap, near) for name, near in WITHIN.items()},
         }
-        for name, of in (
-            ("score", None if failed else interquartile_mean(score, seed=SEED)),
-            ("gap", None if failed else task_mean(gap, seed=SEED)),
-            *((f"within_{near:.0%}".rstrip("%"), _share(gap, near)) for near in NEAR),
-        ):
-            found = of or Inference(math.nan, (), "", note=f"{failed} runs without a solution")
-            row |= {
-                name: found.estimate,
-                f"{name}_low": found.low,
-                f"{name}_high": found.high,
-                f"{name}_note": found.note,
-            }
-        rows.append(row)
+        row = {"method": method, "tasks": len(gap), "runs": sum(map(len, gap.values()))}
+        rows.append(row | {"failed": failed} | _columns(measures))
+    nothing = Inference(math.nan, (), "")
     columns = ["method", "tasks", "runs", "failed"]
-    for name in ("score", "gap", *(f"within_{near:.0%}".rstrip("%") for near in NEAR)):
-        columns += [name, f"{name}_low", f"{name}_high", f"{name}_note"]
+    columns += _columns(dict.fromkeys(("score", "gap", *WITHIN), nothing))
     frame = pd.DataFrame(rows, columns=columns)
     return frame.sort_values("score", ascending=False, kind="stable", ignore_index=True)
 
 
-def profiles_frame(scores: pd.DataFrame) -> pd.DataFrame:
-    """Profiles of every method of :func:`everywhere`, to be drawn: one row a threshold.
+def _columns(measures: Mapping[str, Inference]) -> dict[str, float | str]:
+    """Each with its interval, and a note that says why there is none."""
+    return {
+        f"{name}{ending}": value
+        for name, found in measures.items()
+        for ending, value in (
+            ("", found.estimate),
+            ("_low", found.low),
+            ("_high", found.high),
+            ("_note", found.note),
+        )
+    }
+
+
+def profiles(scores: pd.DataFrame) -> pd.DataFrame:
+    """Profiles of every method of :func:`everywhere` of ``scores``: one row a threshold.
 
     ``kind``: ``gap`` (share of runs whose gap, as a share of the optimum, is at most
     ``threshold``) or ``score`` (share of runs whose normalised score is above it); ``share``
@@ -113,9 +180,8 @@ def profiles_frame(scores: pd.DataFrame) -> pd.DataFrame:
     parts = []
     for method in everywhere(scores):
         for kind, thresholds in THRESHOLDS.items():
-            reached = "at most" if kind == "gap" else "above"
             values = by_task(scores, method, kind)
-            found = profile(values, thresholds, reached, seed=SEED)  # type: ignore[arg-type]
+            found = profile(values, thresholds, REACHED[kind], seed=SEED)
             notes = [
                 _note(found.n, low, high) for low, high in zip(found.low, found.high, strict=True)
             ]

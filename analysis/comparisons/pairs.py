@@ -18,15 +18,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.frontier import SHARES
 from analysis.comparisons.methods import LEARNER, TOLD
+from analysis.comparisons.targets import SHARES
 from analysis.results.folder import CellRuns
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import (
@@ -57,14 +57,8 @@ SPENDS = {
     "solve_s": ("solve_s",),
 }
 """What a run spends: sums of columns of :func:`analysis.comparisons.methods.methods_frame`."""
-COLUMNS = (
-    "task kind first second runs_first runs_second n_first n_second mean_first mean_second "
-    "sd_first sd_second difference low high interval pairs correlation independent_low "
-    "independent_high expected p_bootstrap p_bootstrap_holm p_permutation p_permutation_holm "
-    "delta delta_low delta_high improvement improvement_low improvement_high trials "
-    "movement_ticks evaluations solve_s told_more told_less runs_5 runs_2 runs_1 smallest "
-    "smallest_share note"
-)
+RUNS_FOR = {f"runs_{share:.0%}".removesuffix("%"): share for share in SHARES}
+"""Differences, as shares of the optimum, for which so many runs are needed."""
 Kind = Literal["conditions", "variant", "method"]
 
 
@@ -108,135 +102,230 @@ def pairs(study: Study) -> Iterator[Pair]:
             against = [most]
             if cell.method.startswith(LEARNER) and own in plain:
                 kind, against = "variant", [own]
-            elif still in plain and study.methods[task, label]["other_arm"] == "still":
+            elif still in plain and study.method_rows[task, label].other_arm == "still":
                 against.append(str(still))
             for name in against:
                 more_told = _told(study, cell) - _told(study, plain[name])
                 yield Pair(kind, plain[name], cell, "less" if more_told else "greater")
 
 
-def pairwise_frame(study: Study) -> pd.DataFrame:
-    """One row a pair of :func:`pairs`.
+@dataclass(frozen=True, kw_only=True)
+class PairRow:
+    """What two cells of a task show beside each other; NaN where there is no number.
 
-    ``task``, ``kind``, ``first`` (the learner's), ``second``; of each ``runs_``, ``n_`` (runs
-    with a solution, all that follows is of those), ``mean_`` and ``sd_``.
-
-    ``difference``: mean reward of the first less the second's, ticks, with its 95 % BCa
-    interval ``low`` to ``high`` and what that is of (``interval``): pairs of runs that share
-    a seed, independent samples, or a sample against a number (:attr:`Pair.known`).
-    ``pairs`` and ``correlation`` (Pearson's) are of runs that share a seed,
-    ``independent_low`` and ``independent_high`` the interval that leaves pairing out.
-
-    ``p_bootstrap``: one-tailed, in the direction ``expected`` of the first. ``p_permutation``:
-    two-tailed, by the signs of the differences where the second is known. ``_holm``: adjusted
-    over all pairs of the task. ``delta`` (Cliff's) and ``improvement`` (P(first higher),
-    a tie half), each with ``_low`` and ``_high``.
-
-    ``trials``, ``movement_ticks``, ``evaluations`` (forward kinematics and Jacobians),
-    ``solve_s``: what the second spent in a run over what the first did, medians, NaN where
-    the first spent none. ``told_more``, ``told_less``: letters of the information that only
-    the second, only the first is told (:data:`analysis.comparisons.methods.TOLD`).
-
-    ``runs_5``, ``runs_2``, ``runs_1``: runs of each that a one-tailed test at 5 % needs to
-    find a difference of that share (%) of the optimum with power 80 %, at these SDs.
-    ``smallest``: difference that the runs at hand (the fewer of the two) find so, ticks, and
-    ``smallest_share`` of the optimum. ``note``: why there is no interval or test.
+    Of runs with a solution, rewards in ticks. The fields are the columns of
+    ``comparisons.csv``.
     """
+
+    task: str
+    kind: Kind
+    first: str
+    """The learner's label."""
+    second: str
+    runs_first: int
+    runs_second: int
+    n_first: int
+    """Runs with a solution: all that follows is of those."""
+    n_second: int
+    mean_first: float
+    mean_second: float
+    sd_first: float
+    sd_second: float
+    difference: float
+    """Mean reward of the first less the second's."""
+    low: float
+    """Of its 95 % BCa interval."""
+    high: float
+    interval: str
+    """What that is of: pairs of runs that share a seed, independent samples, or a sample
+    against a number (:attr:`Pair.known`)."""
+    pairs: int
+    """Runs that share a seed."""
+    correlation: float
+    """Pearson's, of their rewards."""
+    independent_low: float
+    """Of the interval that leaves pairing out."""
+    independent_high: float
+    expected: Literal["higher", "lower"]
+    """Of the first."""
+    p_bootstrap: float
+    """One-tailed, in the direction expected."""
+    p_bootstrap_holm: float
+    """Adjusted over all pairs of the task."""
+    p_permutation: float
+    """Two-tailed; by the signs of the differences where the second is known."""
+    p_permutation_holm: float
+    delta: float
+    """Cliff's."""
+    delta_low: float
+    delta_high: float
+    improvement: float
+    """P(first higher), a tie half."""
+    improvement_low: float
+    improvement_high: float
+    trials: float
+    """What the second spent in a run over what the first did, medians; NaN where the first
+    spent none."""
+    movement_ticks: float
+    evaluations: float
+    """Forward kinematics and Jacobians."""
+    solve_s: float
+    told_more: str
+    """Letters of the information that only the second is told
+    (:data:`analysis.comparisons.methods.TOLD`)."""
+    told_less: str
+    """That only the first is told."""
+    runs_5: float
+    """Runs of each that a one-tailed test at 5 % needs to find a difference of 5 % of the
+    optimum with power 80 %, at these SDs."""
+    runs_2: float
+    runs_1: float
+    smallest: float
+    """Difference that the runs at hand (the fewer of the two) find so, ticks."""
+    smallest_share: float
+    """The same as a share of the optimum."""
+    note: str
+    """Why there is no interval or test."""
+
+
+def compared(study: Study) -> tuple[PairRow, ...]:
+    """One row a pair of :func:`pairs`, p-values adjusted over the pairs of a task."""
     rows = [_row(study, pair) for pair in pairs(study)]
-    for _, family in itertools.groupby(rows, key=lambda row: row["task"]):
+    adjusted = []
+    for _, family in itertools.groupby(rows, key=lambda row: row.task):
         of_task = list(family)
-        for name in ("p_bootstrap", "p_permutation"):
-            adjusted = holm([row[name] for row in of_task])
-            for row, p in zip(of_task, adjusted, strict=True):
-                row[f"{name}_holm"] = p
-    return pd.DataFrame(rows, columns=COLUMNS.split())
+        bootstrap = holm([row.p_bootstrap for row in of_task])
+        permutation = holm([row.p_permutation for row in of_task])
+        adjusted += [
+            replace(row, p_bootstrap_holm=one, p_permutation_holm=two)
+            for row, one, two in zip(of_task, bootstrap, permutation, strict=True)
+        ]
+    return tuple(adjusted)
 
 
-def _row(study: Study, pair: Pair) -> dict[str, Any]:
+def pairs_table(rows: Sequence[PairRow]) -> pd.DataFrame:
+    """The rows with the fields of :class:`PairRow` as columns."""
+    columns = [field.name for field in fields(PairRow)]
+    return pd.DataFrame([vars(row) for row in rows], columns=columns)
+
+
+def _row(study: Study, pair: Pair) -> PairRow:
+    """A pair, its p-values not yet adjusted."""
     a, b = _rewards(pair.first), _rewards(pair.second)
-    task = pair.first.task
-    row: dict[str, Any] = {
-        "task": task,
-        "kind": pair.kind,
-        "first": pair.first.label,
-        "second": pair.second.label,
-        "runs_first": len(pair.first.runs),
-        "runs_second": len(pair.second.runs),
-        "n_first": len(a),
-        "n_second": len(b),
-        "mean_first": _mean(a),
-        "mean_second": _mean(b),
-        "sd_first": sd(a),
-        "sd_second": 0.0 if pair.known and len(b) else sd(b),
-    }
-    row |= _inference(pair, a, b)
-    first, second = (study.methods[task, cell.label] for cell in (pair.first, pair.second))
+    told, told_second = _told(study, pair.first), _told(study, pair.second)
+    found = _inferred(pair, a, b)
+    sd_first, sd_second = sd(a), 0.0 if pair.known and len(b) else sd(b)
+    optimum = study.optima.get((pair.first.task, "free"))
+    best = abs(optimum.reward) if optimum else math.nan
+    fewest = len(a) if pair.known else min(len(a), len(b))
+    smallest = _smallest(sd_first, sd_second, fewest)
+    return PairRow(
+        task=pair.first.task,
+        kind=pair.kind,
+        first=pair.first.label,
+        second=pair.second.label,
+        runs_first=len(pair.first.runs),
+        runs_second=len(pair.second.runs),
+        n_first=len(a),
+        n_second=len(b),
+        mean_first=_mean(a),
+        mean_second=_mean(b),
+        sd_first=sd_first,
+        sd_second=sd_second,
+        difference=found.difference.estimate,
+        low=found.difference.low,
+        high=found.difference.high,
+        interval=found.interval,
+        pairs=found.pairs,
+        correlation=found.correlation,
+        independent_low=found.independent.low,
+        independent_high=found.independent.high,
+        expected="higher" if pair.expected == "greater" else "lower",
+        p_bootstrap=found.bootstrap.p,
+        p_bootstrap_holm=math.nan,
+        p_permutation=found.permutation.p,
+        p_permutation_holm=math.nan,
+        **_with_ends("delta", cliffs_delta(found.improvement)),
+        **_with_ends("improvement", found.improvement),
+        **_spent(study, pair),
+        told_more=_letters(told_second - told),
+        told_less=_letters(told - told_second),
+        **{name: _runs_for(share * best, sd_first, sd_second) for name, share in RUNS_FOR.items()},
+        smallest=smallest,
+        smallest_share=smallest / best if best > 0 else math.nan,
+        note="; ".join(found.notes),
+    )
+
+
+class _Inferred(NamedTuple):
+    """Difference, tests and effect size of two samples of rewards."""
+
+    difference: Inference
+    independent: Inference
+    bootstrap: Inference
+    permutation: Inference
+    improvement: Inference
+    interval: str = ""
+    pairs: int = 0
+    correlation: float = math.nan
+
+    @property
+    def notes(self) -> list[str]:
+        every = (self.difference, self.bootstrap, self.permutation, self.improvement)
+        return list(dict.fromkeys(found.note for found in every if found.note))
+
+
+def _inferred(pair: Pair, a: Array, b: Array) -> _Inferred:
+    if not (len(a) and len(b)):
+        nothing = Inference(math.nan, (len(a), len(b)), "", note="no run with a solution")
+        return _Inferred(*(nothing,) * 5)
+    second = float(b[0]) if pair.known else b
+    independent = difference_of_means(a, second, seed=SEED)
+    bootstrap = bootstrap_test(a, second, pair.expected, seed=SEED)
+    better = probability_of_improvement(a, second, seed=SEED)
+    if pair.known:
+        flips = sign_flip_test(a, second, "two-sided", seed=SEED)
+        every = independent, independent, bootstrap, flips, better
+        return _Inferred(*every, "against a known value")
+    permutation = permutation_test(a, second, "two-sided", seed=SEED)
+    x, y = paired_by_seed(pair.first.good, pair.second.good)
+    if not len(x):
+        every = independent, independent, bootstrap, permutation, better
+        return _Inferred(*every, "independent")
+    differ = len(x) > 2 and np.ptp(x) and np.ptp(y)
+    correlation = float(np.corrcoef(x, y)[0, 1]) if differ else math.nan
+    paired = paired_difference(x, y, seed=SEED)
+    every = paired, independent, bootstrap, permutation, better
+    return _Inferred(*every, "paired by seed", len(x), correlation)
+
+
+def _with_ends(name: str, found: Inference) -> dict[str, float]:
+    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def _spent(study: Study, pair: Pair) -> dict[str, float]:
+    """What the second spends over what the first does."""
+    ratios = {}
+    rows = study.method_rows
+    first, second = (rows[cell.task, cell.label] for cell in (pair.first, pair.second))
     for name, columns in SPENDS.items():
-        ours, theirs = (sum(spent[column] for column in columns) for spent in (first, second))
-        row[name] = theirs / ours if ours else math.nan
-    row["told_more"] = _letters(_told(study, pair.second) - _told(study, pair.first))
-    row["told_less"] = _letters(_told(study, pair.first) - _told(study, pair.second))
-    optimum = study.optima.get((task, "free"))
-    return row | _sizes(row, abs(optimum.reward) if optimum else math.nan, pair.known)
+        ours, theirs = (
+            sum(getattr(spent, column) for column in columns) for spent in (first, second)
+        )
+        ratios[name] = theirs / ours if ours else math.nan
+    return ratios
 
 
-def _inference(pair: Pair, a: Array, b: Array) -> dict[str, Any]:
-    """Difference, tests and effect sizes of two samples of rewards."""
-    nothing = Inference(math.nan, (len(a), len(b)), "", note="no run with a solution")
-    apart = independent = test = permutation = better = nothing
-    kind, pairs_n, correlation = "", 0, math.nan
-    if len(a) and len(b):
-        second = float(b[0]) if pair.known else b
-        independent = difference_of_means(a, second, seed=SEED)
-        apart, kind = independent, "against a known value" if pair.known else "independent"
-        test = bootstrap_test(a, second, pair.expected, seed=SEED)
-        better = probability_of_improvement(a, second, seed=SEED)
-        if pair.known:
-            permutation = sign_flip_test(a, second, "two-sided", seed=SEED)
-        else:
-            permutation = permutation_test(a, second, "two-sided", seed=SEED)
-            x, y = paired_by_seed(pair.first.good, pair.second.good)
-            if pairs_n := len(x):
-                apart, kind = paired_difference(x, y, seed=SEED), "paired by seed"
-            if pairs_n > 2 and np.ptp(x) and np.ptp(y):
-                correlation = float(np.corrcoef(x, y)[0, 1])
-    delta = cliffs_delta(better)
-    notes = dict.fromkeys(n.note for n in (apart, test, permutation, better) if n.note)
-    return {
-        "difference": apart.estimate,
-        "low": apart.low,
-        "high": apart.high,
-        "interval": kind,
-        "pairs": pairs_n,
-        "correlation": correlation,
-        "independent_low": independent.low,
-        "independent_high": independent.high,
-        "expected": "higher" if pair.expected == "greater" else "lower",
-        "p_bootstrap": test.p,
-        "p_permutation": permutation.p,
-        "delta": delta.estimate,
-        "delta_low": delta.low,
-        "delta_high": delta.high,
-        "improvement": better.estimate,
-        "improvement_low": better.low,
-        "improvement_high": better.high,
-        "note": "; ".join(notes),
-    }
+def _runs_for(difference: float, first_sd: float, second_sd: float) -> float:
+    """Runs that find it; NaN where a number is unknown."""
+    known = difference > 0 and not (math.isnan(first_sd) or math.isnan(second_sd))
+    return runs_needed(difference, first_sd, second_sd) if known else math.nan
 
 
-def _sizes(row: dict[str, Any], optimum: float, known: bool) -> dict[str, Any]:
-    sds = row["sd_first"], row["sd_second"]
-    measured = not any(map(math.isnan, sds))
-    fewest = row["n_first"] if known else min(row["n_first"], row["n_second"])
-    found = {
-        f"runs_{share:.0%}".removesuffix("%"): runs_needed(share * optimum, *sds)
-        if measured and optimum > 0
-        else math.nan
-        for share in SHARES
-    }
-    smallest = smallest_difference(*sds, fewest) if measured else math.nan
-    share = smallest / optimum if optimum > 0 else math.nan
-    return {**found, "smallest": smallest, "smallest_share": share}
+def _smallest(first_sd: float, second_sd: float, runs: int) -> float:
+    if math.isnan(first_sd) or math.isnan(second_sd):
+        return math.nan
+    return smallest_difference(first_sd, second_sd, runs)
 
 
 def _keeping_still(condition: str) -> str | None:
@@ -253,7 +342,7 @@ def _rewards(cell: CellRuns) -> Array:
 
 
 def _told(study: Study, cell: CellRuns) -> set[str]:
-    return set(study.methods[cell.task, cell.label]["told"])
+    return set(study.method_rows[cell.task, cell.label].told)
 
 
 def _letters(told: set[str]) -> str:

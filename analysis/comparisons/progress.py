@@ -4,21 +4,38 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import solve_times
-from analysis.results.folder import Results
+from analysis.comparisons.methods import STILL, solve_times
+from analysis.results.folder import CellRuns, Results
+from analysis.results.optima import locks_base
 from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
 """What can be spent: columns of ``runs.parquet``; ``solve_s`` is wall time in s."""
+LABELS = {
+    "trials": "trials",
+    "movement_ticks": "ticks",
+    "forward_kinematics": "kinematics",
+    "solve_s": "solve s",
+    "jacobians": "Jacobians",
+    "information": "information",
+}
+"""Spends in short. Jacobians and kinds of information are known of whole runs alone."""
+OTHER_ARMS = ("free", "still")
+"""Whose optimum: with all joints free, or with the arm that is not chosen kept still."""
 
 
 @dataclass(frozen=True)
-class Progress:
+class BestSoFar:
     """One run as a step function of what it spent.
 
     A planner is one step, from no solution to its solution, at all that it spent.
@@ -51,8 +68,8 @@ class Progress:
         return values
 
 
-def progress(results: Results) -> dict[str, Progress]:
-    """:class:`Progress` of every run of a folder, by run id.
+def best_so_far(study: Study) -> dict[str, BestSoFar]:
+    """:class:`BestSoFar` of every run of a folder, by run id.
 
     Trials are counted from 1. A completed trial took as many control ticks as its reward
     is negative; the ticks of failed trials are known as a sum only and spread evenly over
@@ -67,10 +84,10 @@ def progress(results: Results) -> dict[str, Progress]:
     or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that
     makes fewer, or has no budget, ended by itself.
     """
-    rewards = _rewards_by_run(results)
-    limit = results.manifest.limits.trials
+    rewards = _rewards_by_run(study.results)
+    limit = study.results.manifest.limits.trials
     found = {}
-    for cell in results.cells:
+    for cell in study.cells.values():
         totals = cell.runs[["run_id", *SPENDS]].set_index("run_id").astype("Float64")
         totals["solve_s"] = solve_times(cell.good.set_index("run_id")).reindex(totals.index)
         table = totals.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -87,17 +104,35 @@ def progress(results: Results) -> dict[str, Progress]:
             trials = rewards.get(str(run_id))
             if not ok:
                 nothing = dict.fromkeys(SPENDS, np.empty(0))
-                found[str(run_id)] = Progress(np.empty(0), nothing, total, trials is not None)
+                found[str(run_id)] = BestSoFar(np.empty(0), nothing, total, trials is not None)
             elif trials is None:
                 spent = {name: np.array([value]) for name, value in total.items()}
-                found[str(run_id)] = Progress(np.array([reward]), spent, total, False)
+                found[str(run_id)] = BestSoFar(np.array([reward]), spent, total, False)
             else:
                 found[str(run_id)] = by_trial(trials, total, stopped=len(trials) >= budget)
     return found
 
 
-def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) -> Progress:
-    """Progress of a run from the reward of each of its trials (n,), NaN where it failed."""
+def cells_by_spend(study: Study) -> Iterator[tuple[CellRuns, str, list[BestSoFar]]]:
+    """Every cell and spend with the runs whose steps are known.
+
+    Without cells whose parameters lock the base: they solve another problem than the task.
+    """
+    for cell in study.cells.values():
+        if locks_base(cell.runs):
+            continue
+        runs = [study.best_so_far[str(run_id)] for run_id in cell.runs.run_id]
+        for spend in SPENDS:
+            yield cell, spend, [run for run in runs if run.known(spend)]
+
+
+def keeps_to(cell: CellRuns, other_arm: str) -> bool:
+    """Whether a method's solutions keep to the restriction of an optimum."""
+    return other_arm == "free" or bool((cell.good.other_arm_travel <= STILL).all())
+
+
+def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) -> BestSoFar:
+    """A run from the reward of each of its trials (n,), NaN where it failed."""
     failed = np.isnan(rewards)
     best = np.maximum.accumulate(np.where(failed, -np.inf, rewards))
     steps = np.flatnonzero(best > np.concatenate([[-np.inf], best[:-1]]))
@@ -108,7 +143,7 @@ def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) 
     share = number / len(rewards)
     spent = {name: total[name] * share for name in SPENDS}
     spent |= {"trials": number, "movement_ticks": np.cumsum(ticks)[steps]}
-    return Progress(best[steps], spent, total, True, stopped)
+    return BestSoFar(best[steps], spent, total, True, stopped)
 
 
 def _rewards_by_run(results: Results) -> dict[str, Array]:

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
 from analysis.comparisons.methods import solve_times
-from analysis.markup import code, escaped
-from analysis.page import Heading, Part, page
-from analysis.results.folder import CellRuns, Results, load_results
+from analysis.comparisons.surroundings import Differing, codes, differing_tasks, surroundings
+from analysis.results.folder import CellRuns
 from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
 from analysis.statistics.estimates import (
     FEWEST,
@@ -30,95 +29,127 @@ from analysis.statistics.estimates import (
     paired_by_seed,
     paired_difference,
 )
-from analysis.table import NONE, Table
+from analysis.study import CellKey, Study, load
 from coartic import CoarticError
+from coartic.robot import Array
 
 SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
 """Spends whose medians are compared; the last one is wall time, s."""
-_WORDS = {"title", "description", "provenance"}  # of a task; they change no result
-_VERDICTS = (
-    ("identical", "identical in every run"),
-    ("equivalent", "not identical, equivalent"),
-    ("undecided", "undecided"),
-    ("different", "different"),
-    ("no interval", "not identical, with too few runs for an interval"),
-    ("not compared", "not compared"),
-)
+Verdict = Literal[
+    "identical", "equivalent", "undecided", "different", "no interval", "not compared"
+]
+_VERDICTS: Mapping[Verdict, str] = {
+    "identical": "identical in every run",
+    "equivalent": "not identical, equivalent",
+    "undecided": "undecided",
+    "different": "different",
+    "no interval": "not identical, with too few runs for an interval",
+    "not compared": "not compared",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class VersionRow:
+    """A cell that both folders have; NaN where there is no number.
+
+    The fields are the columns of the table that ``coartic compare --csv`` writes.
+    """
+
+    task: str
+    method: str
+    variant: str
+    n_a: int
+    """Runs."""
+    n_b: int
+    solved_a: int
+    """Runs with a solution."""
+    solved_b: int
+    mean_a: float = math.nan
+    """Reward, ticks."""
+    mean_b: float = math.nan
+    shared: int
+    """Seeds that both have."""
+    identical: int
+    """Runs among them with the same status, joints, ticks and rewards of all trials."""
+    paired: bool | None = None
+    """Whether ``difference`` is paired by seed: where at least three are shared."""
+    difference: float = math.nan
+    """Mean reward of B less that of A."""
+    low: float = math.nan
+    """Of its 95 % BCa interval."""
+    high: float = math.nan
+    p: float = math.nan
+    """Of the two-sided bootstrap test."""
+    p_adjusted: float = math.nan
+    """After Holm over all cells tested."""
+    margin: float = math.nan
+    """Ticks within which the means count as equivalent."""
+    verdict: Verdict = "not compared"
+    """``identical`` (every run), of an
+    :class:`~analysis.statistics.equivalence.Equivalence`, ``no interval`` (fewer than three
+    runs) or ``not compared`` (``remarks`` say why)."""
+    trials_a: float = math.nan
+    """Medians over runs of what is spent, time in s."""
+    trials_b: float = math.nan
+    movement_ticks_a: float = math.nan
+    movement_ticks_b: float = math.nan
+    forward_kinematics_a: float = math.nan
+    forward_kinematics_b: float = math.nan
+    jacobians_a: float = math.nan
+    jacobians_b: float = math.nan
+    solve_s_a: float = math.nan
+    solve_s_b: float = math.nan
+    remarks: str
+
+    @property
+    def label(self) -> str:
+        """The method with its variant."""
+        return f"{self.method} {self.variant}".strip()
+
+    def spent(self, name: str) -> tuple[float, float]:
+        """What A and B spent, of :data:`SPENT`."""
+        return getattr(self, f"{name}_a"), getattr(self, f"{name}_b")
 
 
 @dataclass(frozen=True)
 class VersionComparison:
-    """What :func:`compare_versions` found, ready for a terminal, Markdown and CSV."""
+    """What :func:`compare_versions` found."""
 
     folders: tuple[Path, Path]
-    differing: Table
+    differing: Sequence[Differing]
     """What differs between the folders as a whole."""
-    same: list[str]
+    same: Sequence[str]
     """What does not."""
-    cells: pd.DataFrame
-    """One row per cell of both folders; columns as :func:`cells_frame` says."""
+    rows: Sequence[VersionRow]
+    """Cells of both folders, in the order of A's plan."""
     only: tuple[dict[str, list[str]], dict[str, list[str]]]
     """Cells that one folder alone has: tasks by method with variant."""
-    notes: list[str]
-    """In inline markup."""
+    stale: tuple[int, int]
+    """Records in each folder that were made by other code and have no part here."""
+
+    @property
+    def cells(self) -> pd.DataFrame:
+        """The rows with the fields of :class:`VersionRow` as columns."""
+        columns = [field.name for field in fields(VersionRow)]
+        return pd.DataFrame([vars(row) for row in self.rows], columns=columns)
 
     @property
     def summary(self) -> list[str]:
         """How many cells came out which way."""
-        counts = self.cells.verdict.value_counts()
-        parts = [f"{counts[key]} {words}" for key, words in _VERDICTS if counts.get(key)]
-        lines = [f"{len(self.cells)} cells in both: {', '.join(parts) or 'nothing to compare'}."]
+        found = [row.verdict for row in self.rows]
+        parts = [
+            f"{found.count(verdict)} {words}"
+            for verdict, words in _VERDICTS.items()
+            if verdict in found
+        ]
+        lines = [f"{len(found)} cells in both: {', '.join(parts) or 'nothing to compare'}."]
         for side, tasks in zip("AB", self.only, strict=True):
             if tasks:
                 lines.append(f"{sum(map(len, tasks.values()))} cells only in {side}.")
         return lines
 
-    @property
-    def table(self) -> Table:
-        """The cells as text, in the order of A's plan."""
-        return Table(
-            "Cells of both folders",
-            (
-                "task",
-                "method",
-                "A: mean (n)",
-                "B: mean (n)",
-                "identical runs",
-                "B − A [95 %]",
-                "adjusted p",
-                f"verdict (margin ±{MARGIN:.0%})",
-                "trials",
-                "ticks",
-                "kinematics",
-                "Jacobians",
-                "solve s",
-                "remarks",
-            ),
-            tuple(_text(row) for row in self.cells.to_dict("records")),
-        )
 
-    def to_markdown(self) -> str:
-        """The whole page."""
-        first, second = self.folders
-        parts: list[Part] = [
-            Heading(1, "Two sets of results"),
-            f"A: {code(str(first))}. B: {code(str(second))}.",
-            self.summary,
-            Heading(2, self.differing.title),
-            self.differing if self.differing.rows else "Nothing.",
-            f"The same: {', '.join(self.same) or 'nothing'}.",
-            Heading(2, self.table.title),
-            self.table,
-            self.notes,
-        ]
-        for side, tasks in zip("AB", self.only, strict=True):
-            if tasks:
-                parts.append(Heading(2, f"Cells only in {side}"))
-                parts.append([escaped(f"{name}: {', '.join(on)}") for name, on in tasks.items()])
-        return page(parts)
-
-
-def load_pair(first: Path, second: Path) -> tuple[Results, Results]:
+def load_pair(first: Path, second: Path) -> tuple[Study, Study]:
     """Two results folders that can be compared.
 
     Raises CoarticError for one folder given twice, and for one that is no results folder,
@@ -128,129 +159,108 @@ def load_pair(first: Path, second: Path) -> tuple[Results, Results]:
         raise CoarticError(
             f"{first} and {second} are one folder: name two, such as results/old results/new"
         )
-    return load_results(first), load_results(second)
+    return load(first), load(second)
 
 
-def compare_versions(first: Results, second: Results) -> VersionComparison:
+def compare_versions(first: Study, second: Study) -> VersionComparison:
     """Everything that differs between A (``first``) and B (``second``)."""
-    differing, same = _surroundings(first, second)
+    differing, same = surroundings(first, second)
     here, there = _cells(first), _cells(second)
     return VersionComparison(
-        (first.folder, second.folder),
+        (first.results.folder, second.results.folder),
         differing,
         same,
-        cells_frame(first, second),
+        compared_cells(first, second),
         (_only(here, there), _only(there, here)),
-        _notes(first, second),
+        (_stale(first), _stale(second)),
     )
 
 
-def cells_frame(first: Results, second: Results) -> pd.DataFrame:
-    """One row per cell that both folders have, in the order of the first one's plan.
-
-    ``n_*`` runs, ``solved_*`` those with a solution, ``mean_*`` reward; ``shared`` seeds and
-    ``identical`` runs among them: the same status, joints, ticks and rewards of all trials.
-    ``difference`` is the mean of B less that of A with its 95 % BCa interval (``low``,
-    ``high``), ``paired`` by seed where at least three are shared; ``p`` is of the two-sided
-    bootstrap test, ``p_adjusted`` after Holm over all cells tested. ``verdict`` is
-    ``identical`` (every run), ``equivalent``, ``undecided`` or ``different``
-    (:class:`~analysis.statistics.equivalence.Equivalence`, ``margin`` in ticks), ``no interval``
-    (fewer than three runs) or ``not compared`` (``remarks`` say why). ``SPENT_*`` are medians
-    over runs, time in s.
-    """
-    here, there = _cells(first), _cells(second)
-    tasks = _differing_tasks(first, second)
-    code = _codes(first), _codes(second)
+def compared_cells(first: Study, second: Study) -> list[VersionRow]:
+    """One row a cell that both folders have, in the order of the first one's plan."""
+    there = _cells(second)
+    tasks = differing_tasks(first, second)
+    ours, theirs = codes(first), codes(second)
     rows = []
-    for key, cell in here.items():
-        if key not in there:
-            continue
-        row = _row(cell, there[key], tasks.get(cell.task))
-        if code[0][cell.method] != code[1][cell.method]:
-            row["remarks"] = "; ".join(filter(None, [row["remarks"], "other code"]))
-        rows.append(row)
-    frame = pd.DataFrame(rows, columns=_COLUMNS)
-    return frame.assign(p_adjusted=holm(frame.p.astype(float).tolist()))
+    for key, cell in _cells(first).items():
+        if key in there:
+            row = _row(cell, there[key], tasks.get(cell.task))
+            if ours[cell.method] != theirs[cell.method]:
+                row = replace(row, remarks=_joined(row.remarks, "other code"))
+            rows.append(row)
+    adjusted = holm([row.p for row in rows])
+    return [replace(row, p_adjusted=p) for row, p in zip(rows, adjusted, strict=True)]
 
 
-_COLUMNS = [
-    *("task", "method", "variant", "n_a", "n_b", "solved_a", "solved_b", "mean_a", "mean_b"),
-    *("shared", "identical", "paired", "difference", "low", "high", "p", "p_adjusted"),
-    *("margin", "verdict"),
-    *(f"{name}_{side}" for name in SPENT for side in "ab"),
-    "remarks",
-]
-
-
-def _row(first: CellRuns, second: CellRuns, task: list[str] | None) -> dict[str, Any]:
+def _row(first: CellRuns, second: CellRuns, task: list[str] | None) -> VersionRow:
+    """``task``: keys in which the tasks of the two differ."""
     a, b = first.good, second.good
     both = first.runs.merge(second.runs, on="seed", suffixes=("_a", "_b"), validate="1:1")
-    same = both.result_a == both.result_b
-    row: dict[str, Any] = {
-        "task": first.task,
-        "method": first.method,
-        "variant": first.variant,
-        "n_a": len(first.runs),
-        "n_b": len(second.runs),
-        "solved_a": len(a),
-        "solved_b": len(b),
-        "shared": len(both),
-        "identical": int(same.sum()),
-        "verdict": "not compared",
-        "remarks": _parameters(first, second),
-    }
+    row = VersionRow(
+        task=first.task,
+        method=first.method,
+        variant=first.variant,
+        n_a=len(first.runs),
+        n_b=len(second.runs),
+        solved_a=len(a),
+        solved_b=len(b),
+        shared=len(both),
+        identical=int((both.result_a == both.result_b).sum()),
+        remarks=_parameters(first, second),
+    )
     if task is not None:  # the rewards of two tasks say nothing of each other
-        return row | {
-            "identical": 0,
-            "remarks": f"the tasks of this name differ: {', '.join(task)}",
-        }
+        remarks = f"the tasks of this name differ: {', '.join(task)}"
+        return replace(row, identical=0, remarks=remarks)
     failed = [
         f"{side} solved {len(good)} of {len(cell.runs)}"
         for side, good, cell in (("A", a, first), ("B", b, second))
         if len(good) < len(cell.runs) or not len(good)
     ]
     if failed:
-        return row | {"remarks": "; ".join(filter(None, [*failed, row["remarks"]]))}
-    row["mean_a"], row["mean_b"] = float(a.reward.mean()), float(b.reward.mean())
-    row |= {
+        return replace(row, remarks=_joined(*failed, row.remarks))
+    spent: dict[str, Any] = {
         f"{name}_{side}": _spent(runs, name)
         for name in SPENT
-        for side, runs in zip("ab", (a, b), strict=True)
+        for side, runs in (("a", a), ("b", b))
     }
-    everything = row["identical"] == len(a) == len(b)
-    return row | (_EQUAL if everything else _difference(a, b))
+    row = replace(row, mean_a=float(a.reward.mean()), mean_b=float(b.reward.mean()), **spent)
+    if row.identical == len(a) == len(b):
+        return replace(row, verdict="identical", paired=True, difference=0.0)
+    return _with_difference(row, a, b)
 
 
-_EQUAL = {"verdict": "identical", "paired": True, "difference": 0.0}
-
-
-def _difference(a: pd.DataFrame, b: pd.DataFrame) -> dict[str, Any]:
+def _with_difference(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> VersionRow:
     """Difference of mean rewards, B less A, with interval, test and verdict."""
     before, after = paired_by_seed(a, b)
     paired = len(before) >= FEWEST
     if paired:
         interval = paired_difference(after, before, seed=SEED)
-        samples: tuple[Any, Any] = (after - before, 0.0)
+        samples: tuple[Array, Array | float] = (after - before, 0.0)
     else:
         before, after = (runs.reward.to_numpy(dtype=np.float64) for runs in (a, b))
         interval = difference_of_means(after, before, seed=SEED)
         samples = (after, before)
-    found = {
-        "paired": paired,
-        "difference": interval.estimate,
-        "low": interval.low,
-        "high": interval.high,
-        "p": bootstrap_test(*samples, "two-sided", seed=SEED).p,
-        "verdict": "no interval",
-    }
-    margin = MARGIN * abs(float(a.reward.mean()))
-    if margin and min(len(before), len(after)) >= FEWEST:
-        agreed = bootstrap_equivalence(*samples, margin, seed=SEED)
-        # Where most pairs are equal, resamples without any spread leave it without an end.
-        if not math.isfinite(agreed.low) or not math.isfinite(agreed.high):
-            agreed = replace(agreed, low=interval.low, high=interval.high)
-        found |= {"margin": margin, "verdict": agreed.verdict}
-    return found
+    row = replace(
+        row,
+        paired=paired,
+        difference=interval.estimate,
+        low=interval.low,
+        high=interval.high,
+        p=bootstrap_test(*samples, "two-sided", seed=SEED).p,
+        verdict="no interval",
+    )
+    margin = MARGIN * abs(row.mean_a)
+    if not margin or min(len(before), len(after)) < FEWEST:
+        return row
+    agreed = bootstrap_equivalence(*samples, margin, seed=SEED)
+    # Where most pairs are equal, resamples without any spread leave it without an end.
+    if not math.isfinite(agreed.low) or not math.isfinite(agreed.high):
+        agreed = replace(agreed, low=interval.low, high=interval.high)
+    return replace(row, margin=margin, verdict=agreed.verdict)
+
+
+def _joined(*remarks: str) -> str:
+    return "; ".join(filter(None, remarks))
 
 
 def _spent(runs: pd.DataFrame, name: str) -> float:
@@ -258,22 +268,31 @@ def _spent(runs: pd.DataFrame, name: str) -> float:
     return float(values.median()) if len(values) else math.nan
 
 
-def _cells(results: Results) -> dict[tuple[str, str], CellRuns]:
-    """Cells by task and label; a cell that the plan names twice has its runs once."""
+def _cells(study: Study) -> dict[CellKey, CellRuns]:
+    """A cell that the plan names twice has its runs once."""
     return {
-        (cell.task, cell.label): replace(cell, runs=cell.runs.drop_duplicates("run_id"))
-        for cell in results.cells
+        key: replace(cell, runs=cell.runs.drop_duplicates("run_id"))
+        for key, cell in study.cells.items()
     }
 
 
 def _only(
-    cells: dict[tuple[str, str], CellRuns], others: dict[tuple[str, str], CellRuns]
+    cells: Mapping[CellKey, CellRuns], others: Mapping[CellKey, CellRuns]
 ) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for task, label in cells:
         if (task, label) not in others:
             found.setdefault(label, []).append(task)
     return found
+
+
+def _stale(study: Study) -> int:
+    planned = set(study.runs.run_id)
+    keys = {run_id.partition("-")[0] for run_id in planned}
+    return sum(
+        path.stem not in planned and path.stem.partition("-")[0] in keys
+        for path in (study.results.folder / "records").glob("*.json")
+    )
 
 
 def _parameters(first: CellRuns, second: CellRuns) -> str:
@@ -286,161 +305,3 @@ def _parameters(first: CellRuns, second: CellRuns) -> str:
         for name in sorted(a.keys() | b.keys())
         if a.get(name) != b.get(name)
     )
-
-
-def _differing_tasks(first: Results, second: Results) -> dict[str, list[str]]:
-    """Tasks of one name, and the keys in which they differ."""
-    here, there = _tasks(first), _tasks(second)
-    found = {}
-    for name in here.keys() & there.keys():
-        keys = sorted(here[name].keys() | there[name].keys())
-        differing = [key for key in keys if here[name].get(key) != there[name].get(key)]
-        if differing:
-            found[name] = differing
-    return found
-
-
-def _tasks(results: Results) -> dict[str, dict[str, Any]]:
-    """What movement and scoring depend on in each task."""
-    return {
-        name: {key: value for key, value in task.items() if key not in _WORDS}
-        for name, task in results.manifest.specification.tasks.items()
-    }
-
-
-def _codes(results: Results) -> dict[str, str]:
-    methods = results.manifest.specification.methods
-    return {name: method.code for name, method in methods.items()}
-
-
-def _surroundings(first: Results, second: Results) -> tuple[Table, list[str]]:
-    """What was asked for and where it was run: a table of what differs, and what does not."""
-    a, b = _facts(first), _facts(second)
-    rows = [(name, a[name], b[name]) for name in a if a[name] != b[name]]
-    same = [name for name in a if a[name] and a[name] == b[name]]
-    for what, kinds, ours, theirs in (
-        ("task", "tasks", *_task_texts(first, second)),
-        ("code of", "methods", _codes(first), _codes(second)),
-        ("library", "libraries", _packages(first), _packages(second)),
-    ):
-        shared = [name for name in ours if name in theirs]
-        differing = [name for name in shared if ours[name] != theirs[name]]
-        rows += [(f"{what} {name}", ours[name], theirs[name]) for name in differing]
-        here, there = (
-            ", ".join(name for name in side if name not in shared) for side in (ours, theirs)
-        )
-        if here or there:
-            rows.append((f"{kinds} of one folder only", here, there))
-        if shared:
-            count = f"{len(shared) - len(differing)} of {len(shared)} shared {kinds}"
-            same.append(f"code of {count}" if what == "code of" else count)
-    text = tuple((what, here or NONE, there or NONE) for what, here, there in rows)
-    return Table("What differs", ("what", "A", "B"), text), same
-
-
-def _facts(results: Results) -> dict[str, str]:
-    specification, limits = results.manifest.specification, results.manifest.limits
-    environment = results.manifest.environment
-    commit = environment.commit
-    facts = {
-        **{name: getattr(specification, name) for name in ("suite", "seed", "runs", "trials")},
-        "time limit (s)": limits.time_s,
-        "trial budget": limits.trials,
-        "rows of runs.parquet": len(results.runs),
-        "coartic": environment.coartic,
-        "code of the model": environment.model_code,
-        "commit": commit and commit.id[:12] + "+" * commit.dirty,
-        "commits of the runs": _list(
-            text[:12] + "+" * text.endswith("+") for text in results.runs.commit.dropna()
-        ),
-        "library versions of the runs": _list(results.runs["packages"].dropna()),
-        **{
-            name: getattr(environment, name)
-            for name in ("python", "platform", "processor", "cores")
-        },
-    }
-    return {name: "" if value is None else str(value) for name, value in facts.items()}
-
-
-def _task_texts(first: Results, second: Results) -> tuple[dict[str, str], dict[str, str]]:
-    """By task the keys, with their values, in which it differs from the other of its name."""
-    differing = _differing_tasks(first, second)
-    here, there = (
-        {
-            name: ", ".join(f"{key} {task.get(key)}" for key in differing.get(name, ()))
-            for name, task in _tasks(results).items()
-        }
-        for results in (first, second)
-    )
-    return here, there
-
-
-def _packages(results: Results) -> dict[str, str]:
-    return results.manifest.environment.packages
-
-
-def _list(values: Iterable[Any]) -> str:
-    return ", ".join(sorted(set(map(str, values))))
-
-
-def _notes(first: Results, second: Results) -> list[str]:
-    notes = [
-        "A cell is identical where all its runs are, and is not tested then.",
-        "B − A: difference of mean rewards (more is better) with its BCa interval, paired by "
-        f"seed where at least {FEWEST} seeds are shared (marked ‖), of independent runs "
-        "otherwise. p: two-sided bootstrap test, Holm over the cells tested here. Verdict: by "
-        f"the studentised bootstrap interval beside ±{MARGIN:.0%} of A's mean "
-        "(docs/statistics.md), by the BCa interval where so many runs are equal that the former "
-        "has no end; a difference can be real (small p) and within the margin.",
-        "Trials, ticks, kinematics, Jacobians and solve time: B's median over A's. Times "
-        "compare code only where processor and load were the same.",
-        "Cells with a run that has no solution are not compared: a mean of the others would "
-        "flatter whichever side failed on the harder runs.",
-        "Identical runs have the same status, the same solution to the last joint and tick, and "
-        "the same reward in every trial. Both folders were checked against their records, whose "
-        "solutions were executed again; `coartic reproduce RUN_ID` performs a whole run again.",
-    ]
-    for side, results in zip("AB", (first, second), strict=True):
-        planned = set(results.runs.run_id)
-        keys = {run_id.partition("-")[0] for run_id in planned}
-        stale = sum(
-            path.stem not in planned and path.stem.partition("-")[0] in keys
-            for path in (results.folder / "records").glob("*.json")
-        )
-        if stale:
-            notes.append(f"{side}: {stale} records were made by other code and have no part here.")
-    return notes
-
-
-def _text(row: dict[Any, Any]) -> tuple[str, ...]:
-    def mean(side: str) -> str:
-        value = row[f"mean_{side}"]
-        return f"{NONE if math.isnan(value) else f'{value:.1f}'} ({row[f'solved_{side}']})"
-
-    difference = NONE
-    if not math.isnan(row["difference"]):
-        difference = f"{row['difference']:+.1f}" if row["difference"] else "0"
-        if not math.isnan(row["low"]):
-            difference += f" [{row['low']:+.1f}, {row['high']:+.1f}]"
-            difference += " ‖" if row["paired"] else ""
-    return (
-        row["task"],
-        f"{row['method']} {row['variant']}".strip(),
-        mean("a"),
-        mean("b"),
-        f"{row['identical']} of {row['shared']}" if row["shared"] else "no seed shared",
-        difference,
-        NONE if math.isnan(row["p_adjusted"]) else f"{row['p_adjusted']:.2g}",
-        row["verdict"],
-        *(_ratio(row[f"{name}_a"], row[f"{name}_b"]) for name in SPENT),
-        row["remarks"] or NONE,
-    )
-
-
-def _ratio(a: float, b: float) -> str:
-    """B over A; both numbers where one of them is 0."""
-    if math.isnan(a) or math.isnan(b) or a == b == 0:
-        return NONE
-    if not a or not b:
-        return f"{a:.3g} → {b:.3g}"
-    return f"{b / a:.3g}"

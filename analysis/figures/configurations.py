@@ -17,7 +17,7 @@ from analysis.figures.selection import missing, solved
 from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, styled
 from analysis.methods import LEARNER, short_name
 from analysis.signatures.trajectories import Trajectories
-from coartic import CoarticError, Execution, Task, execute
+from coartic import Execution, Task, execute
 from coartic.frames import movements_from
 from coartic.robot import Array
 from coartic.task import hands_of
@@ -193,32 +193,21 @@ def configurations(
     )
 
 
-def paper_configurations(
-    study: Study, methods: Sequence[str] | None = None
-) -> tuple[list[Plot], dict[str, str]]:
-    """The paper's Figures 5 to 7 as far as the folder allows, and why one is missing.
+def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """One of the paper's Figures 5 to 7 by its name in :data:`PAPER`, as far as runs allow.
 
-    They show the paper's conditions or ``methods``, and up to :data:`ROWS` hand sequences of
+    It shows the paper's conditions or ``methods``, and up to :data:`ROWS` hand sequences of
     each. Methods that the folder lacks are left out where another one of the task remains.
+    Raises CoarticError where nothing is left.
     """
-    plots, skipped = [], {}
-    for name, (figure, printed) in PAPER.items():
-        rows = [(task, own if methods is None else methods) for task, own in printed]
-        kept = [
-            (task, [label for label in own if (task, label) in study.cells]) for task, own in rows
-        ]
-        kept = [(task, own) for task, own in kept if own]
-        if not kept:
-            wanted = " or ".join(f"{', '.join(own)} on {task}" for task, own in rows)
-            skipped[name] = f"no runs of {wanted}"
-            continue
-        try:
-            plots.append(
-                configurations(study, kept, id=name, like=f"Figure {figure}", sequences=ROWS)
-            )
-        except CoarticError as error:
-            skipped[name] = str(error)
-    return plots, skipped
+    figure, printed = PAPER[name]
+    rows = [(task, own if methods is None else methods) for task, own in printed]
+    kept = [(task, [label for label in own if (task, label) in study.cells]) for task, own in rows]
+    kept = [(task, own) for task, own in kept if own]
+    if not kept:
+        wanted = " or ".join(f"{', '.join(own)} on {task}" for task, own in rows)
+        raise missing(study, f"no runs of {wanted}")
+    return configurations(study, kept, id=name, like=f"Figure {figure}", sequences=ROWS)
 
 
 def _draw(shown: Sequence[Solution]) -> Figure:

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.comparisons.frontier import anytime_frame
 from analysis.comparisons.progress import SPENDS
 from analysis.figures.plot import Plot
 from analysis.figures.selection import chosen, known_tasks, missing
@@ -65,7 +64,7 @@ def frontier(
     labels = [
         label for label in chosen(study, list(found), methods) if not label.startswith(OPTIMUM)
     ]
-    frame = anytime_frame(study.results, study.progress)
+    frame = study.anytime
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
     pareto = study.pareto
     front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]

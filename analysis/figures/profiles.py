@@ -10,11 +10,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from analysis.comparisons.overall import REACHED, by_task, normalised_scores
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
 from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, styled
 from analysis.methods import short_name
-from analysis.statistics.across_tasks import by_task, profile, scores_frame
+from analysis.statistics.across_tasks import profile
 from analysis.statistics.estimates import CONFIDENCE, SEED
 from coartic import CoarticError
 from coartic.robot import Array
@@ -45,7 +46,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     joins the paper's conditions. The caption names methods that were asked for and have no
     such runs. Raises CoarticError where there is none.
     """
-    scores = scores_frame(study.results)
+    scores = normalised_scores(study)
     tasks = list(scores.task.unique())
     known = study.results.tasks
     learners = {
@@ -114,7 +115,7 @@ def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
         found = profile(
             by_task(scores, label, kind),
             levels,
-            "above" if kind == "score" else "at most",
+            REACHED[kind],
             seed=SEED,
         )
         parts.append(

@@ -42,25 +42,25 @@ _MARKS = {
 
 @styled
 def published(
-    study: Study, *, methods: Sequence[str] = CONDITIONS, tasks: Sequence[str] | None = None
+    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
 ) -> Plot:
     """Difference of every mean reward to the printed one, with interval and margin.
 
-    Cells with the paper's number of trials; where the paper reports hand sequences, those
-    too. Raises CoarticError where the folder has none of the paper's cells.
+    Cells with the paper's number of trials, by default of its conditions; where it reports
+    hand sequences, those too. Raises CoarticError where the folder has none of the paper's cells.
     """
-    found = known_tasks(study, tasks)
+    found, labels = known_tasks(study, tasks), methods or CONDITIONS
     rows = [
         row
         for name in found
-        for label in methods
+        for label in labels
         if has(study, name, label)
         for row in _rows(study, name, label)
     ]
     if not rows:
         raise missing(
             study,
-            f"no solved runs with {TRIALS} trials of {', '.join(methods)} on a task that the "
+            f"no solved runs with {TRIALS} trials of {', '.join(labels)} on a task that the "
             "paper prints a reward of",
         )
     data = pd.DataFrame(rows)

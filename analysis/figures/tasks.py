@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -12,6 +13,14 @@ from analysis.figures.plot import Plot
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.figures.style import NORMAL, SMALL, TALLEST, TWO, column_width, styled
 from coartic import Task
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+
+def tasks_of(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """:func:`tasks_plot` of a folder's tasks, whichever methods are shown elsewhere."""
+    return tasks_plot(list(study.tasks.values()))
 
 
 @styled

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import io
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -10,33 +11,32 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.claims.page import FITTED
-from analysis.claims.register import Judged
-from analysis.figures import Figures, Plot, all_figures
+from analysis.figures import Figures, Plot
 from analysis.figures.plot import FILES, rendered, svg_text
+from analysis.figures.register import Section as FigureSection
 from analysis.markup import escaped, words
 from analysis.report import tables
 from analysis.report.document import (
     Block,
     Bullets,
-    Column,
     DataTable,
     Document,
     FigureBlock,
     PlayerBlock,
     Prose,
-    Row,
     Section,
 )
+from analysis.report.formats.csv import table_csv
 from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, headline_numbers, macro_names, numbers_tex
+from analysis.report.pages.claims import claim_section
+from analysis.report.pages.frontier import cost_tables, optima_known
 from analysis.report.player import player_json
 from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
-from analysis.report.trace import FILE, trace_json
+from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
-from analysis.table import Table
 from coartic import CoarticError
 
 if TYPE_CHECKING:
@@ -46,14 +46,6 @@ MOST_TASKS = 8
 """More would make a report that nobody reads."""
 CLAIMS = "claims-register"
 """Id of the section of the claims."""
-_FIGURES = {
-    "Figure 4": "tasks",
-    "Figure 5": "configurations-one-armed",
-    "Figure 6": "configurations-two-armed-1",
-    "Figure 7": "configurations-two-armed-2",
-    "Figure 8": "learned-reward",
-}
-"""Ours by the paper's."""
 _FORMATS = {".pdf": "PDF", ".svg": "SVG", ".png": "PNG", ".csv": "CSV (the data behind it)"}
 
 
@@ -82,53 +74,45 @@ def build(
             f"figures as {', '.join(formats)}: choose of {', '.join(_FORMATS)}, .svg among them, "
             "which report.md shows"
         )
-    figures = all_figures(study, MOST_TASKS, methods)
+    figures = Figures(study, methods, MOST_TASKS)
     numbers = tuple(headline_numbers(study))
-    by_id = {plot.id: plot for plot in figures.plots}
-    judged, pairs, scores = study.judged, study.pairs, study.scores
-    used: set[str] = set()
-
-    def shown(*starts: str) -> list[Block]:
-        """Figures whose ids begin so, each once."""
-        found = [name for start in starts for name in by_id if name.startswith(start)]
-        fresh = [name for name in dict.fromkeys(found) if name not in used]
-        used.update(fresh)
-        return [_figure(by_id[name]) for name in fresh]
-
-    sections = [
-        _summary(study, judged, scores),
-        _section("tasks-drawn", "Tasks", shown("tasks")),
-        _section("paper", "Published and ours", [
-            *shown("published", "learned-reward"),
-            *_tables(tables.published_table(study), tables.exhaustive_table(study)),
-            *shown("recruitment"),
-        ]),
-        _claims(study, judged, set(by_id)),
-        _section("movements", "Movements", [
-            PlayerBlock(
-                "player", "Movements, tick by tick",
-                "Of each method the run nearest its median reward, beside the initial solution. "
-                "Open squares: left arm; closed circles: right arm; thick: the arm at work; "
-                "filled goals are hit.",
-                player_json(study),
-            ),
-            *shown("configurations"),
-        ]),
-        _section("learning", "Learning", shown("learning-curves")),
-        _methods(study, pairs, scores, shown("profiles")),
-        _cost(study, shown("frontier")),
-        _signatures(study, shown("context"), shown("signatures")),
-        _section("more-figures", "More figures", shown("")),
-        _section("limitations", "Limitations", [Bullets(limitations(study))]),
-        _about(study, figures, numbers, formats),
-    ]  # fmt: skip
+    sections = [*_sections(study, figures), _about(study, figures, numbers, formats)]
     document = Document(
-        _title(study.results),
-        tuple(section for section in sections if section.blocks or section.sections),
-        _lead(study.results),
-        {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
+        _title(study.results), tuple(sections), _lead(study.results), study.run_ids
     )
-    return Report(document, figures.plots, numbers, tuple(formats))
+    return Report(document, tuple(figures.plots), numbers, tuple(formats))
+
+
+def report_tables(study: Study) -> dict[str, pd.DataFrame]:
+    """The report's tables by id, with the columns of their CSV files."""
+    document = Document("", tuple(_sections(study, None)), runs=study.run_ids)
+    return {
+        table.id: pd.read_csv(io.StringIO(table_csv(table)), keep_default_na=False, na_values="")
+        for table in document.tables()
+    }
+
+
+def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
+    """The sections that have something to show; without figures and films where None."""
+
+    def drawn(section: FigureSection) -> list[Block]:
+        return (
+            [_figure(plot) for plot in figures.of_section(section)] if figures is not None else []
+        )
+
+    sections = (
+        _summary(study),
+        _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
+        _paper(study, drawn("paper")),
+        _claims(study, () if figures is None else set(figures)),
+        _movements(study, drawn("movements")),
+        _section("learning", "Learning", drawn("learning")),
+        _methods(study, drawn("methods")),
+        _cost(study, drawn("cost")),
+        _signatures(study, drawn("coarticulation")),
+        _section("limitations", "Limitations", [Bullets(limitations(study))]),
+    )
+    return (section for section in sections if section.blocks or section.sections)
 
 
 def write(report: Report, study: Study, folder: Path) -> None:
@@ -141,7 +125,7 @@ def write(report: Report, study: Study, folder: Path) -> None:
     about += macro_names(study).renamed()
     extra = {
         "numbers.tex": numbers_tex(report.numbers, about),
-        FILE: trace_json(study.results, report.document, report.numbers),
+        FILE: trace_json(study, report.document, report.numbers),
     }
     render = partial(rendered, endings=report.formats)
     write_report(report.document, report.plots, folder, extra, render=render)
@@ -165,7 +149,7 @@ def _lead(results: Results) -> str:
     )
 
 
-def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Section:
+def _summary(study: Study) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
     facts = (
@@ -179,99 +163,87 @@ def _summary(study: Study, judged: Sequence[Judged], scores: pd.DataFrame) -> Se
     )
     blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study))]
     unlike = unlike_printed(study)
-    counted = verdicts(judged, CLAIMS)
+    counted = verdicts(study.judged, CLAIMS)
     if unlike:
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         counted = Bullets((*counted.items, note))
     blocks.append(counted)
-    overall = tables.overall_table(study, study.overall, scores)
+    overall = tables.overall_table(study, study.overall, study.scores)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)
 
 
-def _methods(
-    study: Study, pairs: pd.DataFrame, scores: pd.DataFrame, profiles: list[Block]
-) -> Section:
+def _paper(study: Study, figures: list[Block]) -> Section:
+    found = _tables(
+        tables.published_table(study),
+        tables.sequences_table(study),
+        tables.exhaustive_table(study),
+    )
+    return _section("paper", "Published and ours", [*figures, *found])
+
+
+def _movements(study: Study, figures: list[Block]) -> Section:
+    player = PlayerBlock(
+        "player",
+        "Movements, tick by tick",
+        "Of each method the run nearest its median reward, beside the initial solution. "
+        "Open squares: left arm; closed circles: right arm; thick: the arm at work; "
+        "filled goals are hit.",
+        player_json(study),
+    )
+    return _section("movements", "Movements", [player, *figures])
+
+
+def _methods(study: Study, figures: list[Block]) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
         blocks = _tables(tables.methods_table(study, task))
         if not _many(study):
             blocks += _tables(
-                _folded(tables.pairwise_table(study, pairs, task)),
-                _folded(tables.cost_table(study, pairs, task)),
+                _folded(tables.pairwise_table(study, task)),
+                _folded(tables.cost_table(study, task)),
             )
         if blocks:
             below.append(_section(f"on-{slug}-methods", task, blocks))
-    reading = Bullets(tables.reading_of_methods(study))
-    return _section("methods", "Methods side by side", [*profiles, reading], below)
+    reading = Bullets(
+        (
+            *tables.reading_of_methods(study),
+            *(tables.reading_of_pairs(study) if study.pair_rows and not _many(study) else ()),
+        )
+    )
+    return _section("methods", "Methods side by side", [*figures, reading], below)
 
 
-def _cost(study: Study, frontier: list[Block]) -> Section:
+def _cost(study: Study, figures: list[Block]) -> Section:
     if _many(study):
-        return _section("cost", "Reward and what it costs", frontier)
-    targets, areas, pareto = study.targets, study.areas, study.pareto
+        return _section("cost", "Reward and what it costs", figures)
     below = []
     for task, slug in tables.table_ids(study).items():
-        blocks = _tables(
-            tables.targets_table(study, targets, task),
-            _folded(tables.areas_table(study, areas, task)),
-            _folded(tables.pareto_table(study, pareto, task)),
-        )
-        if blocks:
-            below.append(_section(f"on-{slug}-cost", task, blocks))
-    return _section("cost", "Reward and what it costs", frontier, below)
+        found = list(cost_tables(study, task))
+        if found:
+            folded = [replace(table, folded=True) for table in found[1:]]
+            every: list[Block] = [optima_known(study, task), found[0], *folded]
+            below.append(_section(f"on-{slug}-cost", task, every))
+    reading = Bullets(tables.READING_OF_COST)
+    return _section("cost", "Reward and what it costs", [*figures, reading], below)
 
 
-def _signatures(study: Study, context: list[Block], matrices: list[Block]) -> Section:
+def _signatures(study: Study, figures: list[Block]) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
         found = tables.signatures_tables(study, task, short=_many(study))
         if found:
             below.append(_section(f"on-{slug}-signatures", task, _tables(*found)))
     between = _tables(tables.contexts_table(study), *tables.slopes_tables(study))
-    blocks = [*context, *between, *matrices]
+    blocks = [*figures, *between]
     return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 
-def _claims(study: Study, judged: Sequence[Judged], figures: set[str]) -> Section:
-    table = tables.claims_table(study, judged)
-    blocks: list[Block] = []
-    if table is not None:
-        rows = tuple(replace(row, link=f"#claim-{row.key}") for row in table.rows)
-        blocks.append(replace(table, rows=rows, notes=(*table.notes, FITTED)))
-    below = []
-    for entry in judged:
-        claim = entry.claim
-        where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
-        ours = _FIGURES.get(claim.figure)
-        see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
-        quote = f": “{escaped(claim.quote)}”" if claim.quote else ""
-        mark = " †" if claim.fitted else ""
-        lines = [
-            f"{escaped(claim.statement)} *{entry.verdict}{mark}*.",
-            f"Seen: {escaped(entry.evidence)}.",
-            f"Test: {claim.test}. Place: {where}{quote}.{see}",
-        ]
-        content: list[Block] = [Prose(tuple(lines))]
-        if entry.table is not None:
-            content.append(_evidence(study, entry.table, claim.id))
-        title = f"{claim.id}: {entry.verdict}{mark}"
-        below.append(Section(f"claim-{claim.id}", title, tuple(content), folded=True))
-    each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(below), folded=True)
-    return _section(CLAIMS, "Claims", blocks, [each])
-
-
-def _evidence(study: Study, table: Table, claim: str) -> DataTable:
-    """A claim's numbers; rows named like a method rest on its cells."""
-    rows = []
-    for place, texts in enumerate(table.rows, 1):
-        cells = tuple(key for key in study.cells if key[1] == texts[0])
-        rows.append(Row(f"{place}: {texts[0]}", tuple(texts), cells))
-    columns = tuple(Column(f"column_{k}", head) for k, head in enumerate(table.columns, 1))
-    return DataTable(
-        f"evidence-{claim}", escaped(f"{table.title} ({claim})."), columns, tuple(rows)
-    )
+def _claims(study: Study, figures: Collection[str]) -> Section:
+    found = [claim_section(entry, figures) for entry in study.judged]
+    each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(found), folded=True)
+    return _section(CLAIMS, "Claims", _tables(tables.claims_table(study)), [each])
 
 
 def _about(

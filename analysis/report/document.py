@@ -81,7 +81,8 @@ class Column:
     other_arm: Literal["free", "still"] = "free"
     """Of the optimum that it rests on, if it does."""
     printed: bool = True
-    """Whether the LaTeX table has it, which has to fit on a page of paper."""
+    """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has
+    first what paper has."""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():

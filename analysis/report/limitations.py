@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.comparisons.methods import LEARNER
 from analysis.markup import code, escaped
+from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
 from analysis.report.summary import unlike_printed
 from analysis.statistics.estimates import FEWEST
@@ -94,7 +94,7 @@ def _failures(study: Study) -> Iterator[str]:
         )
         others = ", and other reasons" if own.reason.nunique() > 1 else ""
         yield (
-            f"*Failures.* {escaped(task)}: {len(own)} runs are {escaped(status)} "
+            f"*Failures.* {escaped(task)}: {_runs(len(own), 'is', 'are')} {escaped(status)} "
             f"({escaped(str(own.reason.iloc[0]))}{others}): {cells}. Means are over runs that "
             "have a solution."
         )
@@ -127,8 +127,8 @@ def _versions(study: Study) -> Iterator[str]:
         )
     if len(known) < len(runs):
         yield (
-            f"*Unknown commit.* {len(runs) - len(known)} runs were made outside a checkout; each "
-            "run names the hash of the code behind it."
+            f"*Unknown commit.* {_runs(len(runs) - len(known), 'was', 'were')} made outside a "
+            "checkout; each run names the hash of the code behind it."
         )
     if changed:
         yield (
@@ -236,6 +236,10 @@ def _model(study: Study) -> Iterator[str]:
             "*Arms.* No collisions, of the arms with each other or with anything else, are "
             "modelled; the paper mentions none."
         )
+
+
+def _runs(count: int, one: str, several: str) -> str:
+    return f"1 run {one}" if count == 1 else f"{count} runs {several}"
 
 
 def _number(value: float) -> str:

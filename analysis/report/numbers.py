@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.comparisons.methods import LEARNER, solve_times
+from analysis.comparisons.methods import solve_times
+from analysis.methods import LEARNER
 from analysis.published import published_cell, published_initial
 from analysis.results.folder import CellRuns
 from analysis.results.optima import SHIPPED
@@ -140,9 +141,7 @@ def headline_numbers(study: Study) -> list[Number]:
     names = macro_names(study)
     found = [
         *_tasks(study, names),
-        *itertools.chain.from_iterable(
-            _cell(study, names, cell) for cell in study.cells.values() if len(cell.good)
-        ),
+        *_cells(study, names),
         *_conditions(study, names),
         *_hands(study, names),
         *_signatures(study, names),
@@ -206,115 +205,133 @@ def _how(found: Inference) -> str:
     return "; ".join(filter(None, (found.method, found.note)))
 
 
-def _number(
-    macro: str, meaning: str, of: str, found: Inference, cells: tuple[Cell, ...], digits: int,
-    unit: str,
-) -> Number:  # fmt: skip
-    return Number(
-        PREFIX + macro, meaning, found.estimate, digits, unit, found.low, found.high,
-        n=sum(found.n), how=_how(found), cells=cells, of=of,
-    )  # fmt: skip
+@dataclass(frozen=True)
+class _About:
+    """What several numbers are said of: they share the beginning of their macros and cells."""
+
+    stem: str
+    of: str
+    cells: tuple[Cell, ...] = ()
+
+    def value(self, what: str, meaning: str, value: float, digits: int, unit: str) -> Number:
+        macro = f"{PREFIX}{self.stem}{what}"
+        return Number(macro, meaning, value, digits, unit, cells=self.cells, of=self.of)
+
+    def inferred(
+        self, what: str, meaning: str, found: Inference, digits: int, unit: str
+    ) -> Number:
+        number = self.value(what, meaning, found.estimate, digits, unit)
+        n, how = sum(found.n), _how(found)
+        return replace(number, low=found.low, high=found.high, n=n, how=how)
 
 
 def _tasks(study: Study, names: Names) -> Iterator[Number]:
-    for task in study.results.tasks:
-        for arm in ("free", "still"):
+    for task in study.tasks:
+        about = _About(names.tasks[task], task)
+        for arm, suffix in (("free", "Optimum"), ("still", "OptimumStill")):
             best = study.optima.get((task, arm))
-            if best is None:
-                continue
-            yield Number(
-                f"{PREFIX}{names.tasks[task]}Optimum{'' if arm == 'free' else 'Still'}",
-                f"best reward known, other arm {arm}", best.reward, 0, "ticks",
-                how=best.how, cells=best.cells, of=task,
-                origin="" if best.cells else f"the optimum of the {SHIPPED}",
-            )  # fmt: skip
+            if best is not None:
+                meaning = f"best reward known, other arm {arm}"
+                number = about.value(suffix, meaning, best.reward, 0, "ticks")
+                origin = "" if best.cells else f"the optimum of the {SHIPPED}"
+                yield replace(number, how=best.how, cells=best.cells, origin=origin)
         printed = published_initial(task)
         if printed is not None:
-            how, origin = _published(_INITIAL[task], derived=printed[2])
-            yield Number(
-                f"{PREFIX}{names.tasks[task]}PublishedInitialReward",
-                "published reward of the initial solution", printed[1], 0, "ticks",
-                how=how, of=task, origin=origin,
-            )  # fmt: skip
+            meaning = "published reward of the initial solution"
+            number = about.value("PublishedInitialReward", meaning, printed[1], 0, "ticks")
+            yield _published(number, _INITIAL[task], derived=printed[2])
 
 
-def _published(condition: int, *, derived: bool) -> tuple[str, str]:
-    """How the paper gives a value, and its place there."""
+def _published(number: Number, condition: int, *, derived: bool) -> Number:
+    """The number with how the paper gives it, and its place there."""
     how = "derived from other printed numbers" if derived else "printed"
     place = f"Results, Exploration Condition {condition}"
-    return f"{how}; {place}", f"published in the paper (Shah, Barto & Fagg, 2013; {place})"
+    origin = f"published in the paper (Shah, Barto & Fagg, 2013; {place})"
+    return replace(number, how=f"{how}; {place}", origin=origin, cells=())
 
 
-def _cell(study: Study, names: Names, cell: CellRuns) -> Iterator[Number]:
-    task, label = key = cell.task, cell.label
-    name = names.tasks[task] + names.labels[label]
+def _cells(study: Study, names: Names) -> Iterator[Number]:
+    """Of every cell with a solution; with parameters of their own the reward only."""
+    for (task, label), cell in study.cells.items():
+        if not len(cell.good):
+            continue
+        stem = names.tasks[task] + names.labels[label]
+        about = _About(stem, f"{label} on {task}", ((task, label),))
+        reward = _reward(about, cell)
+        yield reward
+        if not cell.variant:
+            yield from _gaps(study, about, reward)
+            yield from _spent(about, cell)
+            yield from _learner(about, cell)
+
+
+def _reward(about: _About, cell: CellRuns) -> Number:
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
-    found = mean(rewards, seed=SEED)
-    who = f"{label} on {task}"
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
-    yield Number(
-        f"{PREFIX}{name}Reward", f"mean learned reward{solved}", found.estimate, 1,
-        "ticks", found.low, found.high, sd(rewards), len(rewards),
-        _how(found), (key,), who,
-    )  # fmt: skip
-    if cell.variant:
-        return
-    row, free = study.methods[key], study.optima.get((task, "free"))
-    for column, macro, arm in (("gap", "Gap", "free"), ("gap_still", "GapStill", "still")):
-        if math.isnan(row[column]):
-            continue
-        source = study.optima[task, arm]
-        best = source.reward
-        if arm == "still" and free is not None and best == free.reward:
-            continue
-        gap = f"gap to the optimum{', other arm still' if arm == 'still' else ''}"
-        for suffix, share, unit in (
-            ("", 1.0, "ticks"),
-            ("Percent", 100 / -best if best else math.nan, "% of the optimum"),
-        ):
-            if not math.isnan(share):
-                yield Number(
-                    f"{PREFIX}{name}{macro}{suffix}", gap, (best - found.estimate) * share, 1,
-                    unit, (best - found.high) * share, (best - found.low) * share,
-                    how=f"{_how(found)}; from the optimum {best}: {source.how}",
-                    cells=tuple(dict.fromkeys([key, *source.cells])), of=who,
-                )  # fmt: skip
-    evaluations = cell.runs.forward_kinematics + cell.runs.jacobians
+    found = mean(rewards, seed=SEED)
+    number = about.inferred("Reward", f"mean learned reward{solved}", found, 1, "ticks")
+    return replace(number, sd=sd(rewards))
+
+
+def _gaps(study: Study, about: _About, reward: Number) -> Iterator[Number]:
+    """From the mean reward to the optimum, and to that with the other arm still if it is lower."""
+    ((task, label),) = about.cells
+    row = study.method_rows[task, label]
+    free, still = (study.optima.get((task, arm)) for arm in ("free", "still"))
+    gaps = []
+    if free is not None and not math.isnan(row.gap):
+        gaps.append(("Gap", "gap to the optimum", free))
+    lower = still is not None and (free is None or still.reward != free.reward)
+    if still is not None and lower and not math.isnan(row.gap_still):
+        gaps.append(("GapStill", "gap to the optimum, other arm still", still))
+    for what, meaning, best in gaps:
+        units = [("", 1.0, "ticks")]
+        if best.reward:
+            units.append(("Percent", 100 / -best.reward, "% of the optimum"))
+        for suffix, scale, unit in units:
+            gap = (best.reward - reward.value) * scale
+            yield replace(
+                about.value(f"{what}{suffix}", meaning, gap, 1, unit),
+                low=(best.reward - reward.high) * scale,
+                high=(best.reward - reward.low) * scale,
+                how=f"{reward.how}; from the optimum {best.reward}: {best.how}",
+                cells=tuple(dict.fromkeys([*about.cells, *best.cells])),
+            )
+
+
+def _spent(about: _About, cell: CellRuns) -> Iterator[Number]:
+    """Medians of what a run spends."""
+    evaluations = "forward kinematics and Jacobians of a run"
+    spent = cell.runs.forward_kinematics + cell.runs.jacobians
     for what, meaning, values, digits, unit in (
         ("Trials", "physical trials of a run", cell.runs.trials, 0, "trials"),
-        (
-            "Evaluations",
-            "forward kinematics and Jacobians of a run",
-            evaluations,
-            0,
-            "evaluations",
-        ),
+        ("Evaluations", evaluations, spent, 0, "evaluations"),
         ("SolveSeconds", "wall time of solving", solve_times(cell.good), 3, "s"),
     ):
         known = values.dropna()
         if len(known):
-            yield Number(
-                f"{PREFIX}{name}{what}", f"median of {meaning}", float(known.median()),
-                digits, unit, n=len(known) if len(known) != len(rewards) else None,
-                cells=(key,), of=who,
-            )  # fmt: skip
-    if label.startswith(LEARNER):
-        initial = cell.good.initial_reward.dropna().unique()
-        if len(initial) == 1:
-            yield Number(
-                f"{PREFIX}{name}InitialReward", "reward of the initial solution",
-                float(initial[0]), 0, "ticks", how="deterministic", cells=(key,), of=who,
-            )  # fmt: skip
-        condition = label.removeprefix(LEARNER)
-        printed = published_cell(task, condition)
-        if printed is not None and printed.summary is not None:
-            summary = printed.summary
-            how, origin = _published(int(condition.removeprefix("EC")), derived=summary.derived)
-            yield Number(
-                f"{PREFIX}{name}PublishedReward", "published mean reward", summary.mean,
-                1, "ticks", sd=math.nan if summary.sd is None else summary.sd, n=summary.runs,
-                how=how, of=who, origin=origin,
-            )  # fmt: skip
+            median = float(known.median())
+            number = about.value(what, f"median of {meaning}", median, digits, unit)
+            yield replace(number, n=len(known) if len(known) != len(cell.good) else None)
+
+
+def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
+    """What the paper's learner begins with, and what the paper prints of it."""
+    if not cell.method.startswith(LEARNER):
+        return
+    initial = cell.good.initial_reward.dropna().unique()
+    if len(initial) == 1:
+        meaning = "reward of the initial solution"
+        number = about.value("InitialReward", meaning, float(initial[0]), 0, "ticks")
+        yield replace(number, how="deterministic")
+    condition = cell.method.removeprefix(LEARNER)
+    printed = published_cell(cell.task, condition)
+    if printed is not None and printed.summary is not None:
+        summary = printed.summary
+        number = about.value("PublishedReward", "published mean reward", summary.mean, 1, "ticks")
+        spread = math.nan if summary.sd is None else summary.sd
+        number = replace(number, sd=spread, n=summary.runs)
+        yield _published(number, int(condition.removeprefix("EC")), derived=summary.derived)
 
 
 def _conditions(study: Study, names: Names) -> Iterator[Number]:
@@ -329,32 +346,25 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
             a, b = (study.cells[key].good.reward.to_numpy(dtype=np.float64) for key in cells)
             if not len(a) or not len(b):
                 continue
-            name = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"
-            what = f"{higher} less {lower} on {task}"
+            stem = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"
+            about = _About(stem, f"{higher} less {lower} on {task}", cells)
             apart = difference_of_means(a, b, seed=SEED)
-            yield _number(
-                f"{name}Reward", "difference of mean rewards", what, apart, cells, 1, "ticks"
-            )
+            yield about.inferred("Reward", "difference of mean rewards", apart, 1, "ticks")
             better = probability_of_improvement(a, b, seed=SEED)
-            yield _number(
-                f"{name}Improvement", "probability of improvement", what, better, cells, 2, ""
-            )
+            yield about.inferred("Improvement", "probability of improvement", better, 2, "")
 
 
 def _hands(study: Study, names: Names) -> Iterator[Number]:
     """How many of the learner's runs found each hand sequence."""
-    tasks = study.results.tasks
-    for key, cell in study.cells.items():
-        task, label = key
-        if not label.startswith(LEARNER) or cell.variant or len(tasks[task].hands) < 2:
+    for (task, label), cell in study.cells.items():
+        if not label.startswith(LEARNER) or cell.variant or len(study.tasks[task].hands) < 2:
             continue
+        stem = f"{names.tasks[task]}{names.labels[label]}Hands"
+        about = _About(stem, f"{label} on {task}", ((task, label),))
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
-            yield Number(
-                f"{PREFIX}{names.tasks[task]}{names.labels[label]}Hands{words(str(hands))}",
-                f"runs that learned {hands}", float(count), 0, "runs",
-                how=f"of {len(cell.good)} with a solution", cells=(key,),
-                of=f"{label} on {task}",
-            )  # fmt: skip
+            found = words(str(hands)), f"runs that learned {hands}"
+            number = about.value(*found, float(count), 0, "runs")
+            yield replace(number, how=f"of {len(cell.good)} with a solution")
 
 
 def _signatures(study: Study, names: Names) -> Iterator[Number]:

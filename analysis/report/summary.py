@@ -12,27 +12,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.claims.register import Judged, Verdict
-from analysis.comparisons.methods import LEARNER
-from analysis.comparisons.paper import published_of
-from analysis.published import TRIALS, published_cell
+from analysis.comparisons.paper import paper_rows
+from analysis.methods import LEARNER
+from analysis.published import published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.statistics.equivalence import difference
 from analysis.statistics.estimates import SEED, mean
 from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-_CONDITION = re.compile(r"dual-process/EC[1-4]")
+_CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
 _VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell")
 
 
 def best_condition(study: Study, task: str) -> str | None:
     """Label of the learner's own condition (no variant) with the highest mean reward."""
     rewards = {
-        label: float(row["reward"])
-        for (name, label), row in study.methods.items()
-        if name == task and _CONDITION.fullmatch(label) and not math.isnan(row["reward"])
+        label: row.reward
+        for (name, label), row in study.method_rows.items()
+        if name == task and _CONDITION.fullmatch(label) and not math.isnan(row.reward)
     }
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
 
@@ -122,16 +121,12 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
 def unlike_printed(study: Study) -> list[str]:
     """The paper's cells whose learned reward differs from the printed one, in words."""
     found = []
-    for cell in study.results.cells:
-        paper, rewards = published_of(cell), cell.good.reward.to_numpy(dtype=np.float64)
-        if paper is None or paper.summary is None or not len(rewards):
-            continue
-        apart = difference(rewards, paper.summary)
-        if (cell.good.trials == TRIALS).all() and apart.verdict == "different":
+    for row in paper_rows(study):
+        if row.verdict == "different" and row.paper.summary is not None:
             found.append(
-                f"{cell.task} {cell.label.removeprefix(LEARNER)}: learned reward "
-                f"{typographic(f'{rewards.mean():.1f}')}, published "
-                f"{typographic(f'{paper.summary.mean:.1f}')}"
+                f"{row.cell.task} {row.cell.label.removeprefix(LEARNER)}: learned reward "
+                f"{typographic(f'{row.rewards.mean():.1f}')}, published "
+                f"{typographic(f'{row.paper.summary.mean:.1f}')}"
             )
     return found
 

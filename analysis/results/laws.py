@@ -20,7 +20,8 @@ from pydantic import ValidationError
 
 from coartic import PAPER, CoarticError, parse_task
 from coartic.inputs import read_bytes
-from coartic.record import Record, RecordError, problems, read_record, run_seed
+from coartic.inputs import problems_inline
+from coartic.record import Record, RecordError, read_record, run_seed
 from coartic.tables import (
     BUILT_IN,
     FORMAT,
@@ -71,7 +72,7 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         manifest = Manifest.model_validate_json(json.dumps(content))
     except ValidationError as error:
-        damaged(path, problems(error))
+        damaged(path, problems_inline(error))
     if manifest.seal() != seal:
         damaged(path, "it is not as it was written: its seal does not fit")
     return manifest

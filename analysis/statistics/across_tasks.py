@@ -5,85 +5,32 @@ task (stratified bootstrap). The intervals are about other runs on the same task
 other tasks.
 
 Sources: R. Agarwal et al. (2021), Deep Reinforcement Learning at the Edge of the Statistical
-Precipice, NeurIPS 34 (interquartile mean, score profiles, probability of improvement);
+Precipice, NeurIPS 34 (interquartile mean, score profiles);
 E. D. Dolan & J. J. Moré (2002), Mathematical Programming 91 (performance profiles).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
-from analysis.results.folder import Results
-from analysis.results.optima import optima
 from analysis.statistics import spread
 from analysis.statistics.estimates import (
     CONFIDENCE,
     RESAMPLES,
     Inference,
     bootstrap_estimate,
-    higher,
     middle_mean,
     sample,
 )
-from coartic.initial import initial_hands
 from coartic.robot import Array
 
 PROFILE_RESAMPLES = 1_999
-
-
-def scores_frame(results: Results) -> pd.DataFrame:
-    """One row a run of every task whose optimum and initial solution are known.
-
-    Columns ``task``, ``method`` (with its variant), ``label`` (the cell's, whatever becomes
-    of ``method``), ``run``, ``seed``, ``reward``;
-    ``score`` (:func:`normalised`) and ``gap`` (:func:`gap_share`), both against the optimum
-    with all joints free and the corrective process alone with the task's initial hands. A
-    run without a solution has NaN for all three.
-    """
-    best, parts = optima(results), []
-    alone = results.sequences.set_index(["task", "hands"]).reward
-    for cell in results.cells:
-        task = results.tasks[cell.task]
-        start = alone.get((cell.task, initial_hands(task)))
-        if (cell.task, "free") not in best or start is None or pd.isna(start):
-            continue
-        rewards = cell.runs.reward.where(cell.runs.status == "ok")
-        values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
-        top = best[cell.task, "free"].reward
-        if top in (0, start):  # nothing to fall short of, or to gain
-            continue
-        parts.append(
-            pd.DataFrame(
-                {
-                    "task": cell.task,
-                    "method": cell.label,
-                    "label": cell.label,
-                    "run": cell.runs.run.to_numpy(),
-                    "seed": cell.runs.seed.to_numpy(),
-                    "reward": values,
-                    "score": normalised(values, float(start), top),
-                    "gap": gap_share(values, top),
-                }
-            )
-        )
-    columns = ["task", "method", "label", "run", "seed", "reward", "score", "gap"]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
-
-
-def by_task(scores: pd.DataFrame, method: str, column: str = "score") -> dict[str, Array]:
-    """One method's column of :func:`scores_frame`, by task, NaN included."""
-    rows = scores[scores.method == method]
-    return {
-        str(task): group[column].to_numpy(dtype=np.float64)
-        for task, group in rows.groupby("task", sort=False)
-    }
+"""A profile takes percentiles of many thresholds, to be drawn: fewer do for a line's width."""
 
 
 def normalised(rewards: ArrayLike, initial: float, optimum: float) -> Array:
@@ -156,37 +103,6 @@ def task_mean(
     return bootstrap_estimate(
         f"mean over {len(values)} tasks, stratified",
         tuple(sample(runs) for runs in values.values()),
-        statistic,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
-
-
-def probability_of_improvement(
-    first: Mapping[str, ArrayLike],
-    second: Mapping[str, ArrayLike],
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
-) -> Inference:
-    """Mean over tasks of P(first higher than second), ties half (Agarwal et al. 2021).
-
-    Stratified BCa interval; none where each task's samples are wholly apart, as no resample
-    differs. Raises ValueError where the tasks are not the same.
-    """
-    if first.keys() != second.keys():
-        raise ValueError(f"tasks differ: {sorted(first)} and {sorted(second)}")
-    pairs = [sample(side[task]) for task in first for side in (first, second)]
-
-    def statistic(*samples: Array, axis: int = -1) -> Array:
-        shares = [higher(a, b) for a, b in zip(samples[::2], samples[1::2], strict=True)]
-        return np.asarray(sum(shares) / len(shares))
-
-    return bootstrap_estimate(
-        f"probability of improvement over {len(first)} tasks, stratified",
-        tuple(pairs),
         statistic,
         confidence=confidence,
         resamples=resamples,

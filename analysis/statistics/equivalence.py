@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
-from analysis.published import Summary
 from analysis.statistics.estimates import (
     CONFIDENCE,
     FEWEST,
@@ -33,6 +32,22 @@ from analysis.statistics.spread import mean, variance
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
+
+
+class Summary(Protocol):
+    """What is printed of a sample: its mean, its SD if there is one, and how many runs."""
+
+    @property
+    def mean(self) -> float:
+        """Of the sample."""
+
+    @property
+    def sd(self) -> float | None:
+        """Of the sample, n - 1 degrees of freedom; None where it is not printed."""
+
+    @property
+    def runs(self) -> int:
+        """Size of the sample."""
 
 
 @dataclass(frozen=True, kw_only=True)

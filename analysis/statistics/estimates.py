@@ -83,10 +83,9 @@ def sample(values: ArrayLike) -> Array:
 def paired_by_seed(
     first: pd.DataFrame, second: pd.DataFrame, column: str = "reward"
 ) -> tuple[Array, Array]:
-    """A column of the runs of two cells, for the seeds where both have a value.
+    """A column of two frames of runs, for the values of ``seed`` where both have one.
 
-    Both frames are rows of ``runs.parquet`` of one task. Raises ValueError where a seed
-    occurs twice in one of them.
+    Raises ValueError where a seed occurs twice in one of them.
     """
     both = first[["seed", column]].merge(
         second[["seed", column]], on="seed", validate="one_to_one", suffixes=("_first", "_second")
@@ -350,9 +349,18 @@ def middle_mean(values: Array, axis: int = -1, weights: Array | None = None) -> 
 
 
 def higher(first: Array, second: Array) -> Array:
-    """Share of pairs over the last axes in which ``first`` is higher, ties counting half."""
-    pairs = first[..., :, None] - second[..., None, :]
-    return np.asarray((pairs > 0).mean((-2, -1)) + 0.5 * (pairs == 0).mean((-2, -1)))
+    """Share of pairs over the last axes in which ``first`` is higher, ties counting half.
+
+    Shapes ``(..., n)`` and ``(..., m)``; takes no more room than one of them.
+    """
+    shape = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
+    above, tied = np.zeros(shape), np.zeros(shape)
+    for place in range(second.shape[-1]):
+        other = second[..., place, None]
+        above += (first > other).sum(axis=-1)
+        tied += (first == other).sum(axis=-1)
+    pairs = first.shape[-1] * second.shape[-1]
+    return np.asarray(above / pairs + 0.5 * (tied / pairs))
 
 
 # Tests

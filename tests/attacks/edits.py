@@ -132,7 +132,9 @@ def table_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
         rows = rows_of(folder, name)
         for column in schema.names:
             filled = {row[column] is not None for row in rows}
-            yield f"{name}/{column}", partial(change_rows, name, partial(_set, column, other))
+            first = "x" if pa.types.is_string(schema.field(column).type) else 1
+            another = other if True in filled else first
+            yield f"{name}/{column}", partial(change_rows, name, partial(_set, column, another))
             if filled == {True, False}:
                 yield (
                     f"{name}/{column} filled",

@@ -22,7 +22,7 @@ from .methods import ATTACKS, Attack, Expectation
 
 TASK = "ascending"
 BUILT_IN = ("dual-process/EC1", "corrective-alone/given", "random-search/climbing")
-LIMIT_S = 90.0  # of a whole suite
+LIMIT_S = 90.0  # of a whole suite, for every hostile method in it
 RUN_LIMIT_S = 4.0
 LARGEST_FOLDER = 20_000_000
 LONGEST_TEXT = 2000
@@ -107,7 +107,7 @@ def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) 
         else:
             (folder / f"hostile{number}.py").write_text(one.source, encoding="utf-8")
             command += ["--method-file", f"hostile{number}.py"]
-    ended = run(root, command, folder, limit=LIMIT_S, paths=paths)
+    ended = run(root, command, folder, limit=LIMIT_S * len(attacks), paths=paths)
     found = _manners(attack, ended, folder)
     out = folder / "out"
     if attack.expects == "ended" and ended.code not in (0, 1):

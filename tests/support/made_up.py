@@ -1,11 +1,24 @@
 """Rows of runs that nobody ran, for what is computed of them."""
 
+from functools import cached_property
+
 import pandas as pd
 
 from analysis.results.folder import Results
+from analysis.study import Study
 from coartic import load_task
 from coartic.record import Commit, Environment
 from coartic.tables import Manifest, Plan, PlanLimits, PlannedCell
+
+
+class MadeUp(Study):
+    """A study with some of its parts made up: ``MadeUp(results, signatures=...)``."""
+
+    def __init__(self, results, **parts):
+        super().__init__(results)
+        for name in parts:
+            assert isinstance(getattr(Study, name), cached_property)
+        vars(self).update(parts)
 
 
 def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
@@ -50,10 +63,11 @@ def replanned(manifest, **update):
     return manifest.model_copy(update={"specification": plan})
 
 
-def fake_results(tmp_path, runs):
+def fake_results(tmp_path, runs, *, task="two-armed-1", method="dual-process/EC2"):
     frame = pd.DataFrame(runs).assign(
-        task="two-armed-1", method="dual-process/EC2", variant="", commit="abc", packages="p"
+        task=task, method=method, variant="", commit="abc", packages="p", replay_reward=None
     )
+    frame = frame.assign(run_id=[f"run-{k}" for k in range(len(frame))])
     frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
     frame = frame.assign(
         told="corrective process, reward by trial", parameters="{}", other_arm_travel=1.0,
@@ -62,5 +76,5 @@ def fake_results(tmp_path, runs):
     )  # fmt: skip
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
     sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
-    manifest = manifest_for([load_task("two-armed-1")], frame)
+    manifest = manifest_for([load_task(task)], frame)
     return Results(tmp_path, manifest, frame, sequences)

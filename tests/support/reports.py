@@ -8,13 +8,14 @@ import pytest
 
 import analysis.report.build
 from analysis.report.build import build, write
+from analysis.report.formats.latex import PACKAGES
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
 
 
 LATEX = r"""\documentclass{article}
 \usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
-\usepackage{booktabs,siunitx,graphicx,longtable}
+\usepackage{booktabs,siunitx,graphicx,tabularx,xltabular}
 \hfuzz=1pt
 \input{numbers.tex}
 \begin{document}
@@ -40,9 +41,9 @@ def compiled(folder, body=""):
     """The log of a document with all macros and tables; skips where LaTeX is missing."""
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", "booktabs.sty", "siunitx.sty", "graphicx.sty", "geometry.sty"]
+    styles = ["kpsewhich", *(f"{name}.sty" for name in (*PACKAGES, "geometry"))]
     if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip("booktabs, siunitx, graphicx or geometry is not installed")
+        pytest.skip(f"geometry or one of {', '.join(PACKAGES)} is not installed")
     (folder / "paper.tex").write_text(LATEX % body, encoding="utf-8")
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=120)

@@ -7,13 +7,12 @@ import pandas as pd
 
 from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
-from benchmarks.harness import perform_plan
+from benchmarks.harness import perform_missing
 from benchmarks.registry import registry
+from benchmarks.run import plan_cells
 from benchmarks.sandbox import failure
 from benchmarks.specification import Limits
-from benchmarks.store import Store
-from benchmarks.suites import Cell, load_suite, manifest_of, run_specs, select_cells
-from benchmarks.tables import write_tables
+from benchmarks.suites import Cell, load_suite, run_specs, select_cells
 from benchmarks.worker import perform
 from coartic import load_task
 from coartic.tables import TIMINGS
@@ -61,12 +60,23 @@ def suite_of(tmp_path, *blocks):
     return select_cells(load_suite(str(path)), KNOWN)
 
 
+def perform_plan(specs, store, executor, **options):
+    """Runs without a suite around them."""
+    with store.locked():
+        return perform_missing(specs, store, executor, **options)
+
+
 def run_and_write(folder, cells=None, runs=2, trials=150, seed=0, executor=None, **options):
     limits = options.pop("limits", Limits(300.0))
-    planned = run_specs(cells or paper_cells(), runs=runs, seed=seed, trials=trials, limits=limits)
-    store = Store(folder)
-    perform_plan([spec for _, spec in planned], store, executor or InProcess(), **options)
-    write_tables(store, manifest_of(load_suite("paper"), runs, seed, planned, limits))
+    plan = plan_cells(
+        load_suite("paper"),
+        cells or paper_cells(),
+        runs=runs,
+        trials=trials,
+        seed=seed,
+        limits=limits,
+    )
+    plan.perform(folder, executor=executor or InProcess(), **options)
     return load_results(folder)
 
 

@@ -6,7 +6,7 @@ from analysis.claims.data import Data
 from analysis.claims.register import Finding
 from analysis.published import published_cell
 from analysis.statistics.estimates import SEED, bootstrap_test, difference_of_means, mean
-from analysis.table import interval
+from analysis.words import interval
 
 
 def better_hands(data: Data, task: str, condition: str, better: str, worse: str) -> Finding:

@@ -11,7 +11,7 @@ from analysis.claims.data import Data, MissingError
 from analysis.claims.register import Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.statistics.estimates import SEED, bootstrap_test, mean
-from analysis.table import interval
+from analysis.words import interval
 from coartic.robot import Array
 
 SHARE = 0.5

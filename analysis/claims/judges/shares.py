@@ -11,7 +11,7 @@ from analysis.claims.register import Finding
 from analysis.published import published_cell
 from analysis.statistics.equivalence import shares
 from analysis.statistics.estimates import Inference, share_test
-from analysis.table import tally
+from analysis.words import tally
 
 MARGIN = 0.25
 """Shares of runs this near are "about as often"."""

@@ -1,8 +1,9 @@
 """A document's tables for LaTeX: booktabs and siunitx, for pdfLaTeX with T1 and UTF-8.
 
-Columns that are not for print are left out, methods have the names that figures show, headers
-are broken into lines; a float that is wider than the line all the same is scaled down to it.
-Tables longer than a page are of longtable, which needs one column of text.
+Columns that are not for print are left out, methods have the names that figures show. Columns of
+many words share what the others leave of the line (tabularx); a table of few words that is wider
+than the line is scaled down to it. Tables longer than a page are of xltabular, which needs one
+column of text.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from analysis.markup import inline
 from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
 from analysis.report.text import Part, parts
-from analysis.words import MINUS, NO_SPREAD, NONE
+from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
 
 _ESCAPES = {
@@ -49,6 +50,16 @@ _ESCAPES = {
     "←": r"$\leftarrow$",
     "∈": r"$\in$",
     "√": r"$\surd$",
+    "↳": r"$\hookrightarrow$",
+    "●": r"$\bullet$",
+    "◐": r"$\odot$",
+    "○": r"$\circ$",
+    "◌": r"$\oslash$",
+    "∫": r"$\int$",
+    "‖": r"$\|$",
+    "¼": "$1/4$",
+    "½": "$1/2$",
+    "¾": "$3/4$",
     "°": r"$^{\circ}$",
     "′": r"$'$",
     "†": r"\textdagger{}",
@@ -72,12 +83,9 @@ _RAISED = {"⁻": "-", **dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", s
 _LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True))
 MOST_ROWS = 35
 """Of a float; a table with more is continued on the next page."""
-PACKAGES = ("booktabs", "siunitx", "graphicx", "longtable")
+PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "xltabular")
 """What the tables need."""
-_LINE = {"footnotesize": 86.0, "scriptsize": 79.0}
-"""Figures on a line of 345 pt; of a float by a tenth more, which scaling leaves above 7 pt."""
-_GAP, _THIN, _MINUS = 1.5, 0.6, 1.5  # between columns; a thin character; a minus
-_LEAST = 8.0  # of a column of text
+_WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _LABELS = {"method", "first", "second"}  # columns of methods with their variants
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
@@ -92,7 +100,7 @@ def latex_inputs(document: Document) -> str:
     inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
     return (
         f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
-        f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
+        f"% tables of more than {MOST_ROWS} rows are xltabulars, for one column of text.\n"
         + inputs
     )
 
@@ -101,38 +109,42 @@ def latex_table(table: DataTable) -> str:
     """One table: numbers in S columns as wide as they need, text and intervals beside them."""
     shown = [part for part in parts(table) if part.column.printed]
     long = len(table.rows) > MOST_ROWS
-    wrapped = _wrapped(shown, table, _LINE["scriptsize" if long else "footnotesize"])
+    broken = _broken(shown, table) or (shown[:1] if long else [])
     kinds = "".join(
-        f">{{\\raggedright\\arraybackslash}}p{{{0.53 * wrapped[part]:.1f}em}}"
-        if part in wrapped
-        else _kind(part, table)
+        r">{\raggedright\arraybackslash}X" if part in broken else _kind(part, table)
         for part in shown
     )
-    kinds = f"@{{}}{kinds}@{{}}"
-    head = " & ".join(_head(part, table, wrapped.get(part)) for part in shown)
+    head = " & ".join(_head(part, table) for part in shown)
     rows = "\n".join(
         " & ".join(_cell(part, row.values[part.index]) for part in shown) + r" \\"
         for row in table.rows
     )
     caption = f"\\caption{{{_spans(table.caption)}}}\n\\label{{tab:{table.id}}}"
     if long:
-        return _long(table, caption, kinds, head, rows)
+        return _long(table, caption, f"@{{}}{kinds}@{{}}", head, rows)
     notes = "".join(
         f"\\par\\smallskip\\parbox{{\\linewidth}}{{{_spans(note)}}}\n" for note in table.notes
     )
+    begin = f"\\begin{{tabularx}}{{\\linewidth}}{{@{{}}{kinds}@{{}}}}"
+    end = r"\end{tabularx}"
+    if not broken:
+        begin = (
+            "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%\n"
+            f"\\begin{{tabular}}{{@{{}}{kinds}@{{}}}}"
+        )
+        end = r"\end{tabular}}"
     return f"""\\begin{{table}}[htbp]
 \\centering
 \\footnotesize
 \\setlength{{\\tabcolsep}}{{3pt}}
 {caption}
-\\resizebox{{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}}{{!}}{{%
-\\begin{{tabular}}{{{kinds}}}
+{begin}
 \\toprule
 {head} \\\\
 \\midrule
 {rows}
 \\bottomrule
-\\end{{tabular}}}}
+{end}
 {notes}\\end{{table}}
 """
 
@@ -143,7 +155,7 @@ def _long(table: DataTable, caption: str, kinds: str, head: str, rows: str) -> s
 \\scriptsize
 \\setlength{{\\tabcolsep}}{{3pt}}
 \\setlength{{\\LTcapwidth}}{{\\linewidth}}
-\\begin{{longtable}}{{{kinds}}}
+\\begin{{xltabular}}{{\\linewidth}}{{{kinds}}}
 {caption} \\\\
 \\toprule
 {head} \\\\
@@ -156,53 +168,27 @@ def _long(table: DataTable, caption: str, kinds: str, head: str, rows: str) -> s
 \\bottomrule
 \\endfoot
 {rows}
-\\end{{longtable}}
+\\end{{xltabular}}
 {notes}\\endgroup
 """
 
 
-def _wrapped(shown: Sequence[Part], table: DataTable, line: float) -> dict[Part, float]:
-    """Columns of text to be broken into lines, and their widths, so that a table fits.
-
-    Widths are of figures, which all are as wide.
-    """
-    widths = {part: max(map(_width, _column(part, table))) for part in shown}
-    excess = sum(widths.values()) + _GAP * (len(shown) - 1) - line
-    found = {}
-    texts = [part for part in shown if part.column.kind == "text"]
-    for part in sorted(texts, key=lambda part: -widths[part]):
-        words = " ".join(_column(part, table)).replace("/", "/ ").split()
-        least = max(_width(max(words, key=_width, default="")), 0.3 * widths[part], _LEAST)
-        width = max(widths[part] - excess, least)
-        if excess > 0 and width < widths[part]:
-            found[part] = width
-            excess -= widths[part] - width
-    return found
+def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
+    """Columns of text that share the line: the longer ones, of a table with many words."""
+    longest = {part: _longest(part, table) for part in shown if part.column.kind == "text"}
+    if sum(longest.values()) <= _WORDS:
+        return []
+    return [part for part, length in longest.items() if length > _WORD]
 
 
-def _width(text: str) -> float:
-    """In figures: thin characters, a true minus, and all others."""
-    thin, minus = sum(map(text.count, " .,:;()[]/|ijlt'-")), text.count(MINUS)
-    return len(text) + (_THIN - 1) * thin + (_MINUS - 1) * minus
+def _longest(part: Part, table: DataTable) -> int:
+    return max((len(_words(part, row.values[part.index])) for row in table.rows), default=0)
 
 
-def _column(part: Part, table: DataTable) -> list[str]:
-    """What stands in a column, the lines of its header first; of S columns their format."""
-    sign, wholes, decimals = _format(part, table) if part.numeric else ("", 0, 0)
-    own = f"{sign and MINUS}{'0' * wholes}{'.' * (decimals > 0)}{'0' * decimals}"
-    words = (_words(part, row.values[part.index]) for row in table.rows)
-    return [*_lines(part, table), own, *words]
-
-
-def _lines(part: Part, table: DataTable, width: float | None = None) -> list[str]:
+def _head(part: Part, table: DataTable) -> str:
     """The header, in as many lines as make it no wider than what stands below."""
-    below = max(len(_words(part, row.values[part.index])) for row in table.rows)
     text = part.header.replace(" %", "\N{NO-BREAK SPACE}%")  # which a line does not begin with
-    return textwrap.wrap(text, max(int(width or below), 7), break_long_words=False)
-
-
-def _head(part: Part, table: DataTable, width: float | None) -> str:
-    text, lines = part.header, _lines(part, table, width)
+    lines = textwrap.wrap(text, max(_longest(part, table), 7), break_long_words=False)
     if len(lines) < 2:
         return f"{{{latex_text(text)}}}"
     place = "l" if part.column.kind == "text" else "r" if part.kind == "interval" else "c"

@@ -19,7 +19,8 @@ def terminal_table(table: DataTable, width: int) -> Table:
     """The table in at most ``width`` characters, below its caption; its notes are left out.
 
     Names of rows and numbers are never broken. Columns for which there is no room are left out
-    from the right, and their number is said below; the first two stay. Brackets are text.
+    from the right, those first that paper has no room for either, and their number is said
+    below; the first two stay. Brackets are text.
     """
     columns = [
         list(map(one_line, column))
@@ -31,10 +32,12 @@ def terminal_table(table: DataTable, width: int) -> Table:
             zip(table.columns, (max(map(len, column)) for column in columns), strict=True)
         )
     ]
-    shown = len(columns)
-    while shown > 2 and sum(least[:shown]) + _PADDING * shown > width:
-        shown -= 1
-    hidden = len(columns) - shown
+    shown = list(range(len(columns)))
+    for place in sorted(shown[2:], key=lambda place: (table.columns[place].printed, -place)):
+        if sum(least[place] + _PADDING for place in shown) <= width:
+            break
+        shown.remove(place)
+    hidden = len(columns) - len(shown)
     found = Table(
         title=Text(one_line(words(table.caption))),
         title_justify="left",
@@ -43,7 +46,8 @@ def terminal_table(table: DataTable, width: int) -> Table:
         box=box.SIMPLE_HEAD,
         highlight=False,
     )
-    for place, column in enumerate(table.columns[:shown]):
+    for place in shown:
+        column = table.columns[place]
         whole = place == 0 or column.kind != "text"
         found.add_column(
             Text(columns[place][0]),
@@ -52,7 +56,7 @@ def terminal_table(table: DataTable, width: int) -> Table:
             no_wrap=whole,
             min_width=least[place],
         )
-    for row in zip(*(column[1:] for column in columns[:shown]), strict=True):
+    for row in zip(*(columns[place][1:] for place in shown), strict=True):
         found.add_row(*map(Text, row))
     return found
 

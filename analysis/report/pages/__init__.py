@@ -1,1 +1,1 @@
-"""Pages of ``coartic analyse``: documents of the report's tables."""
+"""The pages of ``coartic analyse``: documents of the report's tables, with what explains them."""

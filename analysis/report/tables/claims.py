@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from typing import TYPE_CHECKING
 
-from analysis.claims.register import Judged
+from analysis.claims.register import FITTED, RULES
 from analysis.report.document import Column, DataTable, Row
 from analysis.report.tables.common import finite, table
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from analysis.study import Study
 
 
-def claims_table(study: Study, judged: Sequence[Judged]) -> DataTable | None:
-    """The register in short."""
+def claims_table(study: Study) -> DataTable | None:
+    """Every claim with its verdict, p-values and place; rows lead to the claims' sections."""
     by_run = {str(run): key for key, cell in study.cells.items() for run in cell.runs.run_id}
     rows = [
         Row(
@@ -22,30 +22,34 @@ def claims_table(study: Study, judged: Sequence[Judged]) -> DataTable | None:
             (
                 entry.claim.id,
                 entry.claim.statement,
-                entry.verdict + (" †" if entry.claim.fitted else ""),
+                entry.marked,
                 finite(entry.adjusted_p),
                 finite(entry.adjusted_contrary_p),
                 ", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
             ),
             tuple(dict.fromkeys(by_run[run] for run in entry.run_ids)),
+            link=f"#claim-{entry.claim.id}",
         )
-        for entry in judged
+        for entry in study.judged
     ]
+    tested = sum(not math.isnan(entry.p) for entry in study.judged)
+    contraries = sum(not math.isnan(entry.contrary_p) for entry in study.judged)
     return table(
         "claims",
         "What the paper says of its model, and what it does not compare.",
         (
             Column("claim", "claim"),
-            Column("statement", "statement", printed=False),
-            Column("verdict", "verdict"),
-            Column("adjusted_p", "adjusted p", "p", digits=4),
-            Column("adjusted_contrary_p", "of the contrary", "p", digits=4),
-            Column("place", "place in the paper", printed=False),
+            Column("statement", "statement", rests_on=("text",), printed=False),
+            Column("verdict", "verdict", rests_on=("runs",)),
+            Column("adjusted_p", "adjusted p", "p", digits=4, rests_on=("runs",)),
+            Column("adjusted_contrary_p", "of the contrary", "p", digits=4, rests_on=("runs",)),
+            Column("place", "place in the paper", rests_on=("paper",), printed=False),
         ),
         rows,
         (
-            "Supported: what the claim says is seen, and its p (the largest of its tests) is "
-            "below 5 % after Holm's correction over the claims; not supported: the contrary's is, "
-            "or what can be counted is not there. No p: counted, or nothing to test.",
+            RULES,
+            f"Adjusted by Holm over the {tested} claims that could be tested here, for the "
+            f"contrary over {contraries}.",
+            FITTED,
         ),
     )

@@ -3,143 +3,225 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
-from analysis.comparisons.frontier import LABELS
+from analysis.comparisons.areas import Area
+from analysis.comparisons.pareto import TIME_TOLERANCE
+from analysis.comparisons.progress import LABELS, SPENDS
+from analysis.comparisons.targets import Target
 from analysis.markup import escaped
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.report.document import Column, DataTable, Estimate, RestsOn, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
+OtherArm = Literal["free", "still"]
+TARGET_SPENDS = ("trials", "forward_kinematics")
+"""Spends whose targets have tables; ``targets.csv`` has all."""
+SOMETIMES = 0.05
+"""Share of resamples in which a method that has a row is on some front."""
+READING_OF_COST = (
+    "Two-armed tasks have two optima: with all joints free, and with the arm that is not chosen "
+    "kept still; the second concerns methods that keep it so. The optimum's own searches and "
+    "methods with a base that a parameter locks are left out. Kinematics and time within a run "
+    "are its totals, spread evenly over its trials. A planner makes no trials.",
+    "**Targets**: of runs that their budget of trials stopped nobody knows when they would have "
+    "come near. They are censored, all at the horizon, the least spend at which one of them "
+    "ended: what was reached behind it counts among the runs that came near, not in the median "
+    "(18/20 and ∞ with a horizon of 2000: 18 runs did, but not half of the 20 within the 2000 "
+    "that all runs had). Other runs never reach what they missed. `targets.csv` of `coartic "
+    "analyse` has all four spends.",
+    "**Areas**: from one average trial to the largest whole spend of a method that learns. "
+    "`areas.csv` has them in full, `anytime.csv` the curves.",
+    "**Pareto sets**: a method is on the front if none has a mean reward as high for as little "
+    "spend, and one of them better. A method with a single run has nothing to resample. Counts "
+    f"are exact; solve times within {TIME_TOLERANCE:.0%} of each other count as ties, because "
+    "they vary between machines and runs. Methods with a run that has no solution are left out; "
+    "methods on no front are in `pareto.csv`.",
+)
+"""What is behind the tables of this module."""
+_RUNS: tuple[RestsOn, ...] = ("runs",)
+_OPTIMUM: tuple[RestsOn, ...] = ("runs", "optimum")
+_SUFFIX = {"trials": "", "forward_kinematics": "-kinematics"}
 
-def targets_table(study: Study, targets: pd.DataFrame, task: str) -> DataTable | None:
-    """Trials to come near the optimum, the nearest target first to be reached on top."""
-    frame = targets[
-        (targets.task == task) & (targets.spend == "trials") & (targets.other_arm == "free")
+
+def other_arms(study: Study, task: str) -> tuple[OtherArm, ...]:
+    """The optima that a task has: with one arm there is none to keep still."""
+    return ("free", "still") if len(study.tasks[task].hands) > 1 else ("free",)
+
+
+def targets_table(
+    study: Study, task: str, spend: str = "trials", other_arm: OtherArm = "free"
+) -> DataTable | None:
+    """Spend to come near an optimum, the method that does so most often on top."""
+    frame = _of_methods(study.targets, task)
+    frame = frame[(frame.spend == spend) & (frame.other_arm == other_arm)]
+    methods: dict[str, list[Target]] = {}
+    for row in frame.itertuples(index=False, name=None):
+        target = Target(*row)
+        methods.setdefault(target.method, []).append(target)
+    near = [rows for rows in methods.values() if any(row.reached for row in rows)]
+    if not near:
+        return None
+    columns = [
+        Column("method", "method"),
+        *_within(near[0], spend, other_arm),
+        Column("horizon", "horizon", "number", digits=0, rests_on=_RUNS, printed=False),
     ]
-    shares = sorted(frame.share.unique(), reverse=True)
-    rows = []
-    for method, own in frame.groupby("method", sort=False):
-        by_share = {row["share"]: row for row in own.to_dict("records")}
-        if not any(row["reached"] for row in by_share.values()):
-            continue
-        values: list[Value] = [str(method)]
-        for share in shares:
-            row = by_share[share]
-            median = float(row["median"])
-            values += [
-                f"{row['reached']}/{row['runs']}",
-                Estimate(median, None, float(row["low"]), float(row["high"]))
-                if math.isfinite(median) and row["runs"] > 1
-                else median
-                if math.isfinite(median)
-                else None,
-            ]
-        rows.append((sum(-by_share[s]["reached"] / by_share[s]["runs"] for s in shares),
-                     Row(str(method), tuple(values), ((task, str(method)),))))  # fmt: skip
-    heads = [Column("method", "method")]
-    for share in shares:
-        name = f"within_{share:.0%}".rstrip("%")
-        printed = share in (shares[0], shares[-1])
-        heads.append(Column(f"{name}_reached", f"within {100 * share:.0f} %", printed=printed))
-        heads.append(Column(name, "median trials", "number", digits=0, printed=printed))
+    never = ", ".join(name for name, rows in methods.items() if rows not in near)
+    ending = "" if other_arm == "free" else "-still"
     return table(
-        f"targets-{table_ids(study)[task]}",
-        f"Trials to come near the optimum of {escaped(task)}, other arm free.",
-        tuple(heads),
-        [row for _, row in sorted(rows, key=lambda pair: pair[0])],
+        f"targets-{table_ids(study)[task]}{_SUFFIX[spend]}{ending}",
+        f"{LABELS[spend].capitalize()} to come near the optimum of {escaped(task)}, other arm "
+        f"{other_arm}.",
+        tuple(columns),
+        [_target_row(rows) for rows in sorted(near, key=_nearness)],
         (
-            "Runs that came within a share of the optimum, and the median of trials to get there "
-            "over all runs (Kaplan-Meier; runs stopped by their budget are censored). Planners "
-            "need no trials. Methods that never come within 5 % are left out.",
+            "Runs that came within a share of the optimum, and the median spend to get there "
+            "over all runs (Kaplan-Meier; runs stopped by their budget are censored at the "
+            f"horizon).{' Planners need no trials.' if spend == 'trials' else ''}"
+            + (f" Never within {near[0][0].share:.0%}: {escaped(never)}." if never else ""),
         ),
     )
 
 
-def areas_table(study: Study, areas: pd.DataFrame, task: str) -> DataTable | None:
-    """Area under the anytime curve over every spend, the best first."""
-    frame = areas[(areas.task == task) & (areas.other_arm == "free")]
-    spends = list(dict.fromkeys(frame.spend))
-    rows = []
-    for method, own in frame.groupby("method", sort=False):
-        by_spend = {row["spend"]: row for row in own.to_dict("records")}
-        rows.append(
-            Row(
-                str(method),
-                (
-                    str(method),
-                    *(
-                        with_interval(float(row["area"]), float(row["low"]), float(row["high"]))
-                        if (row := by_spend.get(spend))
-                        else None
-                        for spend in spends
-                    ),
-                ),
-                ((task, str(method)),),
-            )
+def _within(targets: list[Target], spend: str, other_arm: OtherArm) -> Iterator[Column]:
+    """Of each share two columns: runs that came so near, and what it took."""
+    for target in targets:
+        name = f"within_{target.share:.0%}".rstrip("%")
+        printed = target in (targets[0], targets[-1])
+        head = f"within {100 * target.share:.0f} %: {typographic(str(target.target))}"
+        yield Column(
+            f"{name}_reached", head, rests_on=_OPTIMUM, other_arm=other_arm, printed=printed
         )
+        yield Column(
+            name, f"median {LABELS[spend]}", "number", digits=0, rests_on=_OPTIMUM,
+            other_arm=other_arm, printed=printed,
+        )  # fmt: skip
+
+
+def _target_row(targets: list[Target]) -> Row:
+    """A method's, the widest share first."""
+    values: list[Value] = [targets[0].method]
+    for target in targets:
+        values += [f"{target.reached}/{target.runs}", _median(target)]
+    horizon = targets[0].horizon
+    values.append(horizon if math.isfinite(horizon) else None)
+    return Row(targets[0].method, tuple(values), ((targets[0].task, targets[0].method),))
+
+
+def _median(target: Target) -> Value:
+    """Infinite where fewer than half came near within the horizon; None where none ever did."""
+    if not target.reached:
+        return None
+    bounded = target.runs > 1 and math.isfinite(target.low)
+    return Estimate(target.median, None, target.low, target.high) if bounded else target.median
+
+
+def _nearness(targets: list[Target]) -> tuple[float, ...]:
+    """Sorts methods best first: shares of runs from the nearest target on, then medians."""
+    nearest = targets[::-1]
+    return (*(-t.reached / t.runs for t in nearest), *(t.median for t in nearest))
+
+
+def areas_table(study: Study, task: str) -> DataTable | None:
+    """Area under the anytime curve over every spend and of every optimum, the best first."""
+    frame = _of_methods(study.areas, task)
+    arms = [arm for arm in other_arms(study, task) if (frame.other_arm == arm).any()]
+    spends = [spend for spend in SPENDS if (frame.spend == spend).any()]
+    known = {
+        (area.method, area.other_arm, area.spend): area
+        for area in (Area(*row) for row in frame.itertuples(index=False, name=None))
+    }
+    rows = [
+        Row(
+            method,
+            (method, *(_area(known.get((method, arm, of))) for arm in arms for of in spends)),
+            ((task, method),),
+        )
+        for method in dict.fromkeys(map(str, frame.method))
+    ]
     rows.sort(key=lambda row: _number(row.values[1]))  # noqa: PD011 (no frame)
+    heads = [
+        Column(
+            spend if arm == "free" else f"{spend}_still",
+            f"over {LABELS[spend]}" + ("" if arm == "free" else ", arm still"),
+            "number", digits=3, rests_on=_OPTIMUM, other_arm=arm,
+            printed=arm == "free" and place < 2,
+        )
+        for arm in arms
+        for place, spend in enumerate(spends)
+    ]  # fmt: skip
     return table(
         f"areas-{table_ids(study)[task]}",
-        f"Area under the anytime curve on {escaped(task)}, other arm free.",
-        (
-            Column("method", "method"),
-            *(
-                Column(str(spend), LABELS[str(spend)], "number", digits=3, printed=i < 2)
-                for i, spend in enumerate(spends)
-            ),
-        ),
+        f"Area under the anytime curve on {escaped(task)}.",
+        (Column("method", "method"), *heads),
         rows,
         (
-            "Mean gap to the optimum, as a share of it, over the logarithm of the budget: 0 is "
-            "optimal from the first trial on, 1 nothing found. Within a task and a column only.",
+            "Mean gap to the optimum, as a share of it, over the logarithm of the budget, with "
+            "its percentile bootstrap interval: 0 is optimal from the first trial on, 1 nothing "
+            "found. Within a task and a column only.",
         ),
     )
 
 
-def pareto_table(study: Study, pareto: pd.DataFrame, task: str) -> DataTable | None:
+def _area(area: Area | None) -> Value:
+    return None if area is None else with_interval(area.area, area.low, area.high)
+
+
+def pareto_table(study: Study, task: str) -> DataTable | None:
     """Methods on some Pareto set of reward and spend."""
-    frame = pareto[pareto.task == task]
-    spends = list(dict.fromkeys(frame.spend))
-    rows = []
-    for method, own in frame.groupby("method", sort=False):
-        by_spend = {row["spend"]: row for row in own.to_dict("records")}
-        if not any(row["front_share"] > 0.05 for row in by_spend.values()):
-            continue
-        first = own.iloc[0]
-        values: list[Value] = [str(method), str(first.told), float(first.reward)]
-        for spend in spends:
-            row = by_spend[spend]
-            values += [_whole(row["amount"]), finite(row["front_share"])]
-        rows.append(Row(str(method), tuple(values), ((task, str(method)),)))
+    frame = study.pareto[study.pareto.task == task]
+    rows = [
+        Row(str(method), tuple(_on_fronts(own)), ((task, str(method)),))
+        for method, own in frame.groupby("method", sort=False)
+        if (own.told_share > SOMETIMES).any()
+    ]
     heads = [
-        Column("method", "method"), Column("told", "told"),
-        Column("reward", "reward", "number", "ticks", 1),
-    ]  # fmt: skip
-    for i, spend in enumerate(spends):
-        heads.append(Column(str(spend), LABELS[str(spend)], "number", printed=i < 3))
-        heads.append(Column(f"{spend}_front", "on front", "share", digits=0, printed=i < 3))
+        Column("method", "method"),
+        Column("told", "told", rests_on=("text",)),
+        Column("reward", "reward", "number", "ticks", 1, rests_on=_RUNS),
+    ]
+    for place, spend in enumerate(LABELS):
+        printed = place < 3
+        heads += [
+            Column(spend, LABELS[spend], "number", rests_on=_RUNS, printed=printed),
+            Column(f"{spend}_front", "on front", "share", digits=0, rests_on=_RUNS,
+                   printed=printed),
+            Column(f"{spend}_told", "of those told no more", "share", digits=0, rests_on=_RUNS,
+                   printed=False),
+        ]  # fmt: skip
     return table(
         f"pareto-{table_ids(study)[task]}",
         f"Pareto sets of reward and spend on {escaped(task)}.",
         tuple(heads),
         rows,
         (
-            "Of every spend the median over runs, and in how many bootstrap resamples the method "
-            "is on the front: no other with as much reward spends less. Methods on none (in at "
-            "most 5 % of resamples) are left out, and so are the optimum's own searches. Solve "
-            "times within 10 % are ties.",
+            "Of every spend the median over runs, and in how many bootstrap resamples of the runs "
+            "the method is on the front of all, and on that of the methods that are told no more "
+            "than it is. Methods on none (in at most 5 % of resamples) are left out.",
         ),
     )
 
 
-def _whole(value: float) -> float | int | None:
-    """Counts that a median left whole are written so; None for NaN."""
-    return int(value) if float(value).is_integer() else finite(value)
+def _on_fronts(rows: pd.DataFrame) -> Iterator[Value]:
+    """A method's values, spend by spend."""
+    first = rows.iloc[0]
+    yield from (str(first.method), str(first.told), float(first.reward))
+    for amount, front, told in zip(rows.amount, rows.front_share, rows.told_share, strict=True):
+        whole = float(amount).is_integer()
+        yield from (int(amount) if whole else finite(amount), finite(front), finite(told))
+
+
+def _of_methods(frame: pd.DataFrame, task: str) -> pd.DataFrame:
+    """Rows of a task without the optimum's searches, which are what the others are held to."""
+    return frame[(frame.task == task) & ~frame.method.str.startswith(OPTIMUM)]
 
 
 def _number(value: Value) -> float:

@@ -235,7 +235,7 @@ def definitions_table() -> DataTable:
 
 def labels_of(study: Study, task: str) -> list[str]:
     """Methods of a task, best mean reward first."""
-    return [label for name, label in study.methods if name == task]
+    return [label for name, label in study.method_rows if name == task]
 
 
 def holm_adjusted(rows: Iterable[SignatureRow]) -> dict[tuple[str, Spot], float]:

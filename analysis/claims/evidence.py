@@ -1,0 +1,56 @@
+"""Tables of evidence: raw values with the cells behind them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+from analysis.claims.register import Finding
+from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.statistics.estimates import Inference
+
+Arm = Literal["free", "still"]
+
+
+def measured(
+    claim: str,
+    evidence: str,
+    title: str,
+    columns: tuple[Column, ...],
+    rows: Sequence[Row],
+    words: Sequence[str],
+) -> Finding:
+    """A finding that judges nothing: a sentence and a table, also in words, row by row."""
+    name, caption = f"evidence-{claim}", f"{title} ({claim})."
+    table = DataTable(name, caption, columns, tuple(rows)) if rows else None
+    return Finding(None, evidence, table=table, rows="; ".join(words))
+
+
+def estimate_of(found: Inference) -> Estimate:
+    """An estimate with its interval, where it has one."""
+    if math.isnan(found.low):
+        return Estimate(found.estimate)
+    return Estimate(found.estimate, None, found.low, found.high)
+
+
+def of_either_optimum(*columns: Column) -> tuple[Column, ...]:
+    """Columns for the optimum with the other arm free, then the same for that with it still."""
+    arms: tuple[Arm, ...] = ("free", "still")
+    return tuple(
+        replace(
+            column,
+            name=f"{column.name}_{arm}",
+            header=f"{column.header}, other arm {arm}",
+            other_arm=arm,
+        )
+        for arm in arms
+        for column in columns
+    )
+
+
+def by_optimum(arm: Arm, *values: Value) -> tuple[Value, ...]:
+    """The values below :func:`of_either_optimum`; none for the other optimum."""
+    none = (None,) * len(values)
+    return (*values, *none) if arm == "free" else (*none, *values)

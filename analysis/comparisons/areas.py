@@ -1,0 +1,78 @@
+"""Area under the anytime curve: one number for how soon a method comes near the optimum."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from analysis.comparisons.progress import OTHER_ARMS, BestSoFar, cells_by_spend, keeps_to
+from analysis.statistics.resampling import mean_interval
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+
+class Area(NamedTuple):
+    """A row of :func:`areas`."""
+
+    task: str
+    method: str
+    other_arm: str
+    spend: str
+    start: float
+    end: float
+    runs: int
+    area: float
+    low: float
+    high: float
+
+
+def areas(study: Study, *, seed: int = 0) -> pd.DataFrame:
+    """Area under the anytime curve: one row per other arm, task, method and spend.
+
+    The area of a run is its gap to the optimum R*, averaged over the logarithm of the
+    budget B from ``start`` to ``end``:
+
+        1 / ln(end / start) · ∫ min(1, (R* − best reward within B) / |R*|) d ln B,
+
+    with a gap of 1 where there is no solution yet. It lies between 0 (optimal from
+    ``start`` on) and 1; 0.1 means 10 % from the optimum on average, each doubling of the
+    budget counting alike. A run that has ended keeps its best reward. ``end`` is the largest
+    whole spend of a run that learns by trial, over all methods of the task, and ``start`` is
+    ``end`` over the number of trials, one average trial: areas compare within a task, a
+    spend and a folder only. The steps are integrated exactly.
+
+    Columns: those of :class:`Area`. ``other_arm``: which optimum; ``area`` is the mean over
+    ``runs`` with its interval ``low`` to ``high``
+    (:func:`analysis.statistics.resampling.mean_interval`). Tasks without a known optimum, spends
+    without a run that learns, and methods with a base that a parameter locks have no rows; of
+    the optimum with the other arm still neither have methods that move that arm.
+    """
+    selected = list(cells_by_spend(study))
+    ends: dict[tuple[str, str], float] = {}
+    for cell, spend, runs in selected:
+        totals = [run.total[spend] for run in runs if run.learns and run.solved]
+        ends[cell.task, spend] = max([ends.get((cell.task, spend), 0.0), *totals])
+    rows = []
+    for other_arm in OTHER_ARMS:
+        for cell, spend, runs in selected:
+            optimum = study.optima.get((cell.task, other_arm))
+            end, trials = ends[cell.task, spend], ends[cell.task, "trials"]
+            if optimum is None or not optimum.reward or not runs:  # nothing to fall short of
+                continue
+            if trials <= 1 or not keeps_to(cell, other_arm):
+                continue
+            start = end / trials
+            each = np.array([[_area(run, spend, optimum.reward, start, end)] for run in runs])
+            mean, low, high = (float(value[0]) for value in mean_interval(each, seed))
+            head = cell.task, cell.label, other_arm, spend, start, end
+            rows.append(Area(*head, len(runs), mean, low, high))
+    return pd.DataFrame(rows, columns=Area._fields)
+
+
+def _area(run: BestSoFar, spend: str, optimum: float, start: float, end: float) -> float:
+    gaps = np.minimum(1.0, (optimum - np.concatenate([[-np.inf], run.rewards])) / abs(optimum))
+    edges = np.clip(np.concatenate([[start], run.spent[spend], [end]]), start, end)
+    return float(np.average(gaps, weights=np.diff(np.log(edges))))

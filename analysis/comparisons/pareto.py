@@ -1,0 +1,140 @@
+"""Pareto sets of reward and spend, and how sure it is that a method is on one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.comparisons.methods import solve_times
+from analysis.comparisons.progress import LABELS
+from analysis.results.folder import CellRuns
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.results.optima import locks_base
+from analysis.statistics.resampling import resampled
+from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+TIME_TOLERANCE = 0.1
+"""Relative difference up to which two solve times are a tie."""
+COLUMNS = (
+    *("task", "method", "told", "runs", "solved", "reward", "spend", "amount"),
+    *("front", "front_share", "front_told", "told_share"),
+)
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+def pareto_sets(study: Study, *, seed: int = 0) -> pd.DataFrame:
+    """Mean reward against spend: one row per task, method and spend, best reward first.
+
+    A method is on the front if no other has a mean reward as high for as little spend, with
+    either one better; ties are all on it. Times within :data:`TIME_TOLERANCE` of each other
+    are ties: they vary between machines and between runs. Columns: ``task``, ``method``,
+    ``told`` (a letter for each kind of information,
+    :data:`analysis.comparisons.methods.TOLD`), ``runs``,
+    ``solved``, mean ``reward``, ``spend`` (:data:`~analysis.comparisons.progress.LABELS`;
+    ``information`` is the number of kinds of information told, which does not weigh them),
+    ``amount`` (median over runs), ``front``, ``front_share`` (of
+    :data:`~analysis.statistics.resampling.RESAMPLES` bootstrap resamples, in how many it is on
+    the front), and ``front_told`` and ``told_share``: the same among methods that were told
+    nothing that it was not.
+
+    Runs are resampled within their cell, reward and spend of a run together, by run number:
+    methods that did the same in every run stay tied, as methods that share their seeds may.
+    A method with a single run is taken as it is. Methods with runs that have no solution are
+    left out: a mean of the others flatters them. So are the optimum's searches, which are
+    references, and methods with a base that a parameter locks.
+    """
+    parts = [
+        part
+        for task in study.tasks
+        if (cells := _solving(study, task))
+        for part in _fronts(study, cells, seed)
+    ]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=COLUMNS)
+
+
+def _solving(study: Study, task: str) -> list[CellRuns]:
+    """The methods to compare on a task, in the order of the table of methods."""
+    return [
+        cell
+        for key, row in study.method_rows.items()
+        if key[0] == task
+        and row.solved == row.runs > 0
+        and not (cell := study.cells[key]).method.startswith(OPTIMUM)
+        and not locks_base(cell.runs)
+    ]
+
+
+def _fronts(study: Study, cells: Sequence[CellRuns], seed: int) -> Iterator[pd.DataFrame]:
+    """The fronts of one task, one a spend."""
+    rows = [study.method_rows[cell.task, cell.label] for cell in cells]
+    told = [frozenset(row.told) for row in rows]
+    no_more: Flags = np.array([[other <= own for other in told] for own in told])
+    reward = np.array([row.reward for row in rows])
+    rewards = [cell.runs.reward.to_numpy(dtype=np.float64) for cell in cells]
+    rewards_again = np.stack([resampled(each, seed).mean(axis=-1) for each in rewards], axis=-1)
+    for spend in LABELS:
+        spent = [_spent(cell, spend, letters) for cell, letters in zip(cells, told, strict=True)]
+        amount = np.array([float(_median(each)) for each in spent])
+        amounts = np.stack([_median(resampled(each, seed)) for each in spent], axis=-1)
+        tolerance = TIME_TOLERANCE if spend == "solve_s" else 0.0
+        worse = dominated(reward, amount, tolerance)
+        again = dominated(rewards_again, amounts, tolerance)
+        known, seen = ~np.isnan(amount), ~np.isnan(amounts)
+        yield pd.DataFrame(
+            {
+                "task": [cell.task for cell in cells],
+                "method": [cell.label for cell in cells],
+                "told": [row.told for row in rows],
+                "runs": [row.runs for row in rows],
+                "solved": [row.solved for row in rows],
+                "reward": reward,
+                "spend": spend,
+                "amount": amount,
+                "front": ~worse.any(axis=-1) & known,
+                "front_share": (~again.any(axis=-1) & seen).mean(axis=0),
+                "front_told": ~(worse & no_more).any(axis=-1) & known,
+                "told_share": (~(again & no_more).any(axis=-1) & seen).mean(axis=0),
+            }
+        )
+
+
+def dominated(reward: Array, amount: Array, tolerance: float = 0.0) -> Flags:
+    """Whether method i is dominated by method j, shape ``(..., n, n)``.
+
+    ``reward`` and ``amount`` have shape ``(..., n)``. Amounts whose ratio is at most
+    1 + ``tolerance`` are ties. Domination has no cycles all the same: along one the reward
+    could not change, and amounts would only fall.
+    """
+    own, other = reward[..., :, None], reward[..., None, :]
+    spent, others = amount[..., :, None], amount[..., None, :]
+    room = 1 + tolerance
+    as_good = (other >= own) & (others <= spent * room)
+    better = (other > own) | (others * room < spent)
+    return as_good & better
+
+
+def _spent(cell: CellRuns, spend: str, told: frozenset[str]) -> Array:
+    """What each run spent (n,); NaN for times that are not taken."""
+    if spend == "information":
+        return np.full(len(cell.runs), float(len(told)))
+    if spend == "solve_s":
+        times = solve_times(cell.good)
+        return times.reindex(cell.runs.index).to_numpy(dtype=np.float64, na_value=np.nan)
+    return cell.runs[spend].to_numpy(dtype=np.float64, na_value=np.nan)
+
+
+def _median(values: Array) -> Array:
+    """Median over the last axis of the values that are known; NaN where none is."""
+    ordered = np.sort(values, axis=-1)  # NaN last
+    count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
+    sides = [np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[-1] - 1)]
+    middle: Array = np.concatenate(
+        [np.take_along_axis(ordered, side, axis=-1) for side in sides], axis=-1
+    ).mean(axis=-1)
+    return middle

@@ -1,0 +1,135 @@
+"""All figures: how each is drawn, and which section of a report shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from matplotlib.figure import Figure
+
+from analysis.figures.bars import bars
+from analysis.figures.configurations import PAPER, paper_configurations
+from analysis.figures.context import context
+from analysis.figures.frontier import frontier
+from analysis.figures.learning_curves import learning_curves
+from analysis.figures.plot import Plot
+from analysis.figures.profiles import profiles
+from analysis.figures.published import published
+from analysis.figures.recruitment import recruitment
+from analysis.figures.selection import known_methods
+from analysis.figures.signature_matrix import signature_matrix
+from analysis.figures.tasks import tasks_of
+from coartic import CoarticError
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+Section = Literal[
+    "tasks-drawn", "paper", "movements", "learning", "methods", "cost", "coarticulation"
+]
+"""Of a report that shows figures, by id."""
+
+
+class Entry(NamedTuple):
+    """One row of the register."""
+
+    name: str
+    """Id of the figure, or what the ids of several begin with."""
+    draw: Callable[..., Plot | list[Plot]]
+    """Of a study and, by keyword, ``methods``: labels to show in place of its own choice.
+
+    Raises CoarticError where the runs do not allow it.
+    """
+    section: Section
+    by_task: bool = False
+    """Whether there is one for each task, which may be too many."""
+
+
+REGISTER = (
+    Entry("tasks", tasks_of, "tasks-drawn"),
+    *(Entry(name, partial(paper_configurations, name), "movements") for name in PAPER),
+    Entry("learned-reward", bars, "paper"),
+    Entry("published", published, "paper"),
+    Entry("learning-curves", learning_curves, "learning"),
+    Entry("recruitment", recruitment, "paper"),
+    Entry("context", context, "coarticulation"),
+    Entry("signatures", signature_matrix, "coarticulation", by_task=True),
+    Entry("frontier", frontier, "cost"),
+    Entry("profiles", profiles, "methods"),
+)
+"""The paper's figures in its order, and the others."""
+
+
+class Figures(Mapping[str, Figure]):
+    """The figures that a folder's runs allow, by id; each is drawn when it is asked for."""
+
+    def __init__(
+        self,
+        study: Study,
+        methods: Sequence[str] | None = None,
+        most_tasks: int | None = None,
+    ) -> None:
+        """Figures of ``methods``, labels with their variants, or of each figure's default.
+
+        Those that there is one of for each task are skipped where there are more than
+        ``most_tasks``. Raises CoarticError for a method that the folder does not have.
+        """
+        if methods is not None:
+            known_methods(study, methods)
+        self._study, self._methods, self._most = study, methods, most_tasks
+        self._drawn: dict[str, list[Plot]] = {}
+        self._skipped: dict[str, str] = {}
+
+    @property
+    def plots(self) -> list[Plot]:
+        """All figures with their words and numbers."""
+        return [plot for entry in REGISTER for plot in self._of(entry)]
+
+    @property
+    def skipped(self) -> dict[str, str]:
+        """Why there is none, by what would have been drawn."""
+        self.plots  # noqa: B018
+        return self._skipped
+
+    def of_section(self, section: str) -> list[Plot]:
+        """Figures of one section of a report."""
+        return [plot for e in REGISTER if e.section == section for plot in self._of(e)]
+
+    def plot(self, name: str) -> Plot:
+        """A figure with its words and numbers, by its id; KeyError where there is none."""
+        for entry in REGISTER:
+            if name.startswith(entry.name):
+                for plot in self._of(entry):
+                    if plot.id == name:
+                        return plot
+                if entry.name in self._skipped:
+                    raise KeyError(f"no figure {name}: {self._skipped[entry.name]}")
+        raise KeyError(f"no figure {name}; there are {', '.join(self)}")
+
+    def __getitem__(self, name: str) -> Figure:
+        """The figure alone."""
+        return self.plot(name).figure
+
+    def __iter__(self) -> Iterator[str]:
+        """Ids, in the order of the register."""
+        return iter([plot.id for plot in self.plots])
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.plots)
+
+    def _of(self, entry: Entry) -> list[Plot]:
+        if entry.name not in self._drawn:
+            try:
+                self._drawn[entry.name] = self._draw(entry)
+            except CoarticError as error:
+                self._drawn[entry.name], self._skipped[entry.name] = [], str(error)
+        return self._drawn[entry.name]
+
+    def _draw(self, entry: Entry) -> list[Plot]:
+        tasks = len(self._study.tasks)
+        if entry.by_task and self._most is not None and tasks > self._most:
+            raise CoarticError(f"there would be one for each of {tasks} tasks")
+        found = entry.draw(self._study, methods=self._methods)
+        return found if isinstance(found, list) else [found]

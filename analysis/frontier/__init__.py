@@ -1,1 +1,0 @@
-"""Reward against what it costs: anytime curves, targets, Pareto sets."""

@@ -1,0 +1,33 @@
+"""What ``coartic analyse`` writes into a results folder."""
+
+from __future__ import annotations
+
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.claims import claims_document
+from analysis.report.pages.comparisons import comparisons_document
+from analysis.report.pages.frontier import frontier_document
+from analysis.report.pages.signatures import signatures_document
+from analysis.study import Study
+
+
+def analyse(study: Study) -> dict[str, bytes]:
+    """All pages and tables by file name."""
+    pages = {
+        "claims.md": markdown(claims_document(study), tables=""),
+        "comparisons.md": markdown(comparisons_document(study), tables=""),
+        "frontier.md": markdown(frontier_document(study), tables=""),
+        "signatures.md": markdown(signatures_document(study), tables=""),
+    }
+    tables = {
+        "claims.csv": study.claims,
+        "comparisons.csv": study.pairs,
+        "across_tasks.csv": study.overall,
+        "profiles.csv": study.profiles,
+        "signatures.csv": study.signatures.drop(columns="label"),
+        "anytime.csv": study.anytime,
+        "targets.csv": study.targets,
+        "areas.csv": study.areas,
+        "pareto.csv": study.pareto,
+    }
+    texts = pages | {name: table.to_csv(index=False) for name, table in tables.items()}
+    return {name: text.encode() for name, text in texts.items()}

@@ -1,0 +1,87 @@
+"""What ``coartic run`` says of its results: against the paper, and all methods side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from analysis.markup import code, escaped, words
+from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
+from analysis.report.legends import with_legends
+from analysis.report.limitations import limitations
+from analysis.report.tables import (
+    exhaustive_table,
+    methods_table,
+    published_table,
+    reading_of_methods,
+    sequences_table,
+    table_ids,
+)
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+
+def comparison_document(study: Study) -> Document:
+    """Published and ours, methods by task, and what the folder cannot show."""
+    said: set[str] = set()
+    against_paper = published_table(study), sequences_table(study), exhaustive_table(study)
+    paper = Section("paper", "Published and ours", _noted(against_paper, said))
+    by_task = (
+        Section(f"on-{slug}", task, _noted([methods_table(study, task)], said))
+        for task, slug in table_ids(study).items()
+    )
+    methods = Section(
+        "methods",
+        "Methods side by side",
+        (Bullets(reading_of_methods(study)),),
+        tuple(section for section in by_task if section.blocks),
+    )
+    limits = Section("limitations", "Limitations", (Bullets(limitations(study)),))
+    return Document(
+        "Comparison",
+        tuple(section for section in (paper, methods, limits) if section.blocks),
+        _made(study),
+        study.run_ids,
+    )
+
+
+def notes_of(document: Document) -> list[str]:
+    """Prose, items and tables' notes of a document as plain text, each once."""
+    found: list[str] = []
+    for block in document.blocks():
+        match block:
+            case DataTable():
+                found += block.notes
+            case Bullets():
+                found += block.items
+            case Prose():
+                found += block.paragraphs
+    return list(dict.fromkeys(map(words, [*found, document.lead])))
+
+
+def _made(study: Study) -> str:
+    """Of which suite, by which code, where and when."""
+    manifest = study.results.manifest
+    specification, environment = manifest.specification, manifest.environment
+    version, commit = f"coartic {environment.coartic}", environment.commit
+    if commit:
+        version += f", commit {commit.id[:12]}{' with changes' if commit.dirty else ''}"
+    made = (
+        f", {specification.runs} runs of {specification.trials} trials, "
+        f"seed {specification.seed}; {version}, model code {environment.model_code}; "
+        f"Python {environment.python}, {environment.platform}; {environment.date}."
+    )
+    return f"Suite {code(specification.suite)}{escaped(made)}"
+
+
+def _noted(tables: Iterable[DataTable | None], said: set[str]) -> tuple[Block, ...]:
+    """The tables that there are, each with the notes that were not ``said`` before."""
+    found: list[Block] = []
+    for table in tables:
+        if table is not None:
+            notes = with_legends(table).notes
+            found.append(replace(table, notes=tuple(note for note in notes if note not in said)))
+            said.update(notes)
+    return tuple(found)

@@ -1,0 +1,86 @@
+"""The register of claims: as a page of its own, and claim by claim for the report."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+from analysis.claims.register import Judged
+from analysis.markup import code, escaped
+from analysis.report.document import Block, Bullets, Document, Prose, Section
+from analysis.report.legends import with_legends
+from analysis.report.summary import verdicts
+from analysis.report.tables import claims_table
+from analysis.words import NONE, slugs
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+_FIGURES = {
+    "Figure 4": "tasks",
+    "Figure 5": "configurations-one-armed",
+    "Figure 6": "configurations-two-armed-1",
+    "Figure 7": "configurations-two-armed-2",
+    "Figure 8": "learned-reward",
+}
+"""Ours by the paper's."""
+
+
+def claims_document(study: Study) -> Document:
+    """The register as a document: counts, a table of verdicts, then claim by claim."""
+    specification = study.results.manifest.specification
+    table = claims_table(study)
+    counted = verdicts(study.judged, "verdicts")
+    groups = [
+        (title, list(own))
+        for title, own in itertools.groupby(study.judged, key=lambda entry: entry.claim.section)
+    ]
+    names = slugs([title for title, _ in groups])
+    return Document(
+        "Claims",
+        (
+            Section("verdicts", "Verdicts", (counted, *([table] if table else []))),
+            *(
+                Section(names[title], title, (), tuple(map(claim_section, own)))
+                for title, own in groups
+            ),
+        ),
+        f"What Shah, Barto & Fagg (2013) say of their model, tested on suite "
+        f"{code(specification.suite)}: {specification.runs} runs of "
+        f"{specification.trials} trials, seed {specification.seed}. Run ids of every claim "
+        "are in `claims.csv`.",
+        study.run_ids,
+    )
+
+
+def claim_section(entry: Judged, figures: Collection[str] = ()) -> Section:
+    """All that is known of a claim; ``figures`` are ids of those that it may point at."""
+    claim = entry.claim
+    where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+    quote = f": “{claim.quote}”" if claim.quote else ""
+    ours = _FIGURES.get(claim.figure)
+    see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
+    items = [f"Seen: {escaped(entry.evidence)}.", f"Test: {claim.test}."]
+    if claim.place and entry.methods:
+        items.append(
+            f"p = {_p(entry.p)}, adjusted {_p(entry.adjusted_p)}; of the contrary "
+            f"{_p(entry.contrary_p)}, adjusted {_p(entry.adjusted_contrary_p)}; "
+            f"{escaped('; '.join(entry.methods))}."
+        )
+    items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
+    blocks: list[Block] = [Prose((escaped(claim.statement),)), Bullets(tuple(items))]
+    if entry.table is not None:
+        blocks.append(with_legends(entry.table))
+    title = f"{claim.id}: {entry.marked}"
+    return Section(f"claim-{claim.id}", title, tuple(blocks), folded=True)
+
+
+def _basis(entry: Judged) -> str:
+    runs = [f"{len(entry.run_ids)} runs"] if entry.run_ids else []
+    return ", ".join([*runs, *entry.sources]) or "nothing in this folder"
+
+
+def _p(value: float) -> str:
+    return NONE if math.isnan(value) else f"{value:.2g}"

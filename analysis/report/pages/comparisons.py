@@ -1,0 +1,128 @@
+"""The page of comparisons: methods against each other by task, and over all tasks."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from analysis.comparisons.overall import everywhere
+from analysis.comparisons.pairs import PairRow
+from analysis.markup import code, escaped
+from analysis.report.document import Block, Bullets, Document, Prose, Section
+from analysis.report.legends import with_legends
+from analysis.report.tables.common import marked, table_ids
+from analysis.report.tables.methods import overall_table
+from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
+from analysis.results.optima import METHODS as OPTIMUM
+from analysis.statistics.estimates import LEVEL, RESAMPLES
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+_OTHERS = {"conditions": "other conditions", "variant": "its variants", "method": "methods"}
+
+
+def comparisons_document(study: Study) -> Document:
+    """Pairs of methods task by task, then the methods that ran on all tasks."""
+    specification = study.results.manifest.specification
+    about: Block = Prose(
+        ("The folder has no runs of the learner under a condition of the paper.",)
+    )
+    if study.pair_rows:
+        about = Bullets(reading_of_pairs(study))
+    return Document(
+        "Methods against each other",
+        (
+            Section("reading", "Who is compared, and how", (about,)),
+            *_tasks(study),
+            Section("all-tasks", "Across tasks", tuple(_across(study))),
+        ),
+        f"On suite {code(specification.suite)}, seed {specification.seed}. Numbers and more "
+        "of them: `comparisons.csv`, `across_tasks.csv`, `profiles.csv` (docs/statistics.md).",
+        {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
+    )
+
+
+def outcome(rows: Sequence[PairRow]) -> Iterator[str]:
+    """What the two-tailed tests of one task tell apart at 5 %, adjusted, for each condition."""
+    tested = [row for row in rows if not math.isnan(row.p_permutation)]
+    least = min(map(_least_p, tested), default=0.0) * len(tested)
+    if least > LEVEL:
+        yield (
+            f"**Too few runs to tell anything apart: {len(tested)} permutation tests of so many "
+            f"runs have an adjusted p of {min(least, 1.0):.2g} at least.**"
+        )
+    groups: dict[tuple[str, str], list[PairRow]] = {}
+    for row in rows:
+        groups.setdefault((row.kind, row.first), []).append(row)
+    for (kind, first), own in groups.items():
+        found: dict[str, list[str]] = {}
+        for row in sorted(own, key=_order):
+            found.setdefault(_VERDICTS[_order(row)], []).append(row.second)
+        words = "; ".join(f"{verdict} {', '.join(names)}" for verdict, names in found.items())
+        yield escaped(f"{first} and {_OTHERS[kind]}: {words}.")
+
+
+_VERDICTS = (
+    "higher than",
+    "lower than",
+    "not told apart from",
+    "not tested (too few runs) against",
+)
+
+
+def _order(row: PairRow) -> int:
+    """Place in :data:`_VERDICTS`."""
+    if math.isnan(row.p_permutation_holm):
+        return 3
+    if row.p_permutation_holm >= LEVEL:
+        return 2
+    return 0 if row.difference > 0 else 1
+
+
+def _least_p(row: PairRow) -> float:
+    """Smallest p of the two-tailed permutation test of so many runs."""
+    n, m = row.n_first, row.n_second
+    orders = 2**n if row.interval == "against a known value" else math.comb(n + m, n)
+    return 2 / min(orders, RESAMPLES + 1)
+
+
+def _tasks(study: Study) -> Iterator[Section]:
+    ids = table_ids(study)
+    for task, rows in itertools.groupby(study.pair_rows, key=lambda row: row.task):
+        tables = (pairwise_table(study, task), cost_table(study, task))
+        blocks = [with_legends(table) for table in tables if table is not None]
+        said = Bullets(tuple(outcome(list(rows))))
+        yield Section(f"on-{ids[task]}", marked(study, task), (said, *blocks))
+
+
+def _across(study: Study) -> Iterator[Block]:
+    tasks = list(dict.fromkeys(study.scores.task))
+    names = escaped(", ".join(tasks)) or "none"
+    table = overall_table(study, study.overall, study.scores)
+    if len(tasks) < 2:
+        yield Prose(
+            (f"Needs at least two tasks with known optimum and initial solution; here: {names}.",)
+        )
+    elif table is None:
+        yield Prose((f"No method ran on all of {names}, the optimum's searches aside.",))
+    else:
+        yield Prose(
+            (
+                f"On {names}. Intervals are about other runs, not other tasks; there are none for "
+                "methods that are run once, and none where the runs of each task all reach a gap "
+                "or none does. *dual-process (EC1, EC4)*: EC1 on one-armed tasks, EC4 on those "
+                "with two arms; likewise EC3, and variants.",
+            )
+        )
+        yield with_legends(table)
+        complete = everywhere(study.scores)
+        left = [
+            name
+            for name in dict.fromkeys(study.scores.method)
+            if name not in complete and not name.startswith(OPTIMUM)
+        ]
+        if left:
+            yield Prose((f"Not run on all of these tasks: {escaped(', '.join(left))}.",))

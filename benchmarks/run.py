@@ -1,0 +1,194 @@
+"""Run a suite into a folder, from Python: what ``coartic run`` does, without a terminal.
+
+``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite, performs what the
+folder lacks, and writes its tables, which ``analysis.load("results/quick")`` reads.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks.executors import Executor, Local
+from benchmarks.harness import Progress, Watcher, perform_missing
+from benchmarks.registry import registry
+from benchmarks.specification import Limits, RunSpec
+from benchmarks.store import Store
+from benchmarks.suites import Cell, Suite, load_suite, manifest_of, run_specs, select_cells
+from benchmarks.tables import OWNER, check_results_folder, write_tables
+from coartic import CoarticError
+from coartic.files import publish
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.record import Record
+from coartic.tables import Manifest
+from coartic.text import counted
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which part of a suite is run, and what of one's own beside it.
+
+    As in :func:`benchmarks.suites.select_cells`: without names, all of it.
+    """
+
+    tasks: Sequence[str] = ()
+    methods: Sequence[str] = ()
+    task_files: Sequence[str | Path] = ()
+    method_files: Sequence[str | Path] = ()
+
+
+ALL_OF_IT = Selection()
+
+
+@dataclass(frozen=True, repr=False)
+class RunReport:
+    """What performing a plan came to; shown as a sentence."""
+
+    folder: Path
+    progress: Progress
+    wall_s: float
+    """Seconds that the runs took, all together."""
+    records: Mapping[str, Record]
+    """All records of the plan by run id, those that were there before among them."""
+
+    @property
+    def crashed(self) -> int:
+        """Runs that crashed, now or before."""
+        return sum(record.status == "crashed" for record in self.records.values())
+
+    def __repr__(self) -> str:
+        progress = self.progress
+        return (
+            f"{counted(progress.total, 'run')}: {progress.present} were there, {progress.done} "
+            f"done in {self.wall_s:.1f} s; {progress.failed} failed. Results in {self.folder}"
+        )
+
+
+@dataclass(frozen=True)
+class SuitePlan:
+    """Every run of a suite, ready to be performed into a folder (:func:`plan_suite`)."""
+
+    suite: Suite
+    planned: Sequence[tuple[Cell, RunSpec]] = field(repr=False)
+    runs: int
+    seed: int
+    limits: Limits
+
+    def perform(
+        self,
+        folder: str | Path,
+        *,
+        executor: Executor | None = None,
+        retry_failed: bool = False,
+        redo: bool = False,
+        watch: Watcher | None = None,
+        pages: Callable[[Path], Mapping[str, bytes]] | None = None,
+    ) -> RunReport:
+        """Perform what a results folder lacks, then write its tables.
+
+        ``executor`` is this machine, a process for every core, by default; ``retry_failed`` and
+        ``redo`` perform anew what timed out or crashed, or everything; ``watch`` is called before
+        the first run and after each; ``pages`` makes further files, by name, of the
+        folder's tables, to be written before anybody else may work in it.
+
+        A KeyboardInterrupt ends it and keeps what is done; so does whatever else. Called again,
+        it goes on from there. Raises CoarticError where something else is in the way in the
+        folder, another suite is at work in it, it cannot be written, or runs keep getting lost.
+        """
+        folder = Path(folder)
+        manifest, clock = self._manifest(), time.perf_counter()
+        check_results_folder(folder)
+        store = Store(folder)
+        with store.locked():
+            progress = perform_missing(
+                [spec for _, spec in self.planned],
+                store,
+                executor or Local(),
+                retry_failed=retry_failed,
+                redo=redo,
+                watch=watch or (lambda progress, spec: None),
+            )
+            wall_s = time.perf_counter() - clock
+            records = write_tables(store, manifest)
+            if pages is not None:
+                publish(folder, pages(folder), owner=OWNER, alone=False)
+        return RunReport(folder, progress, wall_s, records)
+
+    def _manifest(self) -> Manifest:
+        return manifest_of(self.suite, self.runs, self.seed, self.planned, self.limits)
+
+
+def run_suite(
+    suite: str | Path | Suite,
+    folder: str | Path,
+    *,
+    runs: int | None = None,
+    trials: int | None = None,
+    seed: int = 0,
+    select: Selection = ALL_OF_IT,
+    executor: Executor | None = None,
+    watch: Watcher | None = None,
+) -> RunReport:
+    """Run what a folder lacks of a suite, and write its tables.
+
+    :func:`plan_suite`, then :meth:`SuitePlan.perform`, which have more to choose from.
+    """
+    plan = plan_suite(suite, runs=runs, trials=trials, seed=seed, select=select)
+    return plan.perform(folder, executor=executor, watch=watch)
+
+
+def plan_suite(
+    suite: str | Path | Suite,
+    *,
+    runs: int | None = None,
+    trials: int | None = None,
+    seed: int = 0,
+    select: Selection = ALL_OF_IT,
+    limits: Limits | None = None,
+) -> SuitePlan:
+    """Every run of a suite: a shipped one by name, a file by path (``.toml``), or a Suite.
+
+    ``runs`` per cell, ``trials`` per run and ``limits`` are the suite's own by default. Raises
+    CoarticError for anything unknown, out of bounds, or that does not go together.
+    """
+    if not isinstance(suite, Suite):
+        suite = load_suite(str(suite))
+    cells = select_cells(
+        suite,
+        registry(map(Path, select.method_files)),
+        tasks=select.tasks,
+        methods=select.methods,
+        task_files=[Path(path) for path in select.task_files],
+    )
+    return plan_cells(suite, cells, runs=runs, trials=trials, seed=seed, limits=limits)
+
+
+def plan_cells(
+    suite: Suite,
+    cells: Sequence[Cell],
+    *,
+    runs: int | None = None,
+    trials: int | None = None,
+    seed: int = 0,
+    limits: Limits | None = None,
+) -> SuitePlan:
+    """As :func:`plan_suite`, of cells made by hand in place of the suite's."""
+    runs = suite.runs if runs is None else runs
+    trials = suite.trials if trials is None else trials
+    limits = Limits(suite.time_limit_s) if limits is None else limits
+    for name, number, least, most in (
+        ("runs", runs, 1, MOST_RUNS),
+        ("trials", trials, 1, MOST_TRIALS),
+        ("seed", seed, 0, MOST_SEED),
+        ("limits.trials", limits.trials, 1, MOST_TRIALS),
+    ):
+        if number is not None and not least <= number <= most:
+            raise CoarticError(f"{name} is {number}; it must be from {least} to {most:_}")
+    if limits.time_s is not None and not 0 < limits.time_s <= MOST_SECONDS:
+        raise CoarticError(
+            f"limits.time_s is {limits.time_s:g}; it must be above 0, at most {MOST_SECONDS:_}"
+        )
+    planned = run_specs(cells, runs=runs, seed=seed, trials=trials, limits=limits)
+    return SuitePlan(suite, planned, runs, seed, limits)

@@ -1,0 +1,101 @@
+"""The command line. It sits on top of the four packages; nothing imports it.
+
+Each command is a function in one of three files by what it does; it imports what it needs when
+it is called, so that help and completion are there at once.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import signal
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import coartic
+from coartic.cli import drawing, reading, running
+from coartic.cli.terminal import complain
+from coartic.errors import CoarticError
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Comparative benchmark of coarticulation in motor skill acquisition.",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"coartic {coartic.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+for group, commands in (
+    (running.GROUP, running.COMMANDS),
+    (reading.GROUP, reading.COMMANDS),
+    (drawing.GROUP, drawing.COMMANDS),
+):
+    for command in commands:
+        name = command.__name__.removesuffix("_")
+        app.command(name=name, rich_help_panel=group)(command)
+
+
+def main() -> None:
+    """Run the command line; exit code 2 for what the user can put right."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
+            stream.reconfigure(errors="replace")
+    warnings.showwarning = lambda message, *_, **__: complain("warning", str(message))
+    os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
+    # Ctrl-C ends the process; where something is to be saved before, it is caught there. As an
+    # exception, in the middle of an import, it can get lost.
+    interrupted = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        _check_arguments()
+        _check_packages()
+        app(prog_name="coartic")
+    except CoarticError as error:
+        complain("error", str(error))
+        sys.exit(2)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        complain("error", str(error.strerror or error))
+        sys.exit(1)
+    finally:
+        signal.signal(signal.SIGINT, interrupted)
+
+
+def _check_arguments() -> None:
+    """They are kept in records, as text."""
+    for argument in sys.argv[1:]:
+        if any("\ud800" <= c <= "\udfff" for c in argument):
+            raise CoarticError(f"argument {argument!r} is not text in this system's encoding")
+
+
+def _check_packages() -> None:
+    """Other modules of these names, in the current folder say, would be taken for ours."""
+    home = Path(coartic.__file__).parent.parent
+    for name in ("analysis", "baselines", "benchmarks"):
+        found = importlib.util.find_spec(name)
+        origin = Path(found.origin) if found is not None and found.origin else None
+        if origin is None or origin.parent.parent != home:
+            raise CoarticError(
+                f"module {name!r} is taken from {origin or 'nowhere'} instead of coartic's "
+                f"installation in {home}; run the command from another folder"
+            )

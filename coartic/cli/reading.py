@@ -1,0 +1,161 @@
+"""Commands that read what stored runs say."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coartic.cli import arguments as given
+from coartic.cli.arguments import endings_in, labels_in
+from coartic.cli.terminal import say, show_data, show_table
+from coartic.errors import CoarticError
+from coartic.text import counted
+
+GROUP = "Read"
+
+
+def analyse(folder: given.ResultsFolder) -> None:
+    """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
+    from analysis.report.analyses import analyse as pages_of
+    from analysis.study import load
+    from coartic.files import publish
+
+    study = load(folder)
+    files = pages_of(study)
+    publish(folder, files, owner="analyse", alone=False)
+    show_table(
+        "Claims",
+        ("claim", "verdict", "statement"),
+        [
+            (entry.claim.id, entry.verdict + " †" * entry.claim.fitted, entry.claim.statement)
+            for entry in study.judged
+        ],
+    )
+    say(f"In {folder}: {', '.join(files)}.")
+
+
+def report(
+    folder: given.ResultsFolder,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; DIR/report by default.")
+    ] = None,
+    methods: Annotated[
+        str | None,
+        typer.Option(
+            help="Methods that the figures show, labels as in the tables: a,b, "
+            "'\"a x=1, y=2\",b' with parameters."
+        ),
+    ] = None,
+    formats: Annotated[
+        str, typer.Option(help="Files of each figure: svg and any of pdf, png, csv.")
+    ] = "pdf,svg,png,csv",
+) -> None:
+    """Write a report: page with player, tables, figures, numbers for LaTeX, traces.
+
+    A folder that holds anything else than an earlier report, unchanged, is refused.
+    """
+    from analysis.figures.plot import FILES
+    from analysis.report.build import build, write
+    from analysis.report.write import check_report_folder
+    from analysis.study import load
+
+    started = time.monotonic()
+    endings = endings_in(formats, FILES)
+    study = load(folder)
+    out = folder / "report" if out is None else out
+    check_report_folder(out, folder)
+    labels = None if methods is None else labels_in(methods, "--methods")
+    made = build(study, labels, endings)
+    write(made, study, out)
+    say(
+        f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
+        f"it: report.md, {counted(len(made.document.tables()), 'table')} (tables/, CSV and "
+        f"LaTeX), {counted(len(made.plots), 'figure')} (figures/, as {formats}), numbers.tex."
+    )
+
+
+def trace(
+    name: Annotated[str, typer.Argument(help="Macro of numbers.tex, or id of a table.")],
+    row: Annotated[str | None, typer.Argument(help="Row of the table: its first cell.")] = None,
+    column: Annotated[str | None, typer.Argument(help="Column of the table's CSV.")] = None,
+    folder: Annotated[
+        Path, typer.Option("--in", help="Report, its results folder, or a folder above.")
+    ] = Path("results"),
+) -> None:
+    """Say which runs, code and command are behind a number of a report."""
+    from analysis.report.trace import find_report, trace_text
+    from analysis.report.trace import trace as find
+
+    where = [part for part in (row, column) if part is not None]
+    say(*trace_text(find(find_report(folder), name, where)).split("\n"))
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="DIR_A", help="Results folder A.")],
+    second: Annotated[Path, typer.Argument(metavar="DIR_B", help="Results folder B.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Page to write (.md), with a table beside it (.csv).")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Table to write (.csv).")] = None,
+    replace: given.Replace = False,
+) -> None:
+    """Compare two results folders cell by cell: versions, machines, parameters."""
+    from analysis.comparisons.versions import compare_versions, load_pair
+    from analysis.report.formats.markdown import markdown
+    from analysis.report.pages.versions import versions_document
+    from coartic.files import check_outputs, write_outputs
+
+    for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
+        if path is not None and path.suffix.lower() != ending:
+            raise CoarticError(f"{option} {path}: the name must end in {ending}")
+    if out is not None and csv is None:
+        csv = out.with_suffix(".csv")
+    check_outputs(filter(None, (out, csv)), replace=replace)
+    found = compare_versions(*load_pair(first, second))
+    document = versions_document(found)
+    texts = {out: markdown(document, tables=""), csv: found.cells.to_csv(index=False)}
+    written = {path: text.encode() for path, text in texts.items() if path is not None}
+    write_outputs(written, replace=replace)
+    show_data(document.tables())
+    say(*found.summary)
+    if written:
+        say(f"In {' and '.join(map(str, written))}.")
+
+
+def cite(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Results folder; all built-in methods without.")
+    ] = None,
+    style: Annotated[str, typer.Option("--format", help="Only bibtex.")] = "bibtex",
+    analysis: Annotated[
+        bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
+    ] = False,
+) -> None:
+    """Print what to cite: the software, the paper, and the methods of a results folder."""
+    from analysis.citations import MethodSource, bibliography
+    from analysis.results.folder import load_results
+    from benchmarks.registry import CLASSES
+    from coartic.tables import BUILT_IN
+
+    if style != "bibtex":
+        raise CoarticError(f"--format {style}: the one format is bibtex")
+    environment = None
+    if folder is None:
+        methods = [
+            MethodSource(item.name, item.title, item.citation, True) for item in CLASSES.values()
+        ]
+    else:
+        manifest = load_results(folder).manifest
+        environment = manifest.environment.model_dump(mode="json")
+        methods = [
+            MethodSource(name, item.title, item.citation, item.origin == BUILT_IN)
+            for name, item in manifest.specification.methods.items()
+        ]
+    text = bibliography(methods, analysis=analysis, environment=environment)
+    say(*text.rstrip("\n").split("\n"))
+
+
+COMMANDS = (analyse, report, trace, compare, cite)

@@ -1,0 +1,236 @@
+"""What a command says: sentences, tables, and how far a suite is."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from coartic.text import counted, one_line
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import TaskID
+
+    from analysis.report.document import DataTable
+    from benchmarks.harness import Progress
+    from benchmarks.specification import RunSpec
+
+PLAIN_WIDTH = 200  # columns where the output is not a terminal
+_AS_IT_IS: Any = {"markup": False, "emoji": False, "highlight": False}
+"""Names in square brackets or between colons are no markup of rich."""
+
+
+def say(*lines: str, stream: TextIO | None = None) -> None:
+    """Print lines; whatever names are in them, each is one, and prints.
+
+    Text comes to a terminal here, in :func:`show_table` and in :class:`Display`.
+    """
+    print("\n".join(map(one_line, lines)), file=stream)
+
+
+def complain(kind: str, text: str) -> None:
+    """An ``error`` or a ``warning``, a line each of the text."""
+    say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
+
+
+def console() -> Console:
+    """Standard output, as wide as the terminal or as :data:`PLAIN_WIDTH`."""
+    from rich.console import Console
+
+    found = Console(**_AS_IT_IS)
+    return found if found.is_terminal else Console(width=PLAIN_WIDTH, **_AS_IT_IS)
+
+
+def show_table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, wrap: bool = True
+) -> int:
+    """Print a table; the number of columns left out.
+
+    Its first column is never broken. Without ``wrap`` none is: what does not fit in the
+    terminal's width is left out from the right.
+    """
+    from rich import box
+    from rich.table import Table
+
+    out = console()
+    shown = len(columns)
+    columns, rows = tuple(map(one_line, columns)), [tuple(map(one_line, row)) for row in rows]
+    if not wrap:
+        widths = [max(map(len, column)) + 4 for column in zip(columns, *rows, strict=True)]
+        while shown > 2 and sum(widths[:shown]) > out.width:
+            shown -= 1
+    table = Table(
+        title=one_line(title), title_justify="left", box=box.SIMPLE_HEAD, highlight=False
+    )
+    for index, column in enumerate(columns[:shown]):
+        table.add_column(column, overflow="fold", no_wrap=index == 0 or not wrap)
+    for row in rows:
+        table.add_row(*row[:shown])
+    out.print(table)
+    return len(columns) - shown
+
+
+def show_data(tables: Iterable[DataTable]) -> None:
+    """Print tables of values, as many columns of each as fit."""
+    from analysis.report.formats.terminal import terminal_table
+
+    out = console()
+    for table in tables:
+        out.print(terminal_table(table, out.width), "")
+
+
+def show_lines(lines: Iterable[str]) -> None:
+    """Print sentences, wrapped at words to the terminal's width."""
+    out = console()
+    for line in lines:
+        out.print(one_line(line))
+
+
+@contextmanager
+def performing(suite: str, folder: Path) -> Iterator[Display]:
+    """The display of a suite whose runs are performed; interrupted, it ends the process."""
+    with Display(suite) as display:
+        try:
+            yield display
+        except KeyboardInterrupt:
+            display.close()
+            done = (
+                f"{counted(display.done, 'run')} done now {'is' if display.done == 1 else 'are'}"
+            )
+            say(
+                f"interrupted; {done} kept in {folder}, and the same command goes on from there",
+                stream=sys.stderr,
+            )
+            sys.exit(130)
+
+
+class Interrupts:
+    """Until they end, Ctrl-C is a KeyboardInterrupt that does not get lost."""
+
+    def __init__(self) -> None:
+        self._asked = False
+        self._before = signal.signal(signal.SIGINT, self._interrupt)
+
+    def _interrupt(self, *_: object) -> None:
+        self._asked = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raise again what was raised.
+
+        An exception that a signal raises in a destructor or a callback is printed and dropped.
+        """
+        if self._asked:
+            raise KeyboardInterrupt
+
+    def end(self) -> None:
+        """From here on Ctrl-C is what it was before."""
+        signal.signal(signal.SIGINT, self._before)
+
+
+class Display:
+    """Runs done, failures and time left: live on a terminal, plain lines elsewhere.
+
+    While the runs are performed, Ctrl-C is a KeyboardInterrupt.
+    """
+
+    EVERY_S = 10.0  # between plain lines
+
+    def __init__(self, suite: str) -> None:
+        from rich import progress
+        from rich.console import Console
+
+        self.done = 0
+        self._suite = suite
+        self._console = Console(stderr=True, **_AS_IT_IS)
+        self._bar = progress.Progress(
+            progress.TextColumn("{task.description}", markup=False),
+            progress.BarColumn(),
+            progress.MofNCompleteColumn(),
+            progress.TextColumn("{task.fields[failed]} failed"),
+            progress.TimeRemainingColumn(),
+            console=self._console,
+            transient=False,
+        )
+        self._task: TaskID | None = None
+        self._started = self._last = time.monotonic()  # set anew when work begins
+
+    def __enter__(self) -> Display:
+        self._interrupts = Interrupts()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+        self._interrupts.end()
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+        self._bar.stop()
+
+    def end_runs(self) -> None:
+        """All runs are kept: from here on Ctrl-C ends the process."""
+        self._interrupts.check()
+        self._interrupts.end()
+
+    def update(self, progress: Progress, spec: RunSpec | None) -> None:
+        """Show how far the plan is."""
+        self._show(progress, spec)
+        self._interrupts.check()
+
+    def _show(self, progress: Progress, spec: RunSpec | None) -> None:
+        self.done = progress.done
+        if spec is None:
+            for damage in progress.damaged:
+                self.line(f"{damage.reason}; this run is performed again")
+            if progress.stale:
+                self.line(
+                    f"not used, made by other code: {counted(len(progress.stale), 'record')}"
+                )
+            if progress.present:
+                self.line(f"already there: {progress.present} of {counted(progress.total, 'run')}")
+        if self._console.is_terminal:
+            self._live(progress, spec)
+        else:
+            self._plain(progress)
+
+    def _live(self, progress: Progress, spec: RunSpec | None) -> None:
+        if self._task is None:
+            if progress.present == progress.total:
+                return
+            self._bar.start()
+            self._task = self._bar.add_task(
+                one_line(self._suite), total=progress.total - progress.present, failed=0
+            )
+        words = "starting workers (the first time compiles)"
+        if spec is not None:
+            words = f"{spec.task.name} {spec.method}"
+        self._bar.update(
+            self._task,
+            completed=progress.done,
+            failed=progress.failed,
+            description=one_line(words),
+        )
+
+    def _plain(self, progress: Progress) -> None:
+        now = time.monotonic()
+        if progress.done <= 1:  # the workers' start says nothing of the pace
+            self._started = self._last = now
+        there = progress.present + progress.done
+        finished = there == progress.total
+        if not progress.done or (now - self._last < self.EVERY_S and not finished):
+            return
+        self._last = now
+        text = f"{there} of {counted(progress.total, 'run')}, {progress.failed} failed"
+        if not finished:
+            seconds = (now - self._started) / (progress.done - 1) * (progress.total - there)
+            text += f", about {seconds:.0f} s left"
+        self.line(text)
+
+    def line(self, text: str) -> None:
+        """Show a line above the progress."""
+        self._console.print(one_line(text), soft_wrap=True)
