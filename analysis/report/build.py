@@ -278,8 +278,8 @@ def _many(study: Study) -> bool:
 def _few(study: Study) -> str:
     return (
         f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has no "
-        "tables of pairs, targets, areas, Pareto sets and signatures at further goals by task, and "
-        "no figures of signatures; `coartic analyse` writes all of them as CSV."
+        "tables of pairs, targets, areas, Pareto sets and further signatures by task, and no "
+        "figures of signatures; `coartic analyse` writes all of them as CSV."
     )
 
 
