@@ -41,7 +41,7 @@ from coartic.inputs import (
     problems,
     read_toml,
 )
-from coartic.learner import METHOD_PREFIX
+from coartic.learning import METHOD_PREFIX
 from coartic.record import run_seed
 from coartic.robot import Finite
 from coartic.tables import (
@@ -50,6 +50,7 @@ from coartic.tables import (
     Plan,
     PlanLimits,
     PlannedCell,
+    label_of,
     trials_in,
     variant_of,
 )
@@ -196,7 +197,7 @@ class Cell:
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
 
 def suites() -> dict[str, Suite]:

@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.comparisons.overall import profiles_frame
+from analysis.comparisons.overall import by_task, normalised_scores, profiles
 from analysis.statistics import across_tasks
 from analysis.statistics import estimates as statistics
+from analysis.study import Study
 from tests.support.made_up import fake_results
 
 
@@ -30,16 +31,17 @@ def test_scores_of_a_results_folder(tmp_path):
     results = fake_results(tmp_path, runs)
     sequences = pd.DataFrame({"hands": ["LRLR", "RRRR"], "reward": [-533, -671]})
     sequences = sequences.assign(task="two-armed-1", reason="")
-    scores = across_tasks.scores_frame(replace(results, sequences=sequences))
-    optimum = across_tasks.optima(results)["two-armed-1", "free"].reward
+    study = Study(replace(results, sequences=sequences))
+    scores = normalised_scores(study)
+    optimum = study.optima["two-armed-1", "free"].reward
     first = scores.iloc[0]
     assert (first.task, first.method, first.seed) == ("two-armed-1", "dual-process/EC2", 7)
     assert first.score == pytest.approx((671 - 520) / (671 + optimum))
     assert first.gap == pytest.approx((optimum + 520) / -optimum)
     assert scores[["reward", "score", "gap"]].iloc[1].isna().all()
-    values = across_tasks.by_task(scores, "dual-process/EC2", "gap")["two-armed-1"]
+    values = by_task(scores, "dual-process/EC2", "gap")["two-armed-1"]
     assert values == pytest.approx([first.gap, math.nan], nan_ok=True)
-    assert across_tasks.scores_frame(results).empty  # no sequences, no initial solution
+    assert normalised_scores(Study(results)).empty  # no sequences, no initial solution
 
 
 def test_interquartile_mean_over_equal_tasks_is_of_all_runs():
@@ -83,27 +85,6 @@ def test_deterministic_methods_have_no_interval():
     assert math.isnan(found.low)
     with pytest.raises(ValueError, match="finite"):
         across_tasks.interquartile_mean({"a": [0.9, math.nan]}, seed=1)
-
-
-def test_improvement_over_tasks_is_the_mean_of_the_tasks():
-    rng = np.random.default_rng(32)
-    first = {"a": rng.normal(0, 1, 10), "b": rng.normal(1, 1, 12)}
-    second = {"b": rng.normal(0, 1, 8), "a": rng.normal(0, 1, 9)}
-    found = across_tasks.probability_of_improvement(first, second, seed=1)
-    alone = [
-        stats.mannwhitneyu(first[t], second[t]).statistic / len(first[t]) / len(second[t])
-        for t in "ab"
-    ]
-    assert found.estimate == pytest.approx(np.mean(alone))
-    assert 0 <= found.low < found.estimate < found.high <= 1
-    with pytest.raises(ValueError, match="tasks differ"):
-        across_tasks.probability_of_improvement(first, {"a": [1.0]}, seed=1)
-    apart = {task: np.arange(5.0) + 9 for task in "ab"}
-    below = {task: np.arange(5.0) for task in "ab"}
-    sure = across_tasks.probability_of_improvement(apart, below, seed=1)
-    assert sure.estimate == 1.0
-    assert math.isnan(sure.low)
-    assert sure.note == "no interval: no resample differs from the sample"
 
 
 def test_profile_by_hand():
@@ -153,7 +134,7 @@ def test_profiles_of_scores_count_what_is_above():
             for score, gap in ((0.0, 0.4), (0.5, 0.1), (0.5, 0.1), (1.0, 0.0))
         ]
     )
-    shares = profiles_frame(scores).set_index(["kind", "threshold"]).share
+    shares = profiles(scores).set_index(["kind", "threshold"]).share
     for threshold, share in ((-0.02, 1.0), (0.0, 0.75), (0.5, 0.25), (1.0, 0.0)):
         assert shares.loc["score", threshold] == share
     for threshold, share in ((0.0, 0.25), (0.1, 0.75), (0.395, 0.75), (0.4, 1.0)):

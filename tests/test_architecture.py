@@ -46,6 +46,18 @@ def test_imports_point_one_way(path):
         assert not any(name.startswith("coartic.cli") for name in imported(path))
 
 
+STATISTICS = [path for path in sources() if path.parent == ROOT / "analysis" / "statistics"]
+
+
+@pytest.mark.parametrize("path", STATISTICS, ids=lambda path: path.name)
+def test_statistics_know_no_task_no_file_and_no_paper(path):
+    """Numbers come in: of the analysis they use themselves alone."""
+    own = {name for name in imported(path) if name.startswith(("analysis.", "coartic."))}
+    assert own <= {name for name in own if name.startswith("analysis.statistics")} | {
+        "coartic.robot.Array"
+    }
+
+
 def test_the_command_line_uses_all_it_sits_on():
     files = (ROOT / "coartic" / "cli").glob("*.py")
     roots = {name.split(".")[0] for path in files for name in imported(path)}

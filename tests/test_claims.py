@@ -21,7 +21,8 @@ from analysis.report.pages.claims import claims_document
 from analysis.results.folder import Results
 from analysis.signatures.rows import Place, SignatureRow
 from analysis.signatures.trajectories import Trajectories
-from analysis.statistics.estimates import Inference, bootstrap_test, mean
+from analysis.statistics.estimates import Inference, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.study import Study
 from analysis.words import interval
 from benchmarks.suites import Cell

@@ -19,12 +19,8 @@ from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, synergy
 from analysis.statistics import spread
 from analysis.statistics.equivalence import bootstrap_equivalence, difference
-from analysis.statistics.estimates import (
-    bootstrap_test,
-    interquartile_mean,
-    permutation_test,
-    standard_error,
-)
+from analysis.statistics.estimates import interquartile_mean
+from analysis.statistics.hypotheses import bootstrap_test, permutation_test, standard_error
 from coartic import load_task
 from tests.support.commands import call
 from tests.support.suites import InProcess

@@ -36,6 +36,7 @@ from analysis.report.formats.latex import latex_text
 from analysis.report.formats.markdown import markdown as to_markdown
 from analysis.report.formats.terminal import terminal_table
 from analysis.report.numbers import Number, numbers_tex
+from analysis.report.pages.versions import versions_document
 from analysis.report.trace import trace, trace_text
 from analysis.study import Study
 from analysis.words import NONE
@@ -44,6 +45,7 @@ from benchmarks.store import Store
 from benchmarks.suites import Cell
 from coartic import CoarticError, cli, load_task
 from coartic.record import Commit
+from coartic.tables import label_of
 from coartic.text import json_text, one_line, plain, printed, shell_line
 from tests.support.commands import call
 from tests.support.made_up import replanned
@@ -341,6 +343,7 @@ def named(results):
         commit=EVIL,
         packages=EVIL,
     )
+    runs["label"] = list(map(label_of, runs.method, runs.variant))
     failed = runs.status != "ok"
     runs.loc[failed, "reason"] = EVIL
     runs.loc[failed, "status"] = f"crashed{EVIL}"
@@ -452,6 +455,10 @@ def test_analyse(hostile, monkeypatch, capsys, tmp_path):
     assert EVIL.split("\n")[0] in " ".join(labels)
 
 
+def compared(first, second):
+    return to_markdown(versions_document(compare_versions(Study(first), Study(second))), tables="")
+
+
 def test_compare(hostile, monkeypatch, capsys, tmp_path):
     changed = hostile.runs.assign(reward=hostile.runs.reward - 1)
     environment = hostile.manifest.environment.model_copy(update={"platform": f"{EVIL}!"})
@@ -462,14 +469,15 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
         manifest=hostile.manifest.model_copy(update={"environment": environment}),
     )
     other.__dict__["tasks"] = hostile.tasks
-    words_alone(compare_versions(hostile, other).to_markdown())
+    words_alone(compared(hostile, other))
     fewer = hostile.cells[:1]
     other.__dict__["cells"] = fewer
-    assert EVIL[:60] in MARKDOWN.render(compare_versions(hostile, other).to_markdown()).replace(
+    assert EVIL[:60] in MARKDOWN.render(compared(hostile, other)).replace(
         "&lt;", "<").replace("&gt;", ">")  # fmt: skip
-    load = {"a": hostile}
+    folders = {"a": hostile}
     monkeypatch.setattr(
-        "analysis.comparisons.versions.load_results", lambda folder: load.get(folder.name, other)
+        "analysis.comparisons.versions.load",
+        lambda folder: Study(folders.get(folder.name, other)),
     )
     out = tmp_path / "page.md"
     code, text, error = call(monkeypatch, capsys, "compare", "a", "b", "--out", out)

@@ -11,26 +11,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import bootstrap
 
-from analysis.comparisons.frontier import (
-    anytime_frame,
-    area_frame,
-    dominated,
-    for_both_arms,
-    pareto_frame,
-    targets_frame,
-)
-from analysis.comparisons.frontier_page import (
-    areas_tables,
-    frontier_page,
-    pareto_tables,
-    targets_tables,
-)
-from analysis.comparisons.progress import SPENDS, by_trial, progress
+from analysis.comparisons.anytime import anytime_curves
+from analysis.comparisons.areas import areas
+from analysis.comparisons.pareto import dominated, pareto_sets
+from analysis.comparisons.progress import SPENDS, by_trial
+from analysis.comparisons.targets import targets
+from analysis.report.document import Estimate
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.frontier import frontier_document
+from analysis.report.tables.cost import areas_table, pareto_table, targets_table
 from analysis.results.folder import Results
 from analysis.study import Study
 from coartic import load_task
 from coartic.tables import PlanLimits
 from tests.support.made_up import manifest_for, replanned
+from tests.support.reports import shown
 from tests.support.strategies import tiny_task
 
 BEST = -465  # proven optimum of two-armed 1
@@ -55,7 +50,7 @@ def run(method, rewards=None, *, reward=None, number=0, **more):
     }  # fmt: skip
 
 
-def folder(rows, tmp_path):
+def study(rows, tmp_path):
     learning = pd.DataFrame(
         [
             {"run_id": row["run_id"], "trial": trial, "reward": reward}
@@ -68,11 +63,12 @@ def folder(rows, tmp_path):
     counts = ("reward", "proven_bound", "trials", "movement_ticks", "forward_kinematics")
     runs = pd.DataFrame(rows).drop(columns="rewards").astype(dict.fromkeys(counts, "Int64"))
     task = load_task("two-armed-1")
-    return Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame())
+    return Study(Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame()))
 
 
-def of(frame, method, spend="trials"):
-    return frame[(frame.method == method) & (frame.spend == spend)]
+def of(frame, method, spend="trials", other_arm="free"):
+    found = frame[(frame.method == method) & (frame.spend == spend)]
+    return found[found.other_arm == other_arm] if "other_arm" in frame else found
 
 
 def share(frame, method, spend, column="front_share"):
@@ -125,7 +121,7 @@ def test_a_mean_waits_for_the_slowest_run(tmp_path):
         run("m", [-600.0, -500.0, -500.0, -480.0], number=0),
         run("m", [NAN, NAN, -520.0, -500.0], number=1),
     ]
-    curve = of(anytime_frame(folder(rows, tmp_path)), "m").set_index("budget")
+    curve = of(anytime_curves(study(rows, tmp_path)), "m").set_index("budget")
     assert curve.index.tolist() == [1, 2, 3, 4]
     assert curve.solved.tolist() == [1, 1, 2, 2]
     assert curve["mean"].isna().tolist() == [True, True, False, False]
@@ -139,7 +135,7 @@ def test_a_curve_ends_with_the_first_run_that_does(tmp_path):
         run("m", [-500.0] * 10, number=0),
         run("m", [-490.0] * 10, number=1),
     ]
-    curve = of(anytime_frame(folder(rows, tmp_path)), "m", "movement_ticks")
+    curve = of(anytime_curves(study(rows, tmp_path)), "m", "movement_ticks")
     assert curve.budget.iloc[[0, -1]].tolist() == [490, 4900]
     assert curve["mean"].isna().sum() == (curve.budget < 500).sum() > 0
     assert (curve["mean"].dropna() == -495).all()
@@ -152,7 +148,7 @@ def test_planners_are_points(tmp_path):
         run("sometimes", reward=-470, number=0),
         run("sometimes", number=1),
     ]
-    frame = anytime_frame(folder(rows, tmp_path))
+    frame = anytime_curves(study(rows, tmp_path))
     assert set(frame.kind) == {"point"}
     point = of(frame, "planner", "forward_kinematics").squeeze()
     assert (point.budget, point["mean"], point["median"]) == (400, -475, -475)
@@ -166,21 +162,21 @@ def test_intervals_are_those_of_the_percentile_bootstrap(tmp_path):
     rng = np.random.default_rng(0)
     last = rng.integers(-600, -470, size=20).astype(float)
     rows = [run("m", [-700.0, value], number=i) for i, value in enumerate(last)]
-    results = folder([*rows, run("other", [-500.0])], tmp_path)
-    frame = anytime_frame(results, seed=3)
+    results = study([*rows, run("other", [-500.0])], tmp_path)
+    frame = anytime_curves(results, seed=3)
     found = of(frame, "m").iloc[-1]
     expected = bootstrap(
         (last,), np.mean, method="percentile", n_resamples=20_000, rng=rng
     ).confidence_interval
     assert (found.low, found.high) == pytest.approx(tuple(expected), abs=0.1 * last.std())
-    alone = anytime_frame(folder(rows, tmp_path), seed=3)
+    alone = anytime_curves(study(rows, tmp_path), seed=3)
     pd.testing.assert_frame_equal(alone, frame[frame.method == "m"])
     assert of(frame, "other")[["low", "high"]].isna().all(axis=None)
 
 
 def test_cold_runs_have_no_part_in_times_alone(tmp_path):
     rows = [run("m", [-500.0], number=0, warm=False), run("m", [-480.0], number=1)]
-    frame = anytime_frame(folder(rows, tmp_path))
+    frame = anytime_curves(study(rows, tmp_path))
     assert of(frame, "m").runs.tolist() == [2]
     assert set(of(frame, "m", "solve_s").runs) == {1}
 
@@ -200,25 +196,25 @@ def test_areas_in_closed_form(tmp_path):
         run("ended", [1.2 * BEST] * 4),
         run("late", [NAN] * 7 + [BEST] * 9),
     ]
-    frame = area_frame(folder(rows, tmp_path))
-    areas = frame[frame.spend == "trials"].set_index("method").area
-    assert areas["half"] == pytest.approx(0.5)
-    assert areas["constant"] == areas["ended"] == pytest.approx(0.2)
-    assert areas["worse than none"] == areas["nothing"] == 1
-    assert areas["planner"] == 0
-    assert areas["late"] == pytest.approx(0.75)
+    frame = areas(study(rows, tmp_path))
+    frame = frame[frame.other_arm == "free"]
+    found = frame[frame.spend == "trials"].set_index("method").area
+    assert found["half"] == pytest.approx(0.5)
+    assert found["constant"] == found["ended"] == pytest.approx(0.2)
+    assert found["worse than none"] == found["nothing"] == 1
+    assert found["planner"] == 0
+    assert found["late"] == pytest.approx(0.75)
     assert frame.area.between(0, 1).all()
 
 
 @settings(max_examples=20)
 @given(st.lists(st.integers(-1200, BEST), min_size=2, max_size=12))
 def test_areas_are_integrals(tmp_path_factory, rewards):
-    results = folder([run("m", [float(r) for r in rewards])], tmp_path_factory.mktemp("area"))
-    steps = progress(results)
+    results = study([run("m", [float(r) for r in rewards])], tmp_path_factory.mktemp("area"))
     logs = np.linspace(0, math.log(len(rewards)), 20_001)
     middle = np.exp((logs[1:] + logs[:-1]) / 2)
-    gaps = np.minimum(1, (BEST - steps["m-0"].best("trials", middle)) / -BEST)
-    found = of(area_frame(results, steps), "m").area.item()
+    gaps = np.minimum(1, (BEST - results.best_so_far["m-0"].best("trials", middle)) / -BEST)
+    found = of(areas(results), "m").area.item()
     assert found == pytest.approx(gaps.mean(), abs=2e-3)
 
 
@@ -233,7 +229,7 @@ def test_runs_that_never_reach_a_target_count(tmp_path):
         run("m", [-500.0, -489.0, -489.0, -488.0], number=2),
         run("m", [-500.0, -489.0, -489.0, -489.0], number=3),
     ]
-    found = of(targets_frame(folder(rows, tmp_path)), "m").set_index("share")
+    found = of(targets(study(rows, tmp_path)), "m").set_index("share")
     assert found.target.tolist() == [-488, -474, -469]
     assert found.reached.tolist() == [3, 1, 1]
     assert found["median"].tolist() == [3, math.inf, math.inf]
@@ -248,11 +244,11 @@ def test_ends_that_depend_on_rewards_do_not_make_medians(tmp_path):
     """Nine runs end without the target before one that reaches it: no median of it alone."""
     rows = [run("m", [-500.0] * 10, number=i) for i in range(9)]
     rows.append(run("m", [-900.0] * 9 + [-470.0], number=9))
-    results = folder(rows, tmp_path)
+    results = study(rows, tmp_path)
     for spend in ("movement_ticks", "trials"):
-        found = of(targets_frame(results), "m", spend).iloc[0]
+        found = of(targets(results), "m", spend).iloc[0]
         assert (found.reached, found["median"]) == (1, math.inf)
-    found = of(targets_frame(results), "m", "movement_ticks").iloc[0]
+    found = of(targets(results), "m", "movement_ticks").iloc[0]
     assert (found.low, found.horizon) == (math.inf, 5000)
 
 
@@ -262,29 +258,29 @@ def test_planners_that_miss_never_reach_it(tmp_path):
     rows = [run("p", reward=-470, number=i, forward_kinematics=500) for i in range(4)]
     rows += [run("p", reward=-600, number=4 + i, forward_kinematics=100) for i in range(5)]
     rows += [run("p", number=9, forward_kinematics=None)]
-    found = of(targets_frame(folder(rows, tmp_path)), "p", "forward_kinematics").iloc[0]
+    found = of(targets(study(rows, tmp_path)), "p", "forward_kinematics").iloc[0]
     assert (found.runs, found.reached, found["median"]) == (10, 4, math.inf)
     rows[4]["reward"] = -480
-    found = of(targets_frame(folder(rows, tmp_path)), "p", "forward_kinematics").iloc[0]
+    found = of(targets(study(rows, tmp_path)), "p", "forward_kinematics").iloc[0]
     assert (found.reached, found["median"]) == (5, 500)
 
 
 def test_targets_of_the_restricted_optimum(tmp_path):
     rows = [run("still", [-490.0]), run("moving", [-490.0], other_arm_travel=0.1)]
-    results = folder(rows, tmp_path)
-    assert of(targets_frame(results), "still").reached.tolist() == [0, 0, 0]
-    frame = targets_frame(results, other_arm="still")
-    assert of(frame, "still").reached.tolist() == [1, 1, 1]
-    assert of(frame, "still").target.tolist() == [-514, -499, -494]
-    assert not len(of(frame, "moving"))
+    results = study(rows, tmp_path)
+    frame = targets(results)
+    assert of(frame, "still").reached.tolist() == [0, 0, 0]
+    assert of(frame, "still", other_arm="still").reached.tolist() == [1, 1, 1]
+    assert of(frame, "still", other_arm="still").target.tolist() == [-514, -499, -494]
+    assert not len(of(frame, "moving", other_arm="still"))
 
 
 @settings(max_examples=20)
 @given(trial_rewards, st.sampled_from(SPENDS))
 def test_nearer_targets_take_longer(tmp_path_factory, rewards, spend):
     rewards = [BEST + 10 * value for value in rewards]
-    results = folder([run("m", rewards)], tmp_path_factory.mktemp("near"))
-    found = of(targets_frame(results, shares=[0.5, 0.2, 0.1, 0.05, 0.01]), "m", spend)
+    results = study([run("m", rewards)], tmp_path_factory.mktemp("near"))
+    found = of(targets(results, shares=[0.5, 0.2, 0.1, 0.05, 0.01]), "m", spend)
     assert (np.diff(found.reached) <= 0).all()
     times = found["median"].to_numpy()
     assert (times[1:] >= times[:-1]).all()
@@ -294,17 +290,27 @@ def test_what_the_target_table_shows(tmp_path):
     rows = [run("m", [-600.0] * 9 + [-470.0], number=i) for i in range(8)]
     rows += [run("m", [-600.0] * 10, number=8), run("p", reward=-470)]
     rows += [run("never", [-600.0] * 10), run("optimum/x", reward=BEST)]
-    ((table, never),) = targets_tables(targets_frame(folder(rows, tmp_path)), "trials")
-    assert table.columns == ("method", "within 5 %: -488", "within 2 %: -474", "within 1 %: -469")
-    assert table.rows == (  # the larger share first
-        ("p", "1/1, 0", "1/1, 0", "0/1"),
-        ("m", "8/9, 10 [10, 10]", "8/9, 10 [10, 10]", "0/9"),
-    )
-    assert never == ["never"]
+    table = targets_table(study(rows, tmp_path), "two-armed-1")
+    heads = [column.header for column in table.columns if column.name.endswith("_reached")]
+    assert heads == ["within 5 %: −488", "within 2 %: −474", "within 1 %: −469"]
+    assert list(shown(table)) == ["p", "m"]  # the larger share first
+    found = shown(table)["m"]
+    assert (found["within_5_reached"], found["within_1_reached"]) == ("8/9", "0/9")
+    assert found["within_5"] == Estimate(10, None, 10, 10)
+    assert found["within_1"] is None
+    assert found["horizon"] == 10
+    assert shown(table)["p"]["within_2"] == 0.0  # one run, no interval
+    assert shown(table)["p"]["horizon"] is None
+    assert "Never within 5 %: never." in table.notes[0]
     rows = [run("m", [-600.0, -470.0 if i < 2 else -600.0], number=i) for i in range(20)]
-    ((table, never),) = targets_tables(targets_frame(folder(rows, tmp_path)), "trials")
-    assert table.rows[0][1] == "2/20, > 2"
-    assert never == []
+    table = targets_table(study(rows, tmp_path), "two-armed-1")
+    found = shown(table)["m"]
+    assert (found["within_5_reached"], found["within_5"], found["horizon"]) == (
+        "2/20",
+        math.inf,
+        2,
+    )
+    assert "Never" not in table.notes[0]
 
 
 def test_known_times(tmp_path):
@@ -313,7 +319,7 @@ def test_known_times(tmp_path):
         run("m", [-900.0, -700.0, -488.0, -480.0], solve_s=2.0),
         run("m", [-900.0, -700.0, -600.0, -500.0], number=1, solve_s=3.0),
     ]
-    frame = targets_frame(folder(rows, tmp_path), shares=[0.05])
+    frame = targets(study(rows, tmp_path), shares=[0.05])
     times = {"trials": 3, "movement_ticks": 2088, "forward_kinematics": 300, "solve_s": 1.5}
     ends = {"trials": 4, "movement_ticks": 2568, "forward_kinematics": 400, "solve_s": 2.0}
     for spend in SPENDS:
@@ -330,14 +336,15 @@ def test_an_exhaustive_search_never_reaches_what_it_missed(tmp_path):
         run("early", trials, parameters='{"trials": 3}'),
         run("stopped", trials),
     ]
-    results = folder(rows, tmp_path)
-    horizons = targets_frame(results).query("spend == 'trials'").groupby("method").horizon.max()
+    results = study(rows, tmp_path)
+    horizons = targets(results).query("spend == 'trials'").groupby("method").horizon.max()
     assert horizons.to_dict() == {"exhaustive": math.inf, "early": math.inf, "stopped": 2}
-    ((_, never),) = targets_tables(targets_frame(results), "trials")
-    assert never == ["exhaustive", "early", "stopped"]
+    assert targets_table(results, "two-armed-1") is None
     limits = {"limits": PlanLimits(time_s=None, trials=2)}
-    limited = replace(results, manifest=results.manifest.model_copy(update=limits))
-    assert {run_id: run.stopped for run_id, run in progress(limited).items()} == {
+    limited = Study(
+        replace(results.results, manifest=results.results.manifest.model_copy(update=limits))
+    )
+    assert {run_id: run.stopped for run_id, run in limited.best_so_far.items()} == {
         "exhaustive-0": True, "early-0": True, "stopped-0": True,
     }  # fmt: skip
 
@@ -348,16 +355,16 @@ def test_a_locked_base_is_another_problem(tmp_path):
         run("free", reward=BEST - 1, parameters='{"base": "task"}'),
         run("learner", [-600.0, -500.0]),
     ]
-    results = folder(rows, tmp_path)
-    for frame in (targets_frame, area_frame, anytime_frame, pareto_frame):
+    results = study(rows, tmp_path)
+    for frame in (targets, areas, anytime_curves, pareto_sets):
         assert set(frame(results).method) == {"free", "learner"}
-    assert of(pareto_frame(Study(results)), "free", "information").front.item()
+    assert of(pareto_sets(results), "free", "information").front.item()
 
 
 def test_both_optima_in_one_frame(tmp_path):
     rows = [run("still", [-490.0, -490.0]), run("moving", [-490.0, -480.0], other_arm_travel=0.1)]
-    results = folder(rows, tmp_path)
-    frame = for_both_arms(area_frame, results)
+    results = study(rows, tmp_path)
+    frame = areas(results)
     frame = frame[frame.spend == "trials"].set_index(["method", "other_arm"])
     assert set(frame.index) == {("still", "free"), ("still", "still"), ("moving", "free")}
     assert frame.area["still", "still"] == 0
@@ -367,57 +374,57 @@ def test_both_optima_in_one_frame(tmp_path):
 def test_what_the_area_table_shows(tmp_path):
     rows = [run("b", [-930.0, -930.0], solve_s=0.0), run("a", [BEST, BEST])]
     rows += [run("a", [BEST, BEST], number=1), run("optimum/x", reward=BEST)]
-    (table,) = areas_tables(area_frame(folder(rows, tmp_path)))
-    assert [row[0] for row in table.rows] == ["a", "b"]
-    assert table.columns[1:] == ("over trials", "over ticks", "over kinematics", "over solve s")
-    assert table.rows[0][1] == "0.000 [0.000, 0.000]"
-    assert table.rows[1][1] == "1.000"
+    table = areas_table(study(rows, tmp_path), "two-armed-1")
+    assert [row.key for row in table.rows] == ["a", "b"]
+    heads = {column.name: column for column in table.columns}
+    assert list(heads) == ["method", *SPENDS, *(f"{spend}_still" for spend in SPENDS)]
+    assert heads["solve_s"].header == "over solve s"
+    assert {heads[f"{name}_still"].other_arm for name in SPENDS} == {"still"}
+    assert shown(table)["a"]["trials"] == Estimate(0, None, 0, 0)
+    assert shown(table)["b"]["trials"] == Estimate(1)
 
 
 def test_the_page(tmp_path):
     rows = [run("m", [-600.0, -470.0], number=i) for i in range(3)]
     rows += [run("p", reward=-466), run("none", [-900.0, -900.0])]
-    results = folder(rows, tmp_path)
-    frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
-    page = frontier_page(results, *frames, pareto_frame(Study(results)))
-    for arm in ("free", "still"):
-        for what in ("trials to come", "kinematics to come", "area under"):
-            assert page.count(f"### two-armed-1: {what}") == 2
-        assert f"other arm {arm}" in page
-    assert "No run within the widest: none." in page
-    assert "within 10% of each other count as ties" in page
-    assert "Optimum: -465 with the other arm free (proven); " in page
+    document = frontier_document(study(rows, tmp_path))
+    of_targets = [f"targets-two-armed-1{spend}{arm}"
+                  for spend in ("", "-kinematics") for arm in ("", "-still")]  # fmt: skip
+    names = [table.id for table in document.tables()]
+    assert names == [*of_targets, "areas-two-armed-1", "pareto-two-armed-1"]
+    page = markdown(document, tables="")
+    assert page.count("Never within 5 %: none.") == 4
+    assert "within 10 % of each other count as ties" in page
+    assert "Optimum: −465 with the other arm free (proven); " in page
 
 
 def test_a_page_has_no_empty_tables(tmp_path):
     """No method keeps the other arm still: nothing is said of that optimum."""
     rows = [run("m", [-600.0, -470.0], number=i, other_arm_travel=0.5) for i in range(3)]
-    results = folder(rows, tmp_path)
-    frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
-    page = frontier_page(results, *frames, pareto_frame(Study(results)))
-    for block in page.split("\n\n"):
-        assert not block.startswith("|") or len(block.splitlines()) > 2
-    far = folder([run("m", [-900.0, -900.0], number=i) for i in range(3)], tmp_path)
-    frames = [for_both_arms(frame, far) for frame in (targets_frame, area_frame)]
-    page = frontier_page(far, *frames, pareto_frame(Study(far)))
-    assert "trials to come near" not in page
-    assert "No run within the widest: m." in page
+    document = frontier_document(study(rows, tmp_path))
+    assert all(table.rows for table in document.tables())
+    assert not any(table.id.endswith("still") for table in document.tables())
+    areas_shown = next(table for table in document.tables() if table.id.startswith("areas"))
+    assert [column.name for column in areas_shown.columns] == ["method", *SPENDS]
+    far = study([run("m", [-900.0, -900.0], number=i) for i in range(3)], tmp_path)
+    page = markdown(frontier_document(far), tables="")
+    assert "to come near the optimum" not in page
+    assert "−465 with the other arm free (proven), which no run came near: m;" in page
 
 
 def test_an_optimum_by_search_alone_is_marked(tmp_path):
     task = tiny_task(name="two-armed-1")  # not a shipped task: its optimum is the folder's own
     search = run("optimum/multistart", reward=-100)
     for bound, words in (
-        (None, "-100 with the other arm free (**not proven**: the best that was found, by search"),
-        (-90, "-100 with the other arm free (**not proven**: the best that was found; none ex"),
-        (-100, "-100 with the other arm free (proven)"),
+        (None, "−100 with the other arm free (**not proven**: the best that was found, by search"),
+        (-90, "−100 with the other arm free (**not proven**: the best that was found; none ex"),
+        (-100, "−100 with the other arm free (proven)"),
     ):
         rows = [run("m", [-120.0, -101.0]), search | {"proven_bound": bound}]
-        results = folder(rows, tmp_path)
+        results = study(rows, tmp_path).results
         content = {task.name: task.model_dump(mode="json")}
         results = replace(results, manifest=replanned(results.manifest, tasks=content))
-        frames = [for_both_arms(frame, results) for frame in (targets_frame, area_frame)]
-        assert words in frontier_page(results, *frames, pareto_frame(Study(results)))
+        assert words in markdown(frontier_document(Study(results)), tables="")
 
 
 def test_medians_are_censored_at_the_least_end(tmp_path):
@@ -427,12 +434,12 @@ def test_medians_are_censored_at_the_least_end(tmp_path):
         run("m", [-900.0, -900.0, -900.0, -466.0], number=1),
         run("m", [-900.0, -900.0, -900.0, -900.0], number=2),
     ]
-    results = folder(rows, tmp_path)
-    frame = targets_frame(results, shares=(0.05,))
+    results = study(rows, tmp_path)
+    frame = targets(results, shares=(0.05,))
     row = of(frame, "m").iloc[0]
     assert (row.reached, row.horizon, row["median"]) == (2, 2, math.inf)
-    ((table, _),) = targets_tables(frame, "trials")
-    assert table.rows[0][1].startswith("2/3, > 2")
+    found = shown(targets_table(results, "two-armed-1"))["m"]
+    assert (found["within_5_reached"], found["within_5"].value) == ("2/3", math.inf)
 
 
 # Pareto sets
@@ -443,15 +450,18 @@ def test_a_front_is_as_sure_as_its_runs(tmp_path):
     least 6 in 42 of 64; ties are on the front."""
     rows = [run("noisy", reward=-500 + 12 * (i % 2), number=i) for i in range(6)]
     rows += [run("sure", reward=-494), run("worse", reward=-501)]
-    frame = pareto_frame(Study(folder(rows, tmp_path)))
+    noisy = study(rows, tmp_path)
+    frame = pareto_sets(noisy)
     kept = of(frame, "noisy", "information")
     assert kept.front.item()
     assert of(frame, "sure", "information").front.item()
     assert share(frame, "noisy", "information") == pytest.approx(42 / 64, abs=0.04)
     assert share(frame, "sure", "information") == pytest.approx(42 / 64, abs=0.04)
     assert share(frame, "worse", "information") == 0
-    (table,) = pareto_tables(frame)
-    assert [(row[0], row[-1]) for row in table.rows] == [("noisy", "2 ◐"), ("sure", "2 ◐")]
+    found = shown(pareto_table(noisy, "two-armed-1"))
+    assert list(found) == ["noisy", "sure"]
+    assert found["noisy"]["information"] == 2
+    assert found["noisy"]["information_front"] == pytest.approx(42 / 64, abs=0.04)
 
 
 def test_reward_and_spend_are_resampled_together(tmp_path):
@@ -462,7 +472,7 @@ def test_reward_and_spend_are_resampled_together(tmp_path):
         for i in range(3)
     ]
     rows += [run("point", reward=-490, forward_kinematics=110)]
-    frame = pareto_frame(Study(folder(rows, tmp_path)))
+    frame = pareto_sets(study(rows, tmp_path))
     found = share(frame, "point", "forward_kinematics")
     draws = np.stack(np.meshgrid(*[range(3)] * 3), axis=-1).reshape(-1, 3)  # all 27 resamples
     mean, middle = draws.mean(axis=1), np.median(draws, axis=1)
@@ -477,7 +487,7 @@ def test_twins_stay_tied(tmp_path):
         for name in ("a", "b")
         for i in range(8)
     ]
-    frame = pareto_frame(Study(folder(rows, tmp_path)))
+    frame = pareto_sets(study(rows, tmp_path))
     assert (frame.front_share == 1).all()
 
 
@@ -491,7 +501,7 @@ def test_times_that_are_about_the_same_are_ties(tmp_path):
     ]
     for row, ticks in zip(rows, (109, 100, 98, 119, 130), strict=True):
         row["forward_kinematics"] = ticks
-    frame = pareto_frame(Study(folder(rows, tmp_path)))
+    frame = pareto_sets(study(rows, tmp_path))
     times = frame[frame.spend == "solve_s"].set_index("method").front
     assert set(times.index[times]) == {"best", "quicker", "slower twin"}
     counts = frame[frame.spend == "forward_kinematics"].set_index("method").front
@@ -503,7 +513,7 @@ def test_cold_runs_count_for_reward_but_not_for_time(tmp_path):
         run("m", reward=-480, number=i, warm=i > 0, solve_s=5.0 if i == 0 else 0.5)
         for i in range(4)
     ]
-    frame = pareto_frame(Study(folder(rows, tmp_path)))
+    frame = pareto_sets(study(rows, tmp_path))
     assert of(frame, "m", "solve_s").amount.item() == 0.5
     # Where only the cold run is drawn there is no time: 1 of 256 resamples.
     assert 0.98 < share(frame, "m", "solve_s") < 1
@@ -538,7 +548,8 @@ def test_fronts(tmp_path):
         run("lucky", reward=-465, told="goals", forward_kinematics=1),
         run("lucky", told="goals", number=1, forward_kinematics=1),
     ]
-    frame = pareto_frame(Study(folder(rows, tmp_path)))
+    made = study(rows, tmp_path)
+    frame = pareto_sets(made)
     assert "lucky" not in set(frame.method)
     found = frame[frame.spend == "forward_kinematics"].set_index("method")
     assert set(found.index[found.front]) == {"cheap", "twin", "good"}
@@ -548,21 +559,22 @@ def test_fronts(tmp_path):
         "good": 2, "wasteful": 1, "cheap": 1, "twin": 1, "beaten": 2,
     }  # fmt: skip
     assert set(kinds.index[kinds.front]) == {"good", "wasteful"}
-    (table,) = pareto_tables(frame)
-    shown = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
-    assert set(shown) == {"good", "wasteful", "cheap", "twin"}
-    assert shown["wasteful"]["kinematics"] == "95 ○"
-    assert shown["good"]["kinematics"] == "90 ●"
+    table = shown(pareto_table(made, "two-armed-1"))
+    assert set(table) == {"good", "wasteful", "cheap", "twin"}
+    fronts = ("forward_kinematics", "forward_kinematics_front", "forward_kinematics_told")
+    assert [table["wasteful"][name] for name in fronts] == [95, 0, 1]
+    assert [table["good"][name] for name in fronts] == [90, 1, 1]
 
 
 def test_an_empty_folder_gives_empty_frames(tmp_path):
-    results = folder([run("nothing")], tmp_path)
+    results = study([run("nothing")], tmp_path).results
     results = Results(
         tmp_path,
         replanned(results.manifest, cells=()),
         results.runs[:0],
         results.sequences,
     )
-    for frame in (anytime_frame(results), area_frame(results), targets_frame(results)):
+    empty = Study(results)
+    for frame in (empty.anytime, empty.areas, empty.targets):
         assert not len(frame)
         assert {"task", "method", "spend"} <= set(frame.columns)

@@ -29,17 +29,17 @@ from benchmarks.suites import (
 from benchmarks.tables import write_tables
 from benchmarks.worker import ForeignCodeError, perform
 from coartic import CoarticError, Movement, execute, files, hand_sequences, learn, load_task
-from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
 from coartic.method import Information, Parameters, Session
 from coartic.record import run_seed
+from coartic.rows import movements_from
 from coartic.tables import FORMAT, RUNS
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables, suite_of
 
 FIRST_COLUMNS = [
-    *"run_id suite task method variant run seed status reason hands reward".split(),
+    *"run_id suite task method variant label run seed status reason hands reward".split(),
     *"replay_reward replay_hands initial_reward initial_hands best_trial trials".split(),
 ]
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"

@@ -7,18 +7,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparisons.overall import NEAR, combined, everywhere, overall_frame, profiles_frame
-from analysis.comparisons.pairs import COLUMNS, pairs, pairwise_frame
-from analysis.comparisons.pairs_page import comparisons_page
+from analysis.comparisons.overall import WITHIN, everywhere, over_tasks, profiles
+from analysis.comparisons.pairs import pairs
+from analysis.report.document import Estimate
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.comparisons import comparisons_document
+from analysis.report.tables.pairs import cost_table, pairwise_table
 from analysis.results.folder import Results
-from analysis.results.optima import optima
-from analysis.statistics.across_tasks import scores_frame
 from analysis.statistics.power import power, runs_needed
 from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import load_task
 from tests.support.made_up import manifest_for, row
+from tests.support.reports import shown
 from tests.support.suites import run_and_write
 
 T1, T2 = "two-armed-1", "two-armed-2"
@@ -53,8 +55,7 @@ def study(tmp_path, *cells, tasks=None):
 
 
 def page(of):
-    scores = combined(scores_frame(of.results))
-    return comparisons_page(of, pairwise_frame(of), overall_frame(scores), scores)
+    return markdown(comparisons_document(of), tables="")
 
 
 def test_who_is_compared_with_whom_and_which_way(tmp_path):
@@ -92,7 +93,7 @@ def test_who_is_compared_with_whom_and_which_way(tmp_path):
         (T1, "method", "EC3", "planner", "less"),
         ("ascending", "method", "EC1", "still", "greater"),
     ]
-    frame = pairwise_frame(found)
+    frame = found.pairs
     planned = frame[frame.second == "planner"].iloc[0]
     assert (planned.told_more, planned.told_less, planned.expected) == ("GKR", "AT", "lower")
 
@@ -104,7 +105,7 @@ def test_a_planted_difference_and_what_pairing_does(tmp_path):
         cell("dual-process/EC4", EC4, travel=1.0),
         cell("worse", [reward - 10 for reward in EC4], travel=1.0, trials=5, jacobians=0),
     )
-    (made,) = pairwise_frame(found).to_dict("records")
+    (made,) = found.pairs.to_dict("records")
     assert (made["difference"], made["low"], made["high"]) == (10, 10, 10)
     assert made["interval"] == "paired by seed"
     assert made["pairs"] == made["n_first"] == made["n_second"] == 8
@@ -121,7 +122,40 @@ def test_a_planted_difference_and_what_pairing_does(tmp_path):
     assert made["smallest_share"] == pytest.approx(made["smallest"] / 465)
     assert made["trials"] == 0.5
     assert made["evaluations"] == pytest.approx(1_234_567 / (1_234_567 + 950))
-    assert "+10.0 (no spread in 8 runs)" in page(found)
+    assert shown(pairwise_table(found, T1)) == {
+        "dual-process/EC4 - worse": {
+            "first": "dual-process/EC4", "second": "worse", "n_first": 8, "n_second": 8,
+            "difference": Estimate(10, None, 10, 10), "expected": "higher",
+            **{name: made[name] for name in ("p_bootstrap", "p_bootstrap_holm")},
+            **{name: made[name] for name in ("p_permutation", "p_permutation_holm")},
+            "delta": Estimate(1, None, made["delta_low"], 1),
+            "improvement": Estimate(1, None, made["improvement_low"], 1),
+        }
+    }  # fmt: skip
+    costs = shown(cost_table(found, T1))["dual-process/EC4 - worse"]
+    assert costs["smallest_share"] == made["smallest_share"]
+    assert (costs["runs_2"], costs["told_more"], costs["sd_first"]) == (made["runs_2"], None, sd)
+
+
+def test_the_order_of_the_tables_and_what_they_rest_on(tmp_path):
+    """Conditions, methods, variants; the best second first. Shares are of the optimum."""
+    found = study(
+        tmp_path,
+        cell("dual-process/EC4", EC4, travel=1.0, variant="epsilon=0.5"),
+        cell("low", [-600] * 8, travel=1.0),
+        cell("high", [-470] * 8, travel=1.0),
+        cell("failing", [None] * 8, travel=1.0),
+        cell("dual-process/EC4", EC4, travel=1.0),
+        cell("dual-process/EC3", EC3),
+    )
+    table = cost_table(found, T1)
+    assert [row["second"] for row in shown(table).values()] == [
+        "dual-process/EC3", "high", "low", "failing", "dual-process/EC4 epsilon=0.5",
+    ]  # fmt: skip
+    of_optimum = {column.name for column in table.columns if "optimum" in column.rests_on}
+    assert of_optimum == {"runs_5", "runs_2", "runs_1", "smallest_share"}
+    for column in (*table.columns, *pairwise_table(found, T1).columns):
+        assert "runs" in column.rests_on or column.kind == "text"
 
 
 def test_effects_by_enumeration(tmp_path):
@@ -132,7 +166,7 @@ def test_effects_by_enumeration(tmp_path):
         cell("other", second, travel=1.0),
         cell("planner", [-484], travel=1.0, told=PLANNER),
     )
-    other, planner = pairwise_frame(found).to_dict("records")
+    other, planner = found.pairs.to_dict("records")
     signs = [np.sign(a - b) for a in EC4 for b in second]
     assert other["delta"] == pytest.approx(np.mean(signs))
     assert other["improvement"] == pytest.approx(np.mean([(s + 1) / 2 for s in signs]))
@@ -157,7 +191,7 @@ def test_the_one_tailed_test_is_in_the_stated_direction(tmp_path):
         cell("same", better, travel=1.0),
         cell("more", better, travel=1.0, told=PLANNER),
     )
-    same, more = pairwise_frame(found).to_dict("records")
+    same, more = found.pairs.to_dict("records")
     assert (same["expected"], more["expected"]) == ("higher", "lower")
     assert same["p_bootstrap"] > 0.99
     assert more["p_bootstrap"] < 0.01
@@ -180,7 +214,7 @@ def test_holm_over_the_rows_of_a_task(tmp_path):
             ),
         ]  # fmt: skip
 
-    frame = pairwise_frame(study(tmp_path, *task(T1), *task(T2)))
+    frame = study(tmp_path, *task(T1), *task(T2)).pairs
     for _, rows in frame.groupby("task"):
         assert len(rows) == 4  # the family: not the eight of the page
         for kind in ("p_bootstrap", "p_permutation"):
@@ -200,7 +234,7 @@ def test_few_failed_and_missing_runs(tmp_path):
         cell("dual-process/EC4", [-490], travel=1.0),
         cell("planner", [-480], told=PLANNER),
     )
-    frame = pairwise_frame(one)
+    frame = one.pairs
     assert frame.difference.tolist() == [10, -10, -20]
     nothing = ["low", "high", "p_bootstrap", "p_permutation", "delta_low", "runs_1", "smallest"]
     assert frame[nothing].isna().all(axis=None)
@@ -215,7 +249,7 @@ def test_few_failed_and_missing_runs(tmp_path):
         cell("sometimes", [-490, None, -491, -495], "own", travel=1.0),
         tasks={"own": own},
     )
-    never, sometimes = pairwise_frame(failed).to_dict("records")
+    never, sometimes = failed.pairs.to_dict("records")
     assert math.isnan(never["difference"])
     assert never["note"] == "no run with a solution"
     assert (sometimes["n_first"], sometimes["n_second"], sometimes["pairs"]) == (7, 3, 3)
@@ -223,14 +257,15 @@ def test_few_failed_and_missing_runs(tmp_path):
     assert math.isnan(sometimes["runs_1"])  # no optimum is known
     assert sometimes["smallest"] > 0
     text = page(failed)
-    assert "7 of 8, 3 of 4" in text
+    note = pairwise_table(failed, "own").notes[-1]
+    assert "dual-process/EC4 solved 7 of 8, sometimes solved 3 of 4, never solved 0 of 3" in note
     assert "Needs at least two tasks" in text
 
 
 def test_without_the_learner_there_is_nothing_to_compare(tmp_path):
     alone = study(tmp_path, cell("m", EC4))
-    assert list(pairwise_frame(alone).columns) == COLUMNS.split()
-    assert pairwise_frame(alone).empty
+    assert {"task", "first", "second", "p_permutation_holm", "note"} <= set(alone.pairs.columns)
+    assert alone.pairs.empty
     assert "no runs of the learner" in page(alone)
 
 
@@ -241,7 +276,7 @@ def test_few_runs_that_cannot_differ_are_said_to_be_few(tmp_path):
         cell("dual-process/EC4", EC4[:3], travel=1.0),
         cell("dual-process/EC3", EC3[:3]),
     )
-    assert pairwise_frame(few).p_permutation.tolist() == [0.1]
+    assert few.pairs.p_permutation.tolist() == [0.1]
     assert "Too few runs to tell anything apart: 1 permutation tests" in page(few)
     enough = study(
         tmp_path, cell("dual-process/EC4", EC4, travel=1.0), cell("dual-process/EC3", EC3)
@@ -260,27 +295,25 @@ def test_one_row_over_one_and_two_armed_tasks(tmp_path):
         cell("failing", [-292, None], "ascending"),
         cell("failing", [-465, -465]),
     )
-    scores = combined(scores_frame(made.results))
-    scores = scores[scores.task != T2]
-    best = optima(made.results)
+    scores = made.scores[made.scores.task != T2]
+    best = made.optima
     assert (best["ascending", "free"].reward, best[T1, "free"].reward) == (-292, -465)
     name = "dual-process (EC1, EC4)"
     assert sorted(everywhere(scores)) == sorted([name, "dual-process/EC1", "failing"])
-    overall = overall_frame(scores).set_index("method")
+    overall = over_tasks(scores).set_index("method")
     gaps = [0, 2 / 292, 8 / 292, 27 / 292, 0, 1 / 465, 35 / 465, 206 / 465]
     assert overall.loc[name, "gap"] == pytest.approx(np.mean(gaps))
-    for near in NEAR:
-        column = f"within_{near:.0%}".rstrip("%")
+    for column, near in WITHIN.items():
         assert overall.loc[name, column] == np.mean([gap <= near for gap in gaps])
     middle = sorted([1, 25 / 27, 19 / 27, 0, 1, 205 / 206, 171 / 206, 0])[2:6]
     assert overall.loc[name, "score"] == pytest.approx(np.mean(middle))
     assert math.isnan(overall.loc["failing", "gap"])
     assert overall.loc["failing", "gap_note"] == "1 runs without a solution"
     assert overall.loc["failing", "within_1"] == 0.75  # the failed run reaches nothing
-    profiles = profiles_frame(scores).set_index(["method", "kind", "threshold"]).share
-    assert profiles[name, "gap", 0.01] == overall.loc[name, "within_1"]
-    assert profiles[name, "gap", 0.1] == 7 / 8
-    assert profiles[name, "score", 0.8] == 5 / 8
+    shares = profiles(scores).set_index(["method", "kind", "threshold"]).share
+    assert shares[name, "gap", 0.01] == overall.loc[name, "within_1"]
+    assert shares[name, "gap", 0.1] == 7 / 8
+    assert shares[name, "score", 0.8] == 5 / 8
 
 
 @pytest.fixture(scope="module")
@@ -299,9 +332,10 @@ def folder(tmp_path_factory):
 
 
 def test_the_page_of_a_folder(folder):
-    text = page(Study(folder))
+    made = Study(folder)
+    text = page(made)
     assert text == page(Study(folder))
-    frame = pairwise_frame(Study(folder))
+    frame = made.pairs
     assert len(frame) == 2 + 1 + 2 + 1  # the corrective process alone keeps the other arm still
     assert frame.pairs[frame.second != "corrective-alone/given"].eq(4).all()
     for name in ("## ascending", f"## {T1} †", "## Across tasks", "dual-process (EC1, EC4)"):

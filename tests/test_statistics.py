@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis.statistics import estimates as statistics
+from analysis.statistics import hypotheses
+from analysis.statistics.equivalence import difference_of_shares
 
 # Survival times of mice in days: Efron & Tibshirani (1993), table 2.1.
 TREATMENT = [94, 197, 16, 38, 99, 141, 23]
@@ -28,7 +30,7 @@ def welch(a, b):
 
 def test_bootstrap_test_on_the_mouse_data():
     """Welch's t is 1.06: p is 0.15 by Student's t, and by the book's algorithm near it."""
-    found = statistics.bootstrap_test(TREATMENT, CONTROL, seed=1)
+    found = hypotheses.bootstrap_test(TREATMENT, CONTROL, seed=1)
     assert found.estimate == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
     rng = np.random.default_rng(2)
     a = np.array(TREATMENT) - np.mean(TREATMENT)
@@ -37,7 +39,7 @@ def test_bootstrap_test_on_the_mouse_data():
     extreme = np.mean([welch(rng.choice(a, 7), rng.choice(b, 9)) >= t for _ in range(1_000)])
     assert found.p == pytest.approx(extreme, abs=4 * math.sqrt(0.15 * 0.85 / 1_000))
     assert 0.13 < found.p < 0.18
-    less = statistics.bootstrap_test(TREATMENT, CONTROL, "less", seed=1)
+    less = hypotheses.bootstrap_test(TREATMENT, CONTROL, "less", seed=1)
     assert less.p + found.p == pytest.approx(1, abs=0.01)
     assert "two-sample" in found.method
     assert found.seed == 1
@@ -69,7 +71,7 @@ def test_bootstrap_test_against_all_resamples(a, b, alternative):
         null, observed = np.abs(null), abs(observed)
     sign = -1 if alternative == "less" else 1
     expected = np.mean(sign * np.array(null) >= sign * observed - 1e-9)
-    found = statistics.bootstrap_test(a, other, alternative, seed=3)
+    found = hypotheses.bootstrap_test(a, other, alternative, seed=3)
     assert found.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
 
 
@@ -84,15 +86,15 @@ def test_permutation_test_is_exact_for_small_samples(a, b, alternative):
         mask = np.isin(np.arange(len(pool)), chosen)
         null.append(sign * welch(pool[mask], pool[~mask]))
     expected = np.mean(np.array(null) >= null[0] - 1e-9 * abs(null[0] if null[0] < 1e99 else 0))
-    found = statistics.permutation_test(a, b, alternative, seed=0)
+    found = hypotheses.permutation_test(a, b, alternative, seed=0)
     assert found.p == pytest.approx(expected)
     assert found.seed is None
     assert "exact" in found.method
 
 
 def test_permutation_of_separated_constant_samples():
-    assert statistics.permutation_test([2.0] * 3, [1.0] * 3, seed=0).p == pytest.approx(1 / 20)
-    drawn = statistics.permutation_test([2.0] * 20, [1.0] * 20, seed=0)
+    assert hypotheses.permutation_test([2.0] * 3, [1.0] * 3, seed=0).p == pytest.approx(1 / 20)
+    drawn = hypotheses.permutation_test([2.0] * 20, [1.0] * 20, seed=0)
     assert drawn.p == pytest.approx(1e-4)
     assert "Monte Carlo" in drawn.method
 
@@ -102,15 +104,15 @@ def test_sign_flips_are_exact_for_few_pairs(differences):
     signs = np.array(list(itertools.product([1, -1], repeat=len(differences))))
     expected = np.mean(signs @ np.array(differences) >= sum(differences))
     base = np.arange(len(differences), dtype=float)
-    found = statistics.sign_flip_test(base + differences, base, seed=0)
+    found = hypotheses.sign_flip_test(base + differences, base, seed=0)
     assert found.p == pytest.approx(expected)
-    against = statistics.sign_flip_test(np.array(differences) - 300, -300.0, seed=0)
+    against = hypotheses.sign_flip_test(np.array(differences) - 300, -300.0, seed=0)
     assert against.p == found.p
 
 
 def test_sign_flips_of_many_pairs_are_drawn():
     differences = np.random.default_rng(5).normal(0.4, 1, 40)
-    found = statistics.sign_flip_test(differences, 0.0, seed=6)
+    found = hypotheses.sign_flip_test(differences, 0.0, seed=6)
     expected = stats.ttest_1samp(differences, 0, alternative="greater").pvalue
     assert found.p == pytest.approx(expected, abs=0.01)
     assert found.seed == 6
@@ -195,11 +197,11 @@ def test_where_bca_is_not_defined_the_percentiles_stand_in():
 
 
 def test_tests_that_cannot_be_made():
-    assert math.isnan(statistics.bootstrap_test([1.0], [2.0, 3.0], seed=0).p)
-    assert math.isnan(statistics.bootstrap_test([1.0, 1.0], 2.0, seed=0).p)
-    assert math.isnan(statistics.permutation_test([1.0], [2.0, 3.0], seed=0).p)
-    assert math.isnan(statistics.sign_flip_test([1.0], 2.0, seed=0).p)
-    one_constant = statistics.bootstrap_test([5.0, 6, 7], [1.0] * 3, seed=0)
+    assert math.isnan(hypotheses.bootstrap_test([1.0], [2.0, 3.0], seed=0).p)
+    assert math.isnan(hypotheses.bootstrap_test([1.0, 1.0], 2.0, seed=0).p)
+    assert math.isnan(hypotheses.permutation_test([1.0], [2.0, 3.0], seed=0).p)
+    assert math.isnan(hypotheses.sign_flip_test([1.0], 2.0, seed=0).p)
+    one_constant = hypotheses.bootstrap_test([5.0, 6, 7], [1.0] * 3, seed=0)
     assert 0 < one_constant.p < 0.2
 
 
@@ -210,7 +212,7 @@ def test_samples_are_vectors_of_finite_numbers(values):
 
 
 def test_pairs_of_different_length_are_refused():
-    for function in (statistics.paired_difference, statistics.sign_flip_test):
+    for function in (statistics.paired_difference, hypotheses.sign_flip_test):
         with pytest.raises(ValueError, match="one length"):
             function([1.0, 2.0], [1.0, 2.0, 3.0], seed=0)
     with pytest.raises(ValueError, match="finite"):
@@ -257,16 +259,16 @@ def test_holm_is_closed_testing_by_bonferroni(p_values):
     expected = [
         max(min(1, len(f) * min(p_values[j] for j in f)) for f in families if i in f) for i in m
     ]
-    assert statistics.holm(p_values) == pytest.approx(expected)
+    assert hypotheses.holm(p_values) == pytest.approx(expected)
 
 
 def test_holm_leaves_out_what_was_not_tested():
-    assert statistics.holm([0.04, math.nan, 0.01, 0.03, math.nan]) == pytest.approx(
+    assert hypotheses.holm([0.04, math.nan, 0.01, 0.03, math.nan]) == pytest.approx(
         [0.06, math.nan, 0.03, 0.06, math.nan], nan_ok=True
     )
-    assert statistics.holm([]) == []
+    assert hypotheses.holm([]) == []
     with pytest.raises(ValueError, match="between 0 and 1"):
-        statistics.holm([0.5, 1.5])
+        hypotheses.holm([0.5, 1.5])
 
 
 @given(st.lists(st.floats(-100, 100), min_size=1, max_size=15))
@@ -289,9 +291,9 @@ def test_middle_mean_with_weights_counts_values_so_often():
     [
         statistics.difference_of_means,
         statistics.probability_of_improvement,
-        statistics.bootstrap_test,
-        statistics.permutation_test,
-        statistics.sign_flip_test,
+        hypotheses.bootstrap_test,
+        hypotheses.permutation_test,
+        hypotheses.sign_flip_test,
     ],
 )
 def test_results_belong_to_their_seed(function):
@@ -324,23 +326,23 @@ def test_pairing_by_seed():
     ],
 )
 def test_difference_of_shares(first, second, low, high):
-    found = statistics.difference_of_shares(first, second)
+    found = difference_of_shares(first, second)
     assert found.estimate == pytest.approx(first[0] / first[1] - second[0] / second[1])
     assert (found.low, found.high) == pytest.approx((low, high), abs=6e-5)
-    turned = statistics.difference_of_shares(second, first)
+    turned = difference_of_shares(second, first)
     assert (-turned.high, -turned.low) == pytest.approx((found.low, found.high))
 
 
 def test_a_share_is_of_runs():
     for wrong in ((3, 2), (-1, 2), (0, 0)):
         with pytest.raises(ValueError, match="is no share"):
-            statistics.difference_of_shares((1, 2), wrong)
+            difference_of_shares((1, 2), wrong)
 
 
 def test_share_test():
     """20 of 20 where three quarters are expected: 0.75 to the 20th."""
-    found = statistics.share_test(20, 20, 0.75, "greater")
+    found = hypotheses.share_test(20, 20, 0.75, "greater")
     assert found.estimate == pytest.approx(0.25)
     assert found.p == pytest.approx(0.75**20)
-    assert statistics.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
-    assert statistics.share_test(15, 20, 0.75, "greater").p > 0.5
+    assert hypotheses.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
+    assert hypotheses.share_test(15, 20, 0.75, "greater").p > 0.5

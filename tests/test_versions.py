@@ -10,15 +10,21 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.comparisons.versions import cells_frame, compare_versions, load_pair
+from analysis.comparisons.versions import compare_versions, load_pair
+from analysis.report.document import Estimate
+from analysis.report.formats.markdown import markdown
+from analysis.report.pages.versions import versions_document
+from analysis.report.tables.versions import versions_table
 from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
 from analysis.statistics.equivalence import MARGIN
+from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
 from coartic.tables import FORMAT, Manifest
 from tests.support.commands import call
+from tests.support.reports import shown
 from tests.support.suites import Failing, InProcess, run_and_write
 
 RUNS = 6
@@ -34,17 +40,27 @@ LEARNED = "dual-process/EC1"
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
-    return run_and_write(tmp_path_factory.mktemp("first"), CELLS, runs=RUNS, trials=40)
+    return made(tmp_path_factory.mktemp("first"))
 
 
-def planted(first, edit=lambda runs: runs, manifest=lambda content: None):
+def made(folder, cells=CELLS, **more):
+    return Study(run_and_write(folder, cells, **{"runs": RUNS, "trials": 40, **more}))
+
+
+def page(comparison):
+    return markdown(versions_document(comparison), tables="")
+
+
+def planted(first, edit=lambda runs: runs, edit_manifest=lambda content: None):
     """Results with other runs and another manifest, such as no folder could hold them."""
-    runs, content = edit(first.runs.copy()), first.manifest.model_dump(mode="json")
-    manifest(content)
+    results = first.results
+    runs, content = edit(first.runs.copy()), results.manifest.model_dump(mode="json")
+    edit_manifest(content)
     old = first.runs.loc[runs.index, OUTCOME].astype(str)
     other = (runs[OUTCOME].astype(str) != old).any(axis=1)
     runs.loc[other, "result"] += "-other"
-    return replace(first, runs=runs, manifest=Manifest.model_validate_json(json.dumps(content)))
+    manifest = Manifest.model_validate_json(json.dumps(content))
+    return Study(replace(results, runs=runs, manifest=manifest))
 
 
 def of(runs, method=LEARNED):
@@ -66,8 +82,8 @@ def found(first, second, method=LEARNED):
 
 
 def test_the_same_runs_made_twice_are_identical(first, tmp_path):
-    again = run_and_write(tmp_path / "again", CELLS, runs=RUNS, trials=40)
-    comparison = compare_versions(*load_pair(first.folder, again.folder))
+    again = made(tmp_path / "again")
+    comparison = compare_versions(*load_pair(first.results.folder, again.results.folder))
     cells = comparison.cells
     assert list(cells.method) == [LEARNED, "dual-process/EC3", "corrective-alone/given"]
     assert set(cells.verdict) == {"identical"}
@@ -75,10 +91,11 @@ def test_the_same_runs_made_twice_are_identical(first, tmp_path):
     assert (cells.difference == 0).all()
     assert cells.p.isna().all()
     assert cells.p_adjusted.isna().all()
-    assert not comparison.differing.rows
+    assert not comparison.differing
     assert comparison.summary == ["3 cells in both: 3 identical in every run."]
-    assert "6 of 6" in comparison.to_markdown()
-    assert comparison.to_markdown() == compare_versions(first, again).to_markdown()
+    row = shown(versions_table(comparison))[f"ascending {LEARNED}"]
+    assert (row["identical"], row["shared"], row["difference"]) == (RUNS, RUNS, Estimate(0.0))
+    assert page(comparison) == page(compare_versions(first, again))
 
 
 def test_planted_differences_come_back_in_pairs(first):
@@ -130,15 +147,14 @@ def test_other_hands_are_not_identical(first):
 
 
 def test_without_shared_seeds_runs_are_independent(first, tmp_path):
-    second = run_and_write(tmp_path, CELLS, runs=RUNS + 2, trials=40, seed=1)
+    second = made(tmp_path, runs=RUNS + 2, seed=1)
     comparison = compare_versions(first, second)
     row = comparison.cells.set_index("method").loc[LEARNED]
     assert not row.paired
     assert (row.n_a, row.n_b, row.shared) == (RUNS, RUNS + 2, 0)
     assert row.difference == pytest.approx(row.mean_b - row.mean_a)
-    assert "no seed shared" in comparison.to_markdown()
-    assert ("seed", "0", "1") in comparison.differing.rows
-    assert ("runs", "6", "8") in comparison.differing.rows
+    assert ("seed", "0", "1") in comparison.differing
+    assert ("runs", "6", "8") in comparison.differing
     alone = comparison.cells.set_index("method").loc["corrective-alone/given"]
     assert alone.verdict == "no interval"  # one run each, by other seeds
 
@@ -154,7 +170,7 @@ def test_one_run_that_differs_has_no_interval(first):
 
 def test_failures_are_counted_and_nothing_compared(first, tmp_path):
     cells = CELLS[:1]
-    failing = run_and_write(tmp_path / "b", cells, RUNS, 40, executor=Failing(1))
+    failing = made(tmp_path / "b", cells, executor=Failing(1))
     row = found(first, failing)
     assert (row.solved_a, row.solved_b, row.n_b, row.identical) == (RUNS, RUNS - 1, RUNS, RUNS - 1)
     assert row.verdict == "not compared"
@@ -162,8 +178,8 @@ def test_failures_are_counted_and_nothing_compared(first, tmp_path):
     assert "B solved 5 of 6" in row.remarks
     assert "A solved" not in row.remarks
     # Two runs without a solution came out the same, whatever was said of the reason.
-    again = run_and_write(tmp_path / "c", cells, RUNS, 40, executor=Failing(1))
-    again.runs.reason = again.runs.reason + ", at night"
+    again = made(tmp_path / "c", cells, executor=Failing(1))
+    again.runs["reason"] = again.runs.reason + ", at night"
     both = found(failing, again)
     assert both.identical == RUNS
     assert both.verdict == "not compared"
@@ -176,38 +192,39 @@ def test_tasks_of_one_name_and_other_content(first):
     def rename(content):
         content["specification"]["tasks"]["ascending"]["description"] = "another text"
 
-    comparison = compare_versions(first, planted(first, manifest=move))
+    comparison = compare_versions(first, planted(first, edit_manifest=move))
     rows = comparison.cells.set_index("method")
     assert list(rows.verdict) == ["not compared", "identical", "not compared"]
     assert rows.remarks[LEARNED] == "the tasks of this name differ: goals"
     assert rows.identical[LEARNED] == 0
-    (line,) = comparison.differing.rows
+    (line,) = comparison.differing
     assert line[0] == "task ascending"
     assert "6.5" not in line[1]
     assert "6.5" in line[2]
-    assert found(first, planted(first, manifest=rename)).verdict == "identical"
+    assert found(first, planted(first, edit_manifest=rename)).verdict == "identical"
 
 
 def test_other_code_is_said_and_never_mixed(first, tmp_path):
     """Runs of another version: their records and ids say so, or the folder is refused."""
     learned = replace(CELLS[0], entry=replace(CELLS[0].entry, code="c0ffeec0ffee"))
     cells = [learned, *CELLS[1:]]
-    other = run_and_write(tmp_path / "other", cells, RUNS, 40, executor=OtherVersion())
+    other = made(tmp_path / "other", cells, executor=OtherVersion())
     comparison = compare_versions(first, other)
     row = comparison.cells.set_index("method").loc[LEARNED]
     assert (row.verdict, row.remarks) == ("identical", "other code")
-    assert [line[0] for line in comparison.differing.rows] == [f"code of {LEARNED}"]
-    copied(first, other.folder)  # its tables and manifest, with both versions' records
-    load_results(other.folder)
-    ours, theirs = (results.cells[0].runs.run_id.tolist() for results in (first, other))
+    assert [line[0] for line in comparison.differing] == [f"code of {LEARNED}"]
+    folder = other.results.folder
+    copied(first, folder)  # its tables and manifest, with both versions' records
+    load_results(folder)
+    ours, theirs = (study.results.cells[0].runs.run_id.tolist() for study in (first, other))
     for run_ids, words in (
         ([theirs[0], *ours[1:]], f"run {theirs[0]} is not as planned: it has another code"),
         (ours[1:], "has another number of runs"),
         (ours[::-1], "is not as planned: it has another number"),
     ):
-        replanned(other.folder, run_ids)
+        replanned(folder, run_ids)
         with pytest.raises(CoarticError, match=words):
-            load_pair(first.folder, other.folder)
+            load_pair(first.results.folder, folder)
 
 
 class OtherVersion(InProcess):
@@ -219,9 +236,9 @@ class OtherVersion(InProcess):
             yield from super().perform([{**job, "code": own[job["specification"]["method"]]}])
 
 
-def copied(results, folder):
+def copied(study, folder):
     """A results folder, or what is missing of it, somewhere else."""
-    shutil.copytree(results.folder, folder, dirs_exist_ok=True)
+    shutil.copytree(study.results.folder, folder, dirs_exist_ok=True)
     return folder
 
 
@@ -247,7 +264,7 @@ def test_one_gate_for_every_command(first, tmp_path, monkeypatch, capsys):
         words = f"runs.parquet is damaged (column '{column}' is not as its records have it"
         with pytest.raises(CoarticError, match=re.escape(words)):
             load_results(edited)
-    for command in (("compare", first.folder), ("analyse",), ("report",), ("cite",)):
+    for command in (("compare", first.results.folder), ("analyse",), ("report",), ("cite",)):
         code, _, error = call(monkeypatch, capsys, *command, edited)
         assert code == 2
         assert words in error
@@ -262,26 +279,27 @@ def test_what_differs_in_the_environment(first):
             model_code=model, packages={"numpy": numpy}, date=model
         )
 
-    one = planted(first, manifest=edit("aaaa", "2.4.6"))
-    two = planted(first, manifest=edit("bbbb", "2.4.7"))
-    assert compare_versions(one, two).differing.rows == (
+    one = planted(first, edit_manifest=edit("aaaa", "2.4.6"))
+    two = planted(first, edit_manifest=edit("bbbb", "2.4.7"))
+    assert compare_versions(one, two).differing == [
         ("code of the model", "aaaa", "bbbb"),
         ("library numpy", "2.4.6", "2.4.7"),
-    )
+    ]
 
 
 def test_stale_records_are_counted(first, tmp_path):
     second = copied(first, tmp_path / "b")
     record = next(second.glob("records/*.json"))
     shutil.copy(record, record.with_name(f"{record.stem[:17]}c0ffeec0ffee.json"))
-    page = compare_versions(*load_pair(first.folder, second)).to_markdown()
-    assert "B: 1 records were made by other code and have no part here" in page
-    assert "A: 1 records" not in page
+    comparison = compare_versions(*load_pair(first.results.folder, second))
+    assert comparison.stale == (0, 1)
+    assert "B: 1 records were made by other code and have no part here" in page(comparison)
+    assert "A: 1 records" not in page(comparison)
 
 
 def test_parameters_cells_and_spends(first, tmp_path):
     cells = [CELLS[0], Cell(load_task("ascending"), KNOWN[LEARNED], (("noise_sd", 0.1),))]
-    second = run_and_write(tmp_path, cells, runs=RUNS, trials=80)
+    second = made(tmp_path, cells, trials=80)
     comparison = compare_versions(first, second)
     (row,) = comparison.cells.to_dict("records")
     assert row["remarks"] == "trials 40 → 80"
@@ -292,16 +310,16 @@ def test_parameters_cells_and_spends(first, tmp_path):
         {f"{LEARNED} noise_sd=0.1": ["ascending"]},
     )
     assert comparison.summary[1:] == ["2 cells only in A.", "1 cells only in B."]
-    assert comparison.table.rows[0][8] == "2"  # twice the trials
-    page = comparison.to_markdown()
-    assert "## Cells only in A\n\n- dual-process/EC3: two-armed-2\n" in page
-    assert ("methods of one folder only", "dual-process/EC3, corrective-alone/given", "–") in (
-        comparison.differing.rows
+    row = shown(versions_table(comparison))[f"ascending {LEARNED}"]
+    assert (row["trials"], row["paired"]) == (2, "yes")  # twice the trials
+    assert "## Cells only in A\n\n- dual-process/EC3: two-armed-2\n" in page(comparison)
+    assert ("methods of one folder only", "dual-process/EC3, corrective-alone/given", "") in (
+        comparison.differing
     )
-    other = planted(second, manifest=_without_first)
+    other = planted(second, edit_manifest=_without_first)
     nothing = compare_versions(first, other)
     assert nothing.summary[0] == "0 cells in both: nothing to compare."
-    assert cells_frame(first, other).empty
+    assert nothing.cells.empty
 
 
 def _without_first(content):
@@ -309,7 +327,7 @@ def _without_first(content):
 
 
 def test_folders_that_cannot_be_compared(first, tmp_path):
-    first = first.folder
+    first = first.results.folder
     link = tmp_path / "link"
     link.symlink_to(first)
     for same in (first, link, first / ".." / first.name):
@@ -336,25 +354,25 @@ def test_folders_that_cannot_be_compared(first, tmp_path):
 
 
 def test_command(first, tmp_path, monkeypatch, capsys):
-    second = run_and_write(tmp_path / "b", CELLS, runs=RUNS, trials=80)
+    second = made(tmp_path / "b", trials=80)
     due = compare_versions(first, second)
-    first, second = first.folder, second.folder
-    page = tmp_path / "page.md"
-    code, text, _ = call(monkeypatch, capsys, "compare", first, second, "--out", page)
+    first, second = first.results.folder, second.results.folder
+    out = tmp_path / "page.md"
+    code, text, _ = call(monkeypatch, capsys, "compare", first, second, "--out", out)
     assert code == 0
     assert due.summary[0] in text
-    assert page.read_text(encoding="utf-8") == due.to_markdown()
+    assert out.read_text(encoding="utf-8") == page(due)
     table = pd.read_csv(tmp_path / "page.csv")
     assert list(table.verdict) == list(due.cells.verdict)
     assert table.verdict[2] == "identical" != table.verdict[0]
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     (tmp_path / "page.csv").write_text("of somebody else's")
-    page.unlink()
-    code, _, error = call(monkeypatch, capsys, "compare", first, second, "--out", page)
-    assert (code, page.exists()) == (2, False)
+    out.unlink()
+    code, _, error = call(monkeypatch, capsys, "compare", first, second, "--out", out)
+    assert (code, out.exists()) == (2, False)
     assert f"{tmp_path / 'page.csv'} is there already; add --replace" in error
     assert (tmp_path / "page.csv").read_text() == "of somebody else's"
-    call(monkeypatch, capsys, "compare", first, second, "--out", page, "--replace")
+    call(monkeypatch, capsys, "compare", first, second, "--out", out, "--replace")
     assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     code, text, _ = call(monkeypatch, capsys, "compare", first, second)
     assert code == 0

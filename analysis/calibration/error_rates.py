@@ -24,6 +24,7 @@ from scipy import stats
 from analysis.calibration.simulation import Check, Draw, arguments, lines
 from analysis.published import Summary
 from analysis.statistics import estimates as statistics
+from analysis.statistics import hypotheses
 from analysis.statistics.across_tasks import interquartile_mean
 from analysis.statistics.equivalence import Equivalence, bootstrap_equivalence, difference
 from analysis.statistics.estimates import LEVEL
@@ -119,10 +120,10 @@ def checks() -> list[Check]:
     return found
 
 
-_ONE_TAILED: tuple[statistics.Alternative, ...] = ("greater", "less")
+_ONE_TAILED: tuple[hypotheses.Alternative, ...] = ("greater", "less")
 _TESTS = {
-    "bootstrap test": statistics.bootstrap_test,
-    "permutation test": statistics.permutation_test,
+    "bootstrap test": hypotheses.bootstrap_test,
+    "permutation test": hypotheses.permutation_test,
 }
 
 
@@ -165,23 +166,23 @@ def _null_tests(first: Population, second: Population) -> list[Check]:
     ]
 
 
-def _known_test(population: Population, tail: statistics.Alternative) -> Check:
+def _known_test(population: Population, tail: hypotheses.Alternative) -> Check:
     def test(values: Array, **options: Any) -> statistics.Inference:
-        return statistics.bootstrap_test(values, population.mean, tail, **options)
+        return hypotheses.bootstrap_test(values, population.mean, tail, **options)
 
     data = f"{population.name} {_sign(tail)} value"
     subject = "bootstrap test against a known value"
     return _check(subject, data, _rejects, test, population.sample())
 
 
-def _flip_test(first: Population, second: Population, tail: statistics.Alternative) -> Check:
-    test = partial(statistics.sign_flip_test, alternative=tail)
+def _flip_test(first: Population, second: Population, tail: hypotheses.Alternative) -> Check:
+    test = partial(hypotheses.sign_flip_test, alternative=tail)
     data = f"{first.name} {_sign(tail)} {second.name}"
     subject = "sign-flip test, one-tailed"
     return _check(subject, data, _rejects, test, first.centred, second.centred)
 
 
-def _sign(tail: statistics.Alternative) -> str:
+def _sign(tail: hypotheses.Alternative) -> str:
     return ">" if tail == "greater" else "<"
 
 

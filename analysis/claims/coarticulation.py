@@ -10,7 +10,8 @@ from analysis.comparisons.methods import LEARNER
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
 from analysis.signatures.trajectories import Trajectories
-from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean, share_test
+from analysis.statistics.estimates import FEWEST, SEED, mean
+from analysis.statistics.hypotheses import bootstrap_test, share_test
 from analysis.words import interval
 from coartic.robot import Array
 

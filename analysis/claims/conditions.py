@@ -12,10 +12,10 @@ from analysis.claims.register import Claim, Finding
 from analysis.statistics.estimates import (
     SEED,
     Inference,
-    bootstrap_test,
     difference_of_means,
     probability_of_improvement,
 )
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval, tally
 from coartic.robot import Array
 

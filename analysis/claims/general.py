@@ -28,7 +28,8 @@ from analysis.comparisons.methods import LEARNER
 from analysis.published import TRIALS
 from analysis.results.optima import METHODS as OPTIMUM
 from analysis.signatures.subtasks import postures_before
-from analysis.statistics.estimates import SEED, bootstrap_test, mean
+from analysis.statistics.estimates import SEED, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval, short
 from coartic.task import hands_of
 

@@ -8,7 +8,8 @@ from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
 from analysis.claims.register import Claim, Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
-from analysis.statistics.estimates import SEED, Inference, bootstrap_test, mean
+from analysis.statistics.estimates import SEED, Inference, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval
 
 CONTROLS = ("posture-based/one-goal", "corrective-alone/given")

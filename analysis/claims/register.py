@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 from analysis.claims.data import Data, MissingError
 from analysis.report.document import DataTable
-from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference, holm
+from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
+from analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -21,7 +21,8 @@ from analysis.claims.judges.shares import (
 from analysis.claims.register import Claim, Finding
 from analysis.comparisons.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
-from analysis.statistics.estimates import FEWEST, SEED, bootstrap_test, mean
+from analysis.statistics.estimates import FEWEST, SEED, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval, tally
 from coartic.robot import Array
 

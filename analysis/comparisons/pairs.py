@@ -32,16 +32,13 @@ from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import (
     SEED,
     Inference,
-    bootstrap_test,
     cliffs_delta,
     difference_of_means,
-    holm,
     paired_by_seed,
     paired_difference,
-    permutation_test,
     probability_of_improvement,
-    sign_flip_test,
 )
+from analysis.statistics.hypotheses import bootstrap_test, holm, permutation_test, sign_flip_test
 from analysis.statistics.power import runs_needed, smallest_difference
 from analysis.statistics.spread import sd
 from coartic.exploration import CONDITIONS

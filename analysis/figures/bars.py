@@ -30,7 +30,8 @@ from analysis.figures.style import (
 )
 from analysis.methods import LEARNER, short_name
 from analysis.published import Summary, published_cell, published_initial
-from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, bootstrap_test, holm, mean
+from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
+from analysis.statistics.hypotheses import bootstrap_test, holm
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -29,7 +29,7 @@ from analysis.figures.style import (
     styled,
 )
 from analysis.methods import short_name
-from analysis.statistics.estimates import holm
+from analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.statistics.estimates import RESAMPLES, bootstrap_test
+from analysis.statistics.estimates import RESAMPLES
+from analysis.statistics.hypotheses import bootstrap_test
 from coartic import PAPER, Execution, Hand, MotionModel, Task, Trajectory, correct, move
 from coartic.robot import Array
 
@@ -66,7 +67,7 @@ def sacrifice_p(changes: ArrayLike, *, seed: int, resamples: int = RESAMPLES) ->
 
     No sacrifice: the mean first subtask takes longer by no more than :data:`ROUNDING`, or the
     mean whole takes no less. The larger p of two one-tailed tests
-    (:func:`~analysis.statistics.estimates.bootstrap_test`), as both have to reject
+    (:func:`~analysis.statistics.hypotheses.bootstrap_test`), as both have to reject
     (intersection-union test, Berger 1982). NaN below two runs, and where either does not
     differ between runs.
     """

@@ -4,7 +4,7 @@ A 95 % interval within ±margin is two one-sided tests at level 2.5 % (TOST; D. 
 Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15). Against the paper,
 of which only mean, SD and number of runs are printed, the interval is Welch's; where the
 runs of both sides are at hand, it is the studentised bootstrap's. Of shares of runs it is
-Newcombe's.
+that of R. G. Newcombe (1998), Statistics in Medicine 17, 873.
 """
 
 from __future__ import annotations
@@ -22,12 +22,10 @@ from analysis.statistics.estimates import (
     FEWEST,
     RESAMPLES,
     Inference,
-    difference_of_shares,
     sample,
     samples_of,
-    standard_error,
-    studentised_null,
 )
+from analysis.statistics.hypotheses import standard_error, studentised_null
 from analysis.statistics.spread import mean, variance
 
 MARGIN = 0.01
@@ -157,7 +155,7 @@ def bootstrap_equivalence(
 def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:
     """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
 
-    Newcombe's interval (:func:`~analysis.statistics.estimates.difference_of_shares`). ``p`` is
+    Newcombe's interval (:func:`difference_of_shares`). ``p`` is
     half the error rate at which the interval just touches the margin, 1 where the shares
     themselves differ by the margin or more.
     """
@@ -185,6 +183,39 @@ def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Eq
         p=p,
         margin=margin,
     )
+
+
+def difference_of_shares(
+    first: tuple[int, int], second: tuple[int, int], *, confidence: float = CONFIDENCE
+) -> Inference:
+    """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
+
+    Newcombe's hybrid of two Wilson intervals (1998, method 10), from −1 to 1. Raises ValueError
+    for a count that is not from 0 to a positive number of runs.
+    """
+    for count, total in (first, second):
+        if not 0 <= count <= total or not total:
+            raise ValueError(f"{count} of {total} runs is no share")
+    (a, low_a, high_a), (b, low_b, high_b) = (
+        _wilson(count, total, confidence) for count, total in (first, second)
+    )
+    return Inference(
+        a - b,
+        (first[1], second[1]),
+        "difference of shares, score interval (Newcombe 1998, method 10)",
+        a - b - math.hypot(a - low_a, high_b - b),
+        a - b + math.hypot(high_a - a, b - low_b),
+        confidence,
+    )
+
+
+def _wilson(count: int, total: int, confidence: float) -> tuple[float, float, float]:
+    """A share with Wilson's interval."""
+    z2 = float(special.ndtri(0.5 + confidence / 2)) ** 2
+    share = count / total
+    middle = (count + z2 / 2) / (total + z2)
+    half = math.sqrt(z2 * (total * share * (1 - share) + z2 / 4)) / (total + z2)
+    return share, max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _positive(margin: float) -> float:

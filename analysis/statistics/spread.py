@@ -40,3 +40,13 @@ def sd(values: ArrayLike) -> float:
     """Standard deviation of values (n,), n - 1 degrees of freedom; NaN of fewer than two."""
     known = np.asarray(values, dtype=np.float64)
     return math.sqrt(variance(known)) if len(known) > 1 else math.nan
+
+
+def last_mean(values: Array, axis: int = -1) -> Array:
+    """:func:`mean` of the last axis: a statistic as resampling calls it."""
+    return mean(values, axis)
+
+
+def difference(*groups: Array, axis: int = -1) -> Array:
+    """Mean of the first less that of the second, if there is one; likewise."""
+    return mean(groups[0], axis) - (mean(groups[1], axis) if len(groups) > 1 else 0.0)

@@ -81,3 +81,9 @@ class Page(HTMLParser):
 
     def all(self, tag):
         return [attributes for name, attributes in self.elements if name == tag]
+
+
+def shown(table):
+    """By key and column name the values of a table."""
+    names = [column.name for column in table.columns]
+    return {row.key: dict(zip(names, row.values, strict=True)) for row in table.rows}

@@ -5,7 +5,8 @@ from __future__ import annotations
 from analysis.claims.data import Data
 from analysis.claims.register import Finding
 from analysis.published import published_cell
-from analysis.statistics.estimates import SEED, bootstrap_test, difference_of_means, mean
+from analysis.statistics.estimates import SEED, difference_of_means, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval
 
 

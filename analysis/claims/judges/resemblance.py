@@ -10,7 +10,8 @@ import numpy as np
 from analysis.claims.data import Data, MissingError
 from analysis.claims.register import Finding
 from analysis.comparisons.methods import LEARNER
-from analysis.statistics.estimates import SEED, bootstrap_test, mean
+from analysis.statistics.estimates import SEED, mean
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval
 from coartic.robot import Array
 

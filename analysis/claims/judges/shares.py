@@ -10,7 +10,8 @@ from analysis.claims.data import Data
 from analysis.claims.register import Finding
 from analysis.published import published_cell
 from analysis.statistics.equivalence import shares
-from analysis.statistics.estimates import Inference, share_test
+from analysis.statistics.estimates import Inference
+from analysis.statistics.hypotheses import share_test
 from analysis.words import tally
 
 MARGIN = 0.25

@@ -41,9 +41,9 @@ READING_OF_COST = (
     "`areas.csv` has them in full, `anytime.csv` the curves.",
     "**Pareto sets**: a method is on the front if none has a mean reward as high for as little "
     "spend, and one of them better. A method with a single run has nothing to resample. Counts "
-    f"are exact; solve times within {TIME_TOLERANCE:.0%} of each other count as ties, because "
-    "they vary between machines and runs. Methods with a run that has no solution are left out; "
-    "methods on no front are in `pareto.csv`.",
+    f"are exact; solve times within {100 * TIME_TOLERANCE:.0f} % of each other count as ties, "
+    "because they vary between machines and runs. Methods with a run that has no solution are "
+    "left out; methods on no front are in `pareto.csv`.",
 )
 """What is behind the tables of this module."""
 _RUNS: tuple[RestsOn, ...] = ("runs",)
@@ -74,6 +74,7 @@ def targets_table(
         *_within(near[0], spend, other_arm),
         Column("horizon", "horizon", "number", digits=0, rests_on=_RUNS, printed=False),
     ]
+    widest = near[0][0].share
     never = ", ".join(name for name, rows in methods.items() if rows not in near)
     ending = "" if other_arm == "free" else "-still"
     return table(
@@ -86,7 +87,7 @@ def targets_table(
             "Runs that came within a share of the optimum, and the median spend to get there "
             "over all runs (Kaplan-Meier; runs stopped by their budget are censored at the "
             f"horizon).{' Planners need no trials.' if spend == 'trials' else ''}"
-            + (f" Never within {near[0][0].share:.0%}: {escaped(never)}." if never else ""),
+            + (f" Never within {100 * widest:.0f} %: {escaped(never)}." if never else ""),
         ),
     )
 

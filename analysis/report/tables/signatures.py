@@ -17,7 +17,7 @@ from analysis.report.document import Column, DataTable, Row, Value
 from analysis.report.tables.common import counts, table, table_ids, with_interval
 from analysis.signatures.register import REGISTER
 from analysis.signatures.rows import Signature, SignatureRow
-from analysis.statistics.estimates import holm
+from analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study
