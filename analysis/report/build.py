@@ -233,7 +233,7 @@ def _cost(study: Study, figures: list[Block]) -> Section:
 def _signatures(study: Study, figures: list[Block]) -> Section:
     below = []
     for task, slug in tables.table_ids(study).items():
-        found = tables.signatures_tables(study, task)
+        found = tables.signatures_tables(study, task, short=_many(study))
         if found:
             below.append(_section(f"on-{slug}-signatures", task, _tables(*found)))
     between = _tables(tables.contexts_table(study), *tables.slopes_tables(study))
@@ -279,8 +279,8 @@ def _many(study: Study) -> bool:
 def _few(study: Study) -> str:
     return (
         f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has no "
-        "tables of pairs, targets, areas and Pareto sets by task, and no figures of signatures; "
-        "`coartic analyse` writes all of them as CSV."
+        "tables of pairs, targets, areas, Pareto sets and further signatures by task, and no "
+        "figures of signatures; `coartic analyse` writes all of them as CSV."
     )
 
 

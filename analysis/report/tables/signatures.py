@@ -96,16 +96,20 @@ class Spot(NamedTuple):
         return f"{heading}, goal {self.goal}" if by_goal else heading
 
 
-def signatures_tables(study: Study, task: str) -> list[DataTable]:
-    """The signatures of all methods on one task; the main ones first, the others folded."""
+def signatures_tables(study: Study, task: str, *, short: bool = False) -> list[DataTable]:
+    """The signatures of all methods on one task; all but the main ones folded.
+
+    ``short``: the main ones and those of the other arm alone.
+    """
     rows = [row for row in study.signature_rows if row.task == task]
     found = []
     for kind in _KINDS:
-        if kind.id == "hands" and len(study.tasks[task].hands) < 2:
+        main = kind.id in ("main-signatures", "other-arm")
+        if (short and not main) or (kind.id == "hands" and len(study.tasks[task].hands) < 2):
             continue
         made = _of_task(study, task, kind, rows)
         if made is not None:
-            found.append(replace(made, folded=kind.id not in ("main-signatures", "other-arm")))
+            found.append(replace(made, folded=not main))
     return found
 
 
