@@ -19,6 +19,7 @@ from analysis.claims.judges.reach import shortest_reach
 from analysis.report.formats.markdown import markdown
 from analysis.report.pages.claims import claims_document
 from analysis.results.folder import Results
+from analysis.signatures.rows import Place, SignatureRow
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import Inference, mean
 from analysis.statistics.hypotheses import bootstrap_test
@@ -546,11 +547,11 @@ def by_key(table):
     return {row.key: dict(zip(names, row.values, strict=True)) for row in table.rows}
 
 
-def signature(task, label, name, where="", value=0.0, **more):
-    return {
-        "task": task, "label": label, "signature": name, "where": where, "value": value,
-        "low": np.nan, "high": np.nan, "p": np.nan, "n": 20, **more,
-    }  # fmt: skip
+def signature(task, label, name, goal=None, value=0.0, **more):
+    return SignatureRow(
+        task=task, method=label, variant="", signature=name, place=Place(goal), value=value,
+        **{"n": 20, **more},
+    )  # fmt: skip
 
 
 def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrificed):
@@ -568,18 +569,17 @@ def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrifice
     if ready is not None:
         rows += [row(label, -480, task=T1)]
         paths[T1, label] = [waiting(ready)]
-    goal = "goal 1, right hand, against descending"
     planted = [
-        signature("ascending", label, "context distance", goal, apart),
-        signature("ascending", label, "context dependence", goal, 2.0, p=p),
-        signature("ascending", label, "motor-equivalent part", goal, 0.2),
-        signature("ascending", label, "non-motor-equivalent part", goal, 0.1),
-        signature("ascending", label, "first subtask against the same hands", "goal 1", 5.0),
-        signature("ascending", label, "total against the same hands", "", -5.0),
-        signature("ascending", label, "first subtask sacrificed", "", **sacrificed),
+        signature("ascending", label, "context distance", 1, apart),
+        signature("ascending", label, "context dependence", 1, 2.0, p=p),
+        signature("ascending", label, "motor-equivalent part", 1, 0.2),
+        signature("ascending", label, "non-motor-equivalent part", 1, 0.1),
+        signature("ascending", label, "first subtask against the same hands", 1, 5.0),
+        signature("ascending", label, "total against the same hands", None, -5.0),
+        signature("ascending", label, "first subtask sacrificed", **sacrificed),
     ]
     results = planted_results(rows, tmp_path)
-    study = with_paths(results, paths, signatures=pd.DataFrame(planted))
+    study = with_paths(results, paths, signature_rows=planted)
     judged = verdict_of("shared-signatures", study)
     (name,) = [name for name, *labels in REPRESENTATIVES if label in labels]
     assert learned in {one for _, one, _ in REPRESENTATIVES}
@@ -701,13 +701,12 @@ def test_context_is_more_than_the_spread_and_no_chance(apart, p, verdict, tmp_pa
         for task in ("ascending", "descending")
         for entry in learner(task, "EC1", MIDDLE, "RRR")
     ]
-    goal = "goal 1, right hand, against descending"
     parts = ("motor-equivalent part", "non-motor-equivalent part")
     planted = [
-        signature("ascending", "dual-process/EC1", name, goal, apart, p=p)
+        signature("ascending", "dual-process/EC1", name, 1, apart, p=p)
         for name in ("context distance", "context dependence", *parts)
     ]
-    study = MadeUp(planted_results(rows, tmp_path), signatures=pd.DataFrame(planted))
+    study = MadeUp(planted_results(rows, tmp_path), signature_rows=planted)
     assert verdict_of("context", study).verdict == verdict
 
 
