@@ -547,10 +547,11 @@ def by_key(table):
     return {row.key: dict(zip(names, row.values, strict=True)) for row in table.rows}
 
 
-def signature(task, label, name, place=Place(), value=0.0, **more):  # noqa: B008
+def signature(task, label, name, goal=None, value=0.0, **more):
     return SignatureRow(
-        signature=name, place=place, value=value, n=20, task=task, method=label, variant="", **more
-    )
+        task=task, method=label, variant="", signature=name, place=Place(goal), value=value,
+        **{"n": 20, **more},
+    )  # fmt: skip
 
 
 def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrificed):
@@ -568,15 +569,14 @@ def shown(tmp_path, label, runs, *, apart=0.5, p=0.0001, ready=None, **sacrifice
     if ready is not None:
         rows += [row(label, -480, task=T1)]
         paths[T1, label] = [waiting(ready)]
-    goal = Place(goal=1, hand="right", against="descending")
     planted = [
-        signature("ascending", label, "context distance", goal, apart),
-        signature("ascending", label, "context dependence", goal, 2.0, p=p),
-        signature("ascending", label, "motor-equivalent part", goal, 0.2),
-        signature("ascending", label, "non-motor-equivalent part", goal, 0.1),
-        signature("ascending", label, "first subtask against the same hands", Place(goal=1), 5.0),
-        signature("ascending", label, "total against the same hands", Place(), -5.0),
-        signature("ascending", label, "first subtask sacrificed", Place(), **sacrificed),
+        signature("ascending", label, "context distance", 1, apart),
+        signature("ascending", label, "context dependence", 1, 2.0, p=p),
+        signature("ascending", label, "motor-equivalent part", 1, 0.2),
+        signature("ascending", label, "non-motor-equivalent part", 1, 0.1),
+        signature("ascending", label, "first subtask against the same hands", 1, 5.0),
+        signature("ascending", label, "total against the same hands", None, -5.0),
+        signature("ascending", label, "first subtask sacrificed", **sacrificed),
     ]
     results = planted_results(rows, tmp_path)
     study = with_paths(results, paths, signature_rows=planted)
@@ -701,10 +701,9 @@ def test_context_is_more_than_the_spread_and_no_chance(apart, p, verdict, tmp_pa
         for task in ("ascending", "descending")
         for entry in learner(task, "EC1", MIDDLE, "RRR")
     ]
-    goal = Place(goal=1, hand="right", against="descending")
     parts = ("motor-equivalent part", "non-motor-equivalent part")
     planted = [
-        signature("ascending", "dual-process/EC1", name, goal, apart, p=p)
+        signature("ascending", "dual-process/EC1", name, 1, apart, p=p)
         for name in ("context distance", "context dependence", *parts)
     ]
     study = MadeUp(planted_results(rows, tmp_path), signature_rows=planted)

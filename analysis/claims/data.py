@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -56,6 +57,9 @@ SMOOTH = {
 """Smoothness costs of trajectory optimisation, in words."""
 
 
+Read = TypeVar("Read")
+
+
 class MissingError(Exception):
     """The folder lacks what a claim needs."""
 
@@ -67,6 +71,7 @@ class Data:
     study: Study
     _runs: list[str] = field(default_factory=list)
     _others: list[str] = field(default_factory=list)
+    _cells: list[tuple[str, str]] = field(default_factory=list)
 
     @property
     def results(self) -> Results:
@@ -87,10 +92,19 @@ class Data:
         """Begin a new record of what is read."""
         self._runs.clear()
         self._others.clear()
+        self._cells.clear()
 
     def note(self, run_ids: tuple[str, ...]) -> None:
         """Record runs as read."""
         self._runs += run_ids
+
+    def recorded(
+        self, read: Callable[[Data, str], Read], method: str
+    ) -> tuple[Read, tuple[tuple[str, str], ...]]:
+        """What ``read`` gives of a method, and the cells that it has read: tasks and labels."""
+        before = len(self._cells)
+        found = read(self, method)
+        return found, tuple(dict.fromkeys(self._cells[before:]))
 
     def runs(self, task: str, method: str) -> pd.DataFrame:
         """Solved runs of a method; raises MissingError where they cannot be judged."""
@@ -117,6 +131,7 @@ class Data:
                 )
             if len(cell.runs) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}")
+        self._cells.append((task, method))
         return cell.good
 
     def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:

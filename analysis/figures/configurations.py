@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 Rows = Sequence[tuple[str, Sequence[str]]]
 PAPER: dict[str, tuple[str, Rows]] = {
     "configurations-one-armed": (
-        "5",
+        "Figure 5",
         (("ascending", (f"{LEARNER}EC1",)), ("descending", (f"{LEARNER}EC1",))),
     ),
     "configurations-two-armed-1": (
-        "6",
+        "Figure 6",
         (("two-armed-1", (f"{LEARNER}EC2", f"{LEARNER}EC3", f"{LEARNER}EC4")),),
     ),
     "configurations-two-armed-2": (
-        "7",
+        "Figure 7",
         (("two-armed-2", (f"{LEARNER}EC3", f"{LEARNER}EC4")),),
     ),
 }
-"""Figures of the paper: number, and methods by task."""
+"""Figures like the paper's: which one, and methods by task."""
 ROWS = 2
 """Hand sequences of a method in the paper's figures, at most."""
 COMMON = 0.2
@@ -207,7 +207,7 @@ def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | No
     if not kept:
         wanted = " or ".join(f"{', '.join(own)} on {task}" for task, own in rows)
         raise missing(study, f"no runs of {wanted}")
-    return configurations(study, kept, id=name, like=f"Figure {figure}", sequences=ROWS)
+    return configurations(study, kept, id=name, like=figure, sequences=ROWS)
 
 
 def _draw(shown: Sequence[Solution]) -> Figure:

@@ -42,14 +42,19 @@ class Entry(NamedTuple):
     Raises CoarticError where the runs do not allow it.
     """
     section: Section
+    paper: str = ""
+    """Figure of the paper that it is like."""
     by_task: bool = False
     """Whether there is one for each task, which may be too many."""
 
 
 REGISTER = (
-    Entry("tasks", tasks_of, "tasks-drawn"),
-    *(Entry(name, partial(paper_configurations, name), "movements") for name in PAPER),
-    Entry("learned-reward", bars, "paper"),
+    Entry("tasks", tasks_of, "tasks-drawn", "Figure 4"),
+    *(
+        Entry(name, partial(paper_configurations, name), "movements", figure)
+        for name, (figure, _) in PAPER.items()
+    ),
+    Entry("learned-reward", bars, "paper", "Figure 8"),
     Entry("published", published, "paper"),
     Entry("learning-curves", learning_curves, "learning"),
     Entry("recruitment", recruitment, "paper"),
@@ -95,6 +100,11 @@ class Figures(Mapping[str, Figure]):
     def of_section(self, section: str) -> list[Plot]:
         """Figures of one section of a report."""
         return [plot for e in REGISTER if e.section == section for plot in self._of(e)]
+
+    @property
+    def like_the_paper(self) -> dict[str, str]:
+        """Ids by the figures of the paper that they are like."""
+        return {entry.paper: entry.name for entry in REGISTER if entry.paper and self._of(entry)}
 
     def plot(self, name: str) -> Plot:
         """A figure with its words and numbers, by its id; KeyError where there is none."""

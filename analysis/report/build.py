@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -105,8 +105,8 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
         _summary(study),
         _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
         _paper(study, drawn("paper")),
-        _claims(study, () if figures is None else set(figures)),
-        _movements(study, drawn("movements")),
+        _claims(study, {} if figures is None else figures.like_the_paper),
+        *([] if figures is None else [_movements(study, drawn("movements"))]),
         _section("learning", "Learning", drawn("learning")),
         _methods(study, drawn("methods")),
         _cost(study, drawn("cost")),
@@ -241,7 +241,7 @@ def _signatures(study: Study, figures: list[Block]) -> Section:
     return _section("coarticulation", "Signatures of coarticulation", blocks, below)
 
 
-def _claims(study: Study, figures: Collection[str]) -> Section:
+def _claims(study: Study, figures: Mapping[str, str]) -> Section:
     found = [claim_section(entry, figures) for entry in study.judged]
     each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(found), folded=True)
     return _section(CLAIMS, "Claims", _tables(tables.claims_table(study)), [each])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import NamedTuple
 
 from analysis.claims.coarticulation import prepared_by_waiting
@@ -16,30 +16,16 @@ from analysis.report.document import CellKey, Column, Row, Value
 from analysis.statistics.estimates import LEVEL
 from analysis.words import NONE
 
+_PLAN, _POSTURES = "trajectory-optimisation/", "posture-based/"
+_FREE = " hands=every, other_arm=free"
 REPRESENTATIVES = (
     ("learner", f"{LEARNER}EC1", f"{LEARNER}EC4"),
     ("CMA-ES", "cma-es/bandit", "cma-es/bandit"),
-    (
-        "shortest path",
-        "trajectory-optimisation/path-length",
-        "trajectory-optimisation/path-length",
-    ),
-    (
-        "least squared changes",
-        "trajectory-optimisation/squared-changes",
-        "trajectory-optimisation/squared-changes",
-    ),
-    ("least jerk", "trajectory-optimisation/jerk", "trajectory-optimisation/jerk"),
-    (
-        "two-goal planning",
-        "posture-based/two-goals",
-        "posture-based/two-goals hands=every, other_arm=free",
-    ),
-    (
-        "one-goal planning",
-        "posture-based/one-goal",
-        "posture-based/one-goal hands=every, other_arm=free",
-    ),
+    ("shortest path", f"{_PLAN}path-length", f"{_PLAN}path-length"),
+    ("least squared changes", f"{_PLAN}squared-changes", f"{_PLAN}squared-changes"),
+    ("least jerk", f"{_PLAN}jerk", f"{_PLAN}jerk"),
+    ("two-goal planning", f"{_POSTURES}two-goals", f"{_POSTURES}two-goals{_FREE}"),
+    ("one-goal planning", f"{_POSTURES}one-goal", f"{_POSTURES}one-goal{_FREE}"),
     ("nullspace control", "nullspace-qp/next-goal", "nullspace-qp/next-goal"),
     ("corrective alone", "corrective-alone/given", "corrective-alone/every"),
 )
@@ -66,25 +52,13 @@ PRESENCE = (
 
 _INITIAL = "corrective-alone/given"
 """Whose solution of the one-armed tasks is the initial one."""
-
-
-class _Shown(NamedTuple):
-    """Whether a method shows a signature, and the numbers that say so."""
-
-    present: bool
-    numbers: tuple[float, ...]
-    words: str
-
-    @property
-    def text(self) -> str:
-        """``yes, 0.43``."""
-        return f"{_ANSWERS[self.present]}{', ' * bool(self.words)}{self.words}"
-
-
 _ANSWERS = {True: "yes", False: "no"}
 
+Seen = tuple[bool, tuple[float, ...]] | None
+"""Whether a method shows a signature, and the numbers that say so; None: cannot be said."""
 
-def _context(data: Data, label: str) -> _Shown | None:
+
+def _context(data: Data, label: str) -> Seen:
     apart = context_distance(data, label)
     if apart is None:
         return None
@@ -92,10 +66,10 @@ def _context(data: Data, label: str) -> _Shown | None:
         p = data.signature(ASCENDING, label, "context dependence", 1).p
     except MissingError:
         p = math.nan
-    return _Shown(apart > STEP_APART and not p >= LEVEL, (apart,), f"{apart:.2f}")
+    return apart > STEP_APART and not p >= LEVEL, (apart,)
 
 
-def _sacrifice(data: Data, label: str) -> _Shown | None:
+def _sacrifice(data: Data, label: str) -> Seen:
     try:
         runs = data.signature(ASCENDING, label, "first subtask sacrificed")
     except MissingError:
@@ -103,10 +77,10 @@ def _sacrifice(data: Data, label: str) -> _Shown | None:
     ticks = sacrifice(data, label)
     assert ticks is not None
     low = runs.value if math.isnan(runs.low) else runs.low
-    return _Shown(bool(low > 0.5), ticks, f"{ticks[0]:+.1f}, {ticks[1]:+.1f}")
+    return low > 0.5, ticks
 
 
-def _equivalence(data: Data, label: str) -> _Shown | None:
+def _equivalence(data: Data, label: str) -> Seen:
     context = _context(data, label)
     if context is None:
         return None
@@ -114,33 +88,30 @@ def _equivalence(data: Data, label: str) -> _Shown | None:
         data.signature(ASCENDING, label, name, 1).value
         for name in ("motor-equivalent part", "non-motor-equivalent part")
     )
-    present = context.present and same > other
-    return _Shown(present, (same, other), f"{same:.3f} and {other:.3f}")
+    return context[0] and same > other, (same, other)
 
 
-def _preshaping(data: Data, label: str) -> _Shown | None:
+def _preshaping(data: Data, label: str) -> Seen:
     try:
         own = prepared_by_waiting(data.cell(ONE, label))
     except MissingError:
         return None
-    if not len(own):
-        return None
-    nearer = float(own.mean())
-    return _Shown(nearer > STEP_APART, (nearer,), f"{nearer:+.2f}")
+    nearer = float(own.mean()) if len(own) else math.nan
+    return None if math.isnan(nearer) else (nearer > STEP_APART, (nearer,))
 
 
-def _lead(data: Data, label: str) -> _Shown | None:
+def _lead(data: Data, label: str) -> Seen:
     try:
         data.runs(ASCENDING, label)
         several = len(data.runs(DESCENDING, label)) > 1
         lead = data.signature(ASCENDING, label, "lead time", 1).value
     except MissingError:
         seen = context_distance(data, label) is not None and several
-        return _Shown(False, (math.nan,), "") if seen else None
-    return _Shown(lead > 0, (lead,), f"{lead:.0f} ticks")
+        return (False, (math.nan,)) if seen else None
+    return lead > 0, (lead,)
 
 
-def _turning(data: Data, label: str) -> _Shown | None:
+def _turning(data: Data, label: str) -> Seen:
     try:
         own, initial = (
             sum(data.signature(ASCENDING, name, "turning angle", goal).value for goal in (1, 2))
@@ -148,75 +119,64 @@ def _turning(data: Data, label: str) -> _Shown | None:
         )
     except MissingError:
         return None
-    return _Shown(own <= initial - TURN_APART, (own,), f"{own:.2f} rad")
+    return own <= initial - TURN_APART, (own,)
 
 
 class _Sign(NamedTuple):
     """A signature whose presence is asked for."""
 
     name: str
-    show: Callable[[Data, str], _Shown | None]
+    show: Callable[[Data, str], Seen]
+    style: str
+    """Of its numbers in words."""
     numbers: tuple[Column, ...]
     said: str = ""
-    """What the numbers in brackets are, in words."""
-    tasks: tuple[str, ...] = (ASCENDING, DESCENDING)
-    """Tasks whose runs it rests on."""
-    beside: tuple[CellKey, ...] = ()
-    """What else it rests on."""
-
-    def label(self, one: str, two: str) -> str:
-        """Of a method's labels on one-armed and on two-armed tasks, that which is looked at."""
-        return two if self.tasks == (ONE,) else one
-
-    def cells(self, one: str, two: str) -> tuple[CellKey, ...]:
-        """What its values rest on."""
-        return (*((task, self.label(one, two)) for task in self.tasks), *self.beside)
+    """What the numbers in words are."""
+    two_armed: bool = False
 
     @property
     def head(self) -> str:
         """Its name with what stands behind it in words."""
         return f"{self.name} ({self.said})" if self.said else self.name
 
+    def words(self, seen: Seen) -> str:
+        """``yes, 0.43``."""
+        if seen is None:
+            return NONE
+        present, numbers = seen
+        known = not math.isnan(numbers[0])
+        return ", ".join((_ANSWERS[present], *([self.style.format(*numbers)] if known else [])))
+
 
 def _number(name: str, header: str, unit: str = "", digits: int = 2) -> Column:
     return Column(name, header, "number", unit, digits, rests_on=("runs",), printed=False)
 
 
-_SIGNS = (
-    _Sign("context", _context, (_number("context_distance", "postures apart"),)),
-    _Sign(
-        "sacrifice",
-        _sacrifice,
-        (
-            _number("first_change", "first movement", "ticks", 1),
-            _number("total_change", "all movements", "ticks", 1),
-        ),
-        "first, all",
-        (ASCENDING,),
-    ),
-    _Sign(
-        "motor-equivalent",
-        _equivalence,
-        (
-            _number("equivalent_part", "motor-equivalent part", digits=3),
-            _number("other_part", "other part", digits=3),
-        ),
-    ),
-    _Sign(
-        "preshaping",
-        _preshaping,
-        (_number("nearer", "waiting hand nearer"),),
-        tasks=(ONE,),
-    ),
-    _Sign("lead", _lead, (_number("lead_time", "lead time", "ticks", 0),)),
-    _Sign(
-        "turning",
-        _turning,
-        (_number("turning_angles", "turning angles", "rad"),),
-        tasks=(ASCENDING,),
-        beside=((ASCENDING, _INITIAL),),
-    ),
+_CHANGES = (
+    _number("first_change", "first movement", "ticks", 1),
+    _number("total_change", "all movements", "ticks", 1),
 )
+_PARTS = (
+    _number("equivalent_part", "motor-equivalent part", digits=3),
+    _number("other_part", "other part", digits=3),
+)
+_APART = (_number("context_distance", "postures apart"),)
+_NEARER = (_number("nearer", "waiting hand nearer"),)
+_LEAD = (_number("lead_time", "lead time", "ticks", 0),)
+_ANGLES = (_number("turning_angles", "turning angles", "rad"),)
+_SIGNS = (
+    _Sign("context", _context, "{:.2f}", _APART),
+    _Sign("sacrifice", _sacrifice, "{:+.1f}, {:+.1f}", _CHANGES, "first, all"),
+    _Sign("motor-equivalent", _equivalence, "{:.3f} and {:.3f}", _PARTS),
+    _Sign("preshaping", _preshaping, "{:+.2f}", _NEARER, two_armed=True),
+    _Sign("lead", _lead, "{:.0f} ticks", _LEAD),
+    _Sign("turning", _turning, "{:.2f} rad", _ANGLES),
+)
+_HEADS = ("method", "reward (ascending)", *(sign.head for sign in _SIGNS))
+
+
+def _columns(sign: _Sign) -> tuple[Column, ...]:
+    return (Column(sign.name.replace("-", "_"), sign.name, rests_on=("runs",)), *sign.numbers)
 
 
 def _reward(data: Data, label: str) -> float | None:
@@ -231,61 +191,32 @@ def shared_signatures(data: Data) -> Finding:
     data.runs(ASCENDING, f"{LEARNER}EC1")
     data.runs(DESCENDING, f"{LEARNER}EC1")
     rows, words = [], []
-    present: dict[str, list[str] | None] = {sign.head: None for sign in _SIGNS}
+    shown: dict[str, list[str]] = {}
     for name, one, two in REPRESENTATIVES:
-        shown = [sign.show(data, sign.label(one, two)) for sign in _SIGNS]
-        if not any(shown):
+        seen = [data.recorded(sign.show, two if sign.two_armed else one) for sign in _SIGNS]
+        if not any(found for found, _ in seen):
             continue
-        reward = _reward(data, one)
+        reward, cells = data.recorded(_reward, one)
         values: list[Value] = [name, reward]
         texts = [name, NONE if reward is None else f"{reward:.1f}"]
-        for sign, found in zip(_SIGNS, shown, strict=True):
-            texts.append(found.text if found else NONE)
-            values.append(_ANSWERS[found.present] if found else None)
-            values += found.numbers if found else [None] * len(sign.numbers)
-            if found:
-                own = present[sign.head] or []
-                present[sign.head] = [*own, name] if found.present else own
-        rows.append(_row(data, (name, one, two), values))
-        heads = ("method", "reward (ascending)", *(sign.head for sign in _SIGNS))
-        words.append(", ".join(map(" ".join, zip(heads, texts, strict=True))))
-    evidence = "; ".join(
-        f"{name}: {'not judged' if own is None else ', '.join(own) or 'none'}"
-        for name, own in present.items()
-    )
-    return measured("shared-signatures", evidence, "Signatures", _columns(), rows, words)
-
-
-def _columns() -> tuple[Column, ...]:
-    return (
+        by_column: dict[str, tuple[CellKey, ...]] = {}
+        for sign, (found, own) in zip(_SIGNS, seen, strict=True):
+            present, numbers = found or (None, (None,) * len(sign.numbers))
+            values += [None if present is None else _ANSWERS[present], *numbers]
+            texts.append(sign.words(found))
+            by_column |= {column.name: own for column in _columns(sign) if own != cells}
+            if present is not None:
+                shown.setdefault(sign.head, []).extend([name] * present)
+        rows.append(Row(name, tuple(values), cells, by_column))
+        words.append(", ".join(map(" ".join, zip(_HEADS, texts, strict=True))))
+    columns = (
         Column("method", "method"),
         Column("reward", "reward, ascending", "number", digits=1, rests_on=("runs",)),
-        *(
-            column
-            for sign in _SIGNS
-            for column in (
-                Column(_identifier(sign), sign.name, rests_on=("runs",)),
-                *sign.numbers,
-            )
-        ),
+        *(column for sign in _SIGNS for column in _columns(sign)),
     )
-
-
-def _row(data: Data, method: tuple[str, str, str], values: list[Value]) -> Row:
-    """A method's row, with the cells of the folder that its values rest on."""
-    name, one, two = method
-
-    def known(cells: Iterable[CellKey]) -> tuple[CellKey, ...]:
-        return tuple(cell for cell in cells if cell in data.study.cells)
-
-    both = known((task, one) for task in (ASCENDING, DESCENDING))
-    by_column = {"reward": known([(ASCENDING, one)])}
-    for sign in _SIGNS:
-        names = (_identifier(sign), *(column.name for column in sign.numbers))
-        by_column |= dict.fromkeys(names, known(sign.cells(one, two)))
-    apart = {column: cells for column, cells in by_column.items() if cells != both}
-    return Row(name, tuple(values), both, apart)
-
-
-def _identifier(sign: _Sign) -> str:
-    return sign.name.replace("-", "_")
+    found_in = {
+        sign.head: ", ".join(shown[sign.head]) or "none" if sign.head in shown else "not judged"
+        for sign in _SIGNS
+    }
+    evidence = "; ".join(map(": ".join, found_in.items()))
+    return measured("shared-signatures", evidence, "Signatures", columns, rows, words)

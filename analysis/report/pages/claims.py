@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from analysis.claims.register import Judged
@@ -17,15 +17,6 @@ from analysis.words import NONE, slugs
 
 if TYPE_CHECKING:
     from analysis.study import Study
-
-_FIGURES = {
-    "Figure 4": "tasks",
-    "Figure 5": "configurations-one-armed",
-    "Figure 6": "configurations-two-armed-1",
-    "Figure 7": "configurations-two-armed-2",
-    "Figure 8": "learned-reward",
-}
-"""Ours by the paper's."""
 
 
 def claims_document(study: Study) -> Document:
@@ -55,13 +46,13 @@ def claims_document(study: Study) -> Document:
     )
 
 
-def claim_section(entry: Judged, figures: Collection[str] = ()) -> Section:
-    """All that is known of a claim; ``figures`` are ids of those that it may point at."""
+def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Section:
+    """All that is known of a claim; ``figures``: ids of ours by the paper's that they are like."""
     claim = entry.claim
     where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
     quote = f": “{claim.quote}”" if claim.quote else ""
-    ours = _FIGURES.get(claim.figure)
-    see = f" Ours: [figure {ours}](#{ours})." if ours in figures else ""
+    ours = (figures or {}).get(claim.figure)
+    see = f" Ours: [figure {ours}](#{ours})." if ours else ""
     items = [f"Seen: {escaped(entry.evidence)}.", f"Test: {claim.test}."]
     if claim.place and entry.methods:
         items.append(
