@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement, execute
-from coartic.learner import TRIALS
+from coartic.learning import TRIALS
 from coartic.method import Information, MethodError, Parameters, Result, Session
 from coartic.robot import HANDS, Array
 from coartic.task import hands_of

@@ -38,7 +38,7 @@ from benchmarks.sandbox import Failure, Sandbox
 from coartic import CoarticError, Task, tables
 from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import problems_inline, read_text
-from coartic.learner import METHOD_PREFIX
+from coartic.learning import METHOD_PREFIX
 from coartic.method import Method
 from coartic.record import SEARCH, Values
 from coartic.text import LONGEST_LINE, did_you_mean, plain

@@ -21,7 +21,7 @@ from benchmarks.run import plan_suite
 from benchmarks.suites import Suite, load_suite, select_cells
 from coartic import CONDITIONS, Robot, learn, reference
 from coartic.compiled import entry, inner, joint_chain
-from coartic.learner import METHOD_PREFIX, TRIALS, warm_up
+from coartic.learning import METHOD_PREFIX, TRIALS, warm_up
 from coartic.robot import chain
 
 SLOW_TRIALS = 60

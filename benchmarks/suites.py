@@ -41,7 +41,7 @@ from coartic.inputs import (
     problems,
     read_toml,
 )
-from coartic.learner import METHOD_PREFIX
+from coartic.learning import METHOD_PREFIX
 from coartic.record import run_seed
 from coartic.robot import Finite
 from coartic.tables import (

@@ -28,7 +28,7 @@ from benchmarks.provenance import environment, process_peak_mb
 from benchmarks.sandbox import THREADS
 from coartic import CoarticError, MotionModel, NotApplicableError, parse_task
 from coartic.errors import SolutionError
-from coartic.learner import warm_up
+from coartic.learning import warm_up
 from coartic.method import (
     BudgetError,
     Information,

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from coartic.corrective import Correction, correct
     from coartic.errors import CoarticError, NotApplicableError, TaskError
     from coartic.exploration import CONDITIONS, VARIANTS, ExplorationCondition
-    from coartic.frames import learning_frame, runs_frame, solutions_frame
     from coartic.initial import corrective_trial, hand_sequences, initial_hands
-    from coartic.learner import Counters, LearningRun, learn, learn_many
+    from coartic.learning import Counters, LearningRun, learn, learn_many
     from coartic.model import PAPER, MotionModel
     from coartic.movement import MoveResult, move
     from coartic.robot import Arm, Hand, Robot
+    from coartic.rows import learning_table, runs_table, solutions_table
     from coartic.solution import Execution, Movement, execute
     from coartic.task import Provenance, Start, Task, builtin_tasks, load_task, parse_task
     from coartic.ticks import Trajectory, trajectory
@@ -54,12 +54,12 @@ __all__ = [
     "initial_hands",
     "learn",
     "learn_many",
-    "learning_frame",
+    "learning_table",
     "load_task",
     "move",
     "parse_task",
-    "runs_frame",
-    "solutions_frame",
+    "runs_table",
+    "solutions_table",
     "trajectory",
 ]
 
@@ -67,12 +67,12 @@ _HOMES = {
     "corrective": ("Correction", "correct"),
     "errors": ("CoarticError", "NotApplicableError", "TaskError"),
     "exploration": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
-    "frames": ("learning_frame", "runs_frame", "solutions_frame"),
     "initial": ("corrective_trial", "hand_sequences", "initial_hands"),
-    "learner": ("Counters", "LearningRun", "learn", "learn_many"),
+    "learning": ("Counters", "LearningRun", "learn", "learn_many"),
     "model": ("PAPER", "MotionModel"),
     "movement": ("MoveResult", "move"),
     "robot": ("Arm", "Hand", "Robot"),
+    "rows": ("learning_table", "runs_table", "solutions_table"),
     "solution": ("Execution", "Movement", "execute"),
     "task": ("Provenance", "Start", "Task", "builtin_tasks", "load_task", "parse_task"),
     "ticks": ("Trajectory", "trajectory"),

@@ -32,7 +32,7 @@ _PRESENTATION = {
     "__init__.py",
     "__main__.py",
     "files.py",
-    "frames.py",
+    "rows.py",
     "inputs.py",
     "record.py",
     "reference.py",

@@ -20,12 +20,22 @@ from typing import Any, NamedTuple
 
 from coartic.compiled import entry, inner, joint_chain, joint_lever
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import configuration, goal_centre, scratch_for
+from coartic.movement import checked_goal, configuration, scratch_for
 from coartic.robot import Array, Hand, Robot
 
 # Of the smaller pivot of J Jᵀ, in units of its trace: nothing where J has full rank, above
 # rounding where it has not (a straight arm on a locked base).
 _DAMPING = 1e-14
+
+
+class Corrector(NamedTuple):
+    """How the corrective process may descend."""
+
+    free_x: bool
+    """Whether the base moves in x."""
+    free_y: bool
+    nullspace_gain: float = 0.0
+    """β, 0 to 1 per iteration; 0 is the paper's process."""
 
 
 class Correction(NamedTuple):
@@ -56,9 +66,7 @@ def _pull(q: Any, start: Any, joint: int, disturbing: float, gain: float) -> boo
 
 
 @inner
-def _stay(
-    q: Any, start: Any, arm: Any, free_x: bool, free_y: bool, nullspace_gain: float, scratch: Any
-) -> bool:
+def _stay(q: Any, start: Any, arm: Any, how: Any, scratch: Any) -> bool:
     """q += β N(q) (start - q) for N = I - J⁺J, given the chain of ``q``; whether it moved.
 
     N r = r - Jᵀ(J Jᵀ)⁻¹ J r for r = start - q. It is never longer than r, so that a
@@ -66,11 +74,11 @@ def _stay(
     """
     xs, ys = scratch.xs, scratch.ys
     tip = len(arm.links)
-    xx = 1.0 if free_x else 0.0  # J Jᵀ
-    yy = 1.0 if free_y else 0.0
+    xx = 1.0 if how.free_x else 0.0  # J Jᵀ
+    yy = 1.0 if how.free_y else 0.0
     xy = 0.0
-    hand_x = start[0] - q[0] if free_x else 0.0  # J r
-    hand_y = start[1] - q[1] if free_y else 0.0
+    hand_x = start[0] - q[0] if how.free_x else 0.0  # J r
+    hand_y = start[1] - q[1] if how.free_y else 0.0
     for k in range(tip):
         dx, dy = joint_lever(xs, ys, k, tip)
         away = start[arm.first + k] - q[arm.first + k]
@@ -85,48 +93,38 @@ def _stay(
         y, x = _solve(yy, xy, xx, hand_y, hand_x)
 
     moved = False
-    if free_x:
-        moved = _pull(q, start, 0, x, nullspace_gain)
-    if free_y:
-        moved = _pull(q, start, 1, y, nullspace_gain) or moved
+    if how.free_x:
+        moved = _pull(q, start, 0, x, how.nullspace_gain)
+    if how.free_y:
+        moved = _pull(q, start, 1, y, how.nullspace_gain) or moved
     for k in range(tip):
         dx, dy = joint_lever(xs, ys, k, tip)
-        moved = _pull(q, start, arm.first + k, dx * x + dy * y, nullspace_gain) or moved
+        moved = _pull(q, start, arm.first + k, dx * x + dy * y, how.nullspace_gain) or moved
     return moved
 
 
-def _correct(
-    q: Any,
-    arm: Any,
-    goal_x: float,
-    goal_y: float,
-    free_x: bool,
-    free_y: bool,
-    nullspace_gain: float,
-    model: Any,
-    scratch: Any,
-) -> tuple[bool, int]:
+def _correct(q: Any, arm: Any, goal: Any, how: Any, model: Any, scratch: Any) -> tuple[bool, int]:
     """Descend from ``q`` in place; converged, iterations."""
     xs, ys, start = scratch.xs, scratch.ys, scratch.start
     tip = len(arm.links)
-    if nullspace_gain > 0.0:
+    if how.nullspace_gain > 0.0:
         start[:] = q
     for iteration in range(model.max_iterations + 1):
         joint_chain(q, arm, xs, ys)
-        error_x = goal_x - xs[tip]
-        error_y = goal_y - ys[tip]
+        error_x = goal.x - xs[tip]
+        error_y = goal.y - ys[tip]
         error = math.sqrt(error_x * error_x + error_y * error_y)
         if error <= model.correction_tolerance:
             return True, iteration
         if iteration == model.max_iterations or not math.isfinite(error):
             return False, iteration
         moved = False
-        if nullspace_gain > 0.0:
-            moved = _stay(q, start, arm, free_x, free_y, nullspace_gain, scratch)
-        if free_x:
+        if how.nullspace_gain > 0.0:
+            moved = _stay(q, start, arm, how, scratch)
+        if how.free_x:
             moved = moved or q[0] + model.gain * error_x != q[0]
             q[0] += model.gain * error_x
-        if free_y:
+        if how.free_y:
             moved = moved or q[1] + model.gain * error_y != q[1]
             q[1] += model.gain * error_y
         for k in range(tip):
@@ -145,14 +143,7 @@ _compiled_correct = entry(_correct)
 
 @inner
 def shift_kernel(
-    target: Any,
-    q: Any,
-    arm: Any,
-    goal_x: float,
-    goal_y: float,
-    mask: Any,
-    length: float,
-    scratch: Any,
+    target: Any, q: Any, arm: Any, goal: Any, mask: Any, length: float, scratch: Any
 ) -> None:
     """Shift ``target`` by ``length`` along the step that **A** would make from ``q``.
 
@@ -161,8 +152,8 @@ def shift_kernel(
     xs, ys, step = scratch.xs, scratch.ys, scratch.start
     tip = len(arm.links)
     joint_chain(q, arm, xs, ys)
-    error_x = goal_x - xs[tip]
-    error_y = goal_y - ys[tip]
+    error_x = goal.x - xs[tip]
+    error_y = goal.y - ys[tip]
     step[:] = 0.0
     step[0] = error_x
     step[1] = error_y
@@ -207,10 +198,8 @@ def correct(
     converged, iterations = _compiled_correct(
         position,
         robot.arm(hand),
-        *goal_centre(goal),
-        "x" not in locked_base,
-        "y" not in locked_base,
-        float(nullspace_gain),
+        checked_goal(goal),
+        Corrector("x" not in locked_base, "y" not in locked_base, float(nullspace_gain)),
         checked_model(model),
         scratch_for(robot),
     )

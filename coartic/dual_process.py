@@ -21,7 +21,7 @@ from coartic.exploration import (
     ExplorationCondition,
 )
 from coartic.initial import InitialSearch, search_initial_hands
-from coartic.learner import METHOD_PREFIX, TRIALS, learn
+from coartic.learning import METHOD_PREFIX, TRIALS, learn
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.task import Task
 

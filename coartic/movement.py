@@ -34,6 +34,14 @@ _CLEARANCE = 1e-9
 LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
+class Goal(NamedTuple):
+    """A goal as the kernels read it, length unit."""
+
+    x: float
+    y: float
+    radius: float
+
+
 class Scratch(NamedTuple):
     """Work space of the kernels: joint positions, link rates, start of a movement."""
 
@@ -65,7 +73,7 @@ def scratch_for(robot: Robot) -> Scratch:
 
 
 @inner
-def _clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
+def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
     """Number of steps during which a gap provably stays open.
 
     ``gap`` > 0 is the distance to a disc's rim, ``closing`` the rate at which it
@@ -86,15 +94,7 @@ def _clear_steps(gap: float, closing: float, speed: float, bend: float) -> float
 
 
 def _move(
-    q: Any,
-    target: Any,
-    arm: Any,
-    goal_x: float,
-    goal_y: float,
-    radius: float,
-    stop_on_arrival: bool,
-    model: Any,
-    scratch: Any,
+    q: Any, target: Any, arm: Any, goal: Any, stop_on_arrival: bool, model: Any, scratch: Any
 ) -> tuple[int, bool, int]:
     """Move ``q`` in place; ticks, goal hit, forward-kinematics evaluations."""
     xs, ys, rates, start = scratch
@@ -143,10 +143,10 @@ def _move(
         joint_chain(q, arm, xs, ys)
         evaluations += 1
 
-        goal_dx = goal_x - xs[tip]
-        goal_dy = goal_y - ys[tip]
+        goal_dx = goal.x - xs[tip]
+        goal_dy = goal.y - ys[tip]
         goal_distance = math.sqrt(goal_dx * goal_dx + goal_dy * goal_dy)
-        if goal_distance <= radius:
+        if goal_distance <= goal.radius:
             return k + 1, True, evaluations
         if k == last:
             return k + 1, False, evaluations
@@ -158,7 +158,7 @@ def _move(
             velocity_y += rates[link] * (xs[link + 1] - xs[link])
 
         closing = (velocity_x * goal_dx + velocity_y * goal_dy) / goal_distance
-        clear = _clear_steps(goal_distance - radius, closing, speed, bend)
+        clear = clear_steps(goal_distance - goal.radius, closing, speed, bend)
         if stop_on_arrival:
             end_dx = end_x - xs[tip]
             end_dy = end_y - ys[tip]
@@ -166,10 +166,8 @@ def _move(
             if end_distance <= model.arrival_tolerance:
                 return k + 1, False, evaluations
             closing = (velocity_x * end_dx + velocity_y * end_dy) / end_distance
-            clear = min(
-                clear,
-                _clear_steps(end_distance - model.arrival_tolerance, closing, speed, bend),
-            )
+            gap = end_distance - model.arrival_tolerance
+            clear = min(clear, clear_steps(gap, closing, speed, bend))
         # Every step up to k + clear is clear of both discs.
         k += 1 + int(min(clear, float(last)))
 
@@ -203,8 +201,7 @@ def move(
         position,
         end,
         robot.arm(hand),
-        *goal_centre(goal),
-        _radius(radius),
+        checked_goal(goal, radius),
         stop_on_arrival,
         checked_model(model),
         scratch_for(robot),
@@ -229,7 +226,7 @@ def follow(
     the hand within ``radius`` of the goal, or at the end; k steps take k + 1 ticks, as
     for :func:`move`. Raises ValueError for a wrong shape.
     """
-    goal_centre(goal), _radius(radius), checked_model(model)
+    checked_goal(goal, radius), checked_model(model)
     points = path_points(robot, q, waypoints, model)
     last = len(points) - 1
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
@@ -265,15 +262,11 @@ def configuration(robot: Robot, q: Any) -> Array:
     return array
 
 
-def goal_centre(goal: Any) -> tuple[float, float]:
-    """The two coordinates of a goal; ValueError where they are anything else."""
-    x, y = float(goal[0]), float(goal[1])
+def checked_goal(centre: Any, radius: float = 0.0) -> Goal:
+    """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST``."""
+    x, y = float(centre[0]), float(centre[1])
     if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
         raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST:g}")
-    return x, y
-
-
-def _radius(radius: float) -> float:
     if not 0.0 <= radius <= LARGEST:
         raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST:g}")
-    return float(radius)
+    return Goal(x, y, float(radius))

@@ -31,7 +31,7 @@ from pydantic import (
 
 from coartic.errors import CoarticError, IncompleteError, SolutionError
 from coartic.inputs import MOST_BYTES, problems_inline, read_bytes
-from coartic.learner import METHOD_PREFIX
+from coartic.learning import METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
 from coartic.movement import configuration

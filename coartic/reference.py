@@ -101,7 +101,7 @@ def learn(
     trials: int,
     model: MotionModel = PAPER,
 ) -> ReferenceRun:
-    """:func:`coartic.learner.learn`, after Figure 3 line by line."""
+    """:func:`coartic.learning.learn`, after Figure 3 line by line."""
     rng = np.random.default_rng(seed)
     first_hands = hands_of(initial_hands(task, condition.hands, model=model))
     values: dict[tuple[State, Hand], float] = {}

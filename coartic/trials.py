@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import entry
+from coartic.compiled import entry, inlined
 from coartic.corrective import correct_kernel
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import LARGEST, move_kernel, scratch_for
+from coartic.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array
 from coartic.task import Task, hands_of
 
@@ -52,71 +53,75 @@ class _Count(NamedTuple):
 _C = _Count()
 
 
-def _make(
-    hands: Any,
-    start: Any,
-    goals: Any,
-    radius: float,
-    free_x: bool,
-    free_y: bool,
-    left: Any,
-    right: Any,
-    model: Any,
-    scratch: Any,
-    targets: Any,
-    reached: Any,
-    ticks: Any,
-    completed: Any,
-    counts: Any,
-) -> None:
-    """Make every trial, filling ``targets`` and all that follows it."""
-    q = np.empty_like(start)
-    found = np.empty_like(start)
-    for trial in range(len(targets)):
-        q[:] = start
-        for goal in range(len(goals)):
-            arm = left if hands[goal] == 0 else right
-            goal_x, goal_y = goals[goal, 0], goals[goal, 1]
-            target = targets[trial, goal]
-            given = False
-            for j in range(len(q)):
-                given = given or not math.isnan(target[j])
-            if given:
-                for j in range(len(q)):
-                    if math.isnan(target[j]):
-                        target[j] = q[j]
-                spent, hit, evaluations = move_kernel(
-                    q, target, arm, goal_x, goal_y, radius, True, model, scratch
-                )
-                ticks[trial] += spent
-            else:  # a movement to where it is tells whether the goal is hit
-                found[:] = q
-                _, hit, evaluations = move_kernel(
-                    q, found, arm, goal_x, goal_y, radius, False, model, scratch
-                )
-            counts[_C.evaluations] += evaluations
+class _Made(NamedTuple):
+    """What the kernel fills; see :class:`Trials`."""
+
+    targets: Any
+    reached: Any
+    ticks: Any
+    completed: Any
+    counts: Any
+
+
+@inlined
+def _attempt(
+    q: Any, found: Any, target: Any, arm: Any, goal: Any, made: Any, model: Any, scratch: Any
+) -> tuple[int, bool]:
+    """Move to a goal's target, where it has one; ticks, goal hit."""
+    given = False
+    for j in range(len(q)):
+        given = given or not math.isnan(target[j])
+    if given:
+        for j in range(len(q)):
+            if math.isnan(target[j]):
+                target[j] = q[j]
+        ticks, hit, evaluations = move_kernel(q, target, arm, goal, True, model, scratch)
+    else:  # a movement to where it is tells whether the goal is hit
+        found[:] = q
+        _, hit, evaluations = move_kernel(q, found, arm, goal, False, model, scratch)
+        ticks = 0
+    made.counts[_C.evaluations] += evaluations
+    return ticks, hit
+
+
+@inlined
+def _finish(
+    q: Any, found: Any, arm: Any, goal: Any, problem: Any, made: Any, scratch: Any
+) -> tuple[int, bool]:
+    """Have **A** finish what was missed; ticks, goal hit."""
+    found[:] = q
+    converged, iterations = correct_kernel(
+        found, arm, goal, problem.corrector, problem.model, scratch
+    )
+    made.counts[_C.iterations] += iterations
+    made.counts[_C.evaluations] += iterations + 1
+    ticks, hit = 0, False
+    if converged:
+        ticks, hit, evaluations = move_kernel(q, found, arm, goal, False, problem.model, scratch)
+        made.counts[_C.corrections] += 1
+        made.counts[_C.evaluations] += evaluations
+    return ticks, hit
+
+
+@entry
+def _make(hands: Any, problem: Any, made: Any, scratch: Any) -> None:
+    """Make every trial of ``made.targets``, and fill the rest."""
+    q = np.empty_like(problem.start)
+    found = np.empty_like(problem.start)
+    for trial in range(len(made.targets)):
+        q[:] = problem.start
+        for number in range(len(problem.goals)):
+            arm, goal = arm_of(problem, hands[number]), goal_of(problem, number)
+            target = made.targets[trial, number]
+            ticks, hit = _attempt(q, found, target, arm, goal, made, problem.model, scratch)
+            made.ticks[trial] += ticks
             if not hit:
-                found[:] = q
-                converged, iterations = correct_kernel(
-                    found, arm, goal_x, goal_y, free_x, free_y, 0.0, model, scratch
-                )
-                counts[_C.iterations] += iterations
-                counts[_C.evaluations] += iterations + 1
-                if not converged:
-                    break
-                spent, hit, evaluations = move_kernel(
-                    q, found, arm, goal_x, goal_y, radius, False, model, scratch
-                )
-                counts[_C.corrections] += 1
-                counts[_C.evaluations] += evaluations
-                ticks[trial] += spent
-                if not hit:
-                    break
-            reached[trial, goal] = q
-            completed[trial] = goal == len(goals) - 1
-
-
-_compiled_make = entry(_make)
+                ticks, hit = _finish(q, found, arm, goal, problem, made, scratch)
+                made.ticks[trial] += ticks
+            if not hit:
+                break
+            made.reached[trial, number] = q
+            made.completed[trial] = number == len(problem.goals) - 1
 
 
 def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = PAPER) -> Trials:
@@ -131,36 +136,30 @@ def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = 
     names = hands_of(hands)
     if len(names) != len(task.goals) or not set(names) <= set(task.hands):
         raise ValueError(f"hands {hands!r} do not fit task {task.name!r}")
-    made = np.array(targets, dtype=np.float64)
-    if made.ndim != 3 or made.shape[1:] != (len(task.goals), task.robot.dof):
+    given = _checked_targets(task, targets)
+    made = _Made(
+        targets=given,
+        reached=np.full_like(given, np.nan),
+        ticks=np.zeros(len(given), dtype=np.int64),
+        completed=np.zeros(len(given), dtype=np.bool_),
+        counts=np.zeros(len(_C), dtype=np.int64),
+    )
+    codes = np.array([HANDS.index(hand) for hand in names], dtype=np.int64)
+    _make(codes, problem_of(task, model), made, scratch_for(task.robot))
+    return Trials(made.ticks, made.completed, given, made.reached, *map(int, made.counts))
+
+
+def _checked_targets(task: Task, targets: Array) -> Array:
+    """A copy of the targets; ValueError where they do not fit the task."""
+    copy = np.array(targets, dtype=np.float64)
+    if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
-            f"targets have shape {made.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
+            f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
         )
-    if np.any(np.abs(made) > LARGEST):
+    if np.any(np.abs(copy) > LARGEST):
         raise ValueError(f"a target has a figure beyond {LARGEST:g}")
     for coordinate in task.locked_base:
-        column = made[..., "xy".index(coordinate)]
+        column = copy[..., "xy".index(coordinate)]
         if np.any(~np.isnan(column) & (column != task.q0["xy".index(coordinate)])):
             raise ValueError(f"a target moves the base in {coordinate}, which is locked")
-    reached = np.full_like(made, np.nan)
-    ticks = np.zeros(len(made), dtype=np.int64)
-    completed = np.zeros(len(made), dtype=np.bool_)
-    counts = np.zeros(len(_C), dtype=np.int64)
-    _compiled_make(
-        np.array([HANDS.index(hand) for hand in names], dtype=np.int64),
-        np.array(task.q0),
-        np.array(task.goal_array),
-        float(task.radius),
-        "x" not in task.locked_base,
-        "y" not in task.locked_base,
-        task.robot.arm("left"),
-        task.robot.arm("right"),
-        model,
-        scratch_for(task.robot),
-        made,
-        reached,
-        ticks,
-        completed,
-        counts,
-    )
-    return Trials(ticks, completed, made, reached, *map(int, counts))
+    return copy

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct, reference
 from coartic.corrective import shift_kernel
-from coartic.movement import scratch_for
+from coartic.movement import Goal, scratch_for
 from coartic.robot import HANDS
 from tests.support.strategies import UNEVEN, configurations
 
@@ -203,7 +203,7 @@ def test_shift_is_along_the_steepest_descent(hand):
         q, goal = rng.uniform(-2, 2, 10), rng.uniform(-3, 3, 2)
         mask = rng.random(10) < 0.7
         target = np.array(q)
-        shift_kernel(target, q, ROBOT.arm(hand), *goal, mask, 0.07, scratch_for(ROBOT))
+        shift_kernel(target, q, ROBOT.arm(hand), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT))
         nearby = q + 1e-6 * np.concatenate([np.eye(10), -np.eye(10)])
         distances = ((ROBOT.forward_kinematics(nearby, hand) - goal) ** 2).sum(axis=1)
         descent = (distances[10:] - distances[:10]) * mask
@@ -213,5 +213,7 @@ def test_shift_is_along_the_steepest_descent(hand):
 def test_no_shift_where_the_corrective_process_would_not_move():
     q, target = np.zeros(10), np.ones(10)
     for goal, mask in [((4.5, 0.1), np.ones(10, bool)), ((2.0, 1.0), np.zeros(10, bool))]:
-        shift_kernel(target, q, ROBOT.arm("right"), *goal, mask, 0.07, scratch_for(ROBOT))
+        shift_kernel(
+            target, q, ROBOT.arm("right"), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT)
+        )
     np.testing.assert_array_equal(target, np.ones(10))

@@ -35,7 +35,7 @@ from analysis.published import TRIALS
 from analysis.study import Study
 from benchmarks.suites import load_suite, select_cells
 from coartic import CoarticError, corrective_trial, execute, load_task
-from coartic.frames import movements_from
+from coartic.rows import movements_from
 from tests.support.made_up import MadeUp
 from tests.support.suites import KNOWN, run_and_write
 

@@ -29,11 +29,11 @@ from benchmarks.suites import (
 from benchmarks.tables import write_tables
 from benchmarks.worker import ForeignCodeError, perform
 from coartic import CoarticError, Movement, execute, files, hand_sequences, learn, load_task
-from coartic.frames import movements_from
 from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
 from coartic.method import Information, Parameters, Session
 from coartic.record import run_seed
+from coartic.rows import movements_from
 from coartic.tables import FORMAT, RUNS
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables, suite_of

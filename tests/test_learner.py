@@ -21,7 +21,7 @@ from coartic import (
     parse_task,
     reference,
 )
-from coartic.learner import TRIALS
+from coartic.learning import TRIALS
 from coartic.robot import HANDS
 from tests.support.strategies import PAPER_CELLS, UNEVEN, tiny_task
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from coartic import PAPER, MotionModel, Robot, move, reference
 from coartic.compiled import entry, joint_chain
-from coartic.movement import _clear_steps, follow
+from coartic.movement import clear_steps, follow
 from coartic.robot import HANDS
 from tests.support.strategies import UNEVEN, configurations
 
@@ -238,11 +238,11 @@ def test_the_bound_keeps_its_promise():
     for _ in range(5000):
         gap, speed, bend = rng.uniform(0, 3), rng.uniform(0, 0.1), rng.uniform(0, 1e-3)
         closing = rng.uniform(-1, 1) * speed
-        steps = _clear_steps(gap, closing, speed, bend)
+        steps = clear_steps(gap, closing, speed, bend)
         assert min(speed * steps, closing * steps + bend * steps**2 / 2) < gap - 5e-10
     for gap in (0.0, 1e-10, 1e-9):  # too near to call
-        assert _clear_steps(gap, 0.01, 0.01, 1e-3) == 0.0
-    assert _clear_steps(1.0, 0.0, 0.0, 0.0) == np.inf
+        assert clear_steps(gap, 0.01, 0.01, 1e-3) == 0.0
+    assert clear_steps(1.0, 0.0, 0.0, 0.0) == np.inf
 
 
 def test_equals_every_step_at_the_largest_figures():

@@ -12,8 +12,8 @@ from analysis.results.folder import Results
 from analysis.results.optima import Entry, collect, entries, essence
 from baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic import builtin_tasks, execute, load_task
-from coartic.frames import movement_rows, movements_from
 from coartic.method import MethodError, Session
+from coartic.rows import movement_rows, movements_from
 from coartic.solution import other_arm_travel
 from tests.support.made_up import manifest_for
 from tests.support.strategies import changed

@@ -52,7 +52,7 @@ from analysis.signatures.subtasks import (
 from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
 from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
-from coartic.frames import movement_rows
+from coartic.rows import movement_rows
 from coartic.solution import other_arm_travel
 from tests.support.made_up import manifest_for
 from tests.support.strategies import changed, tiny_task

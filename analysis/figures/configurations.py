@@ -18,8 +18,8 @@ from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number
 from analysis.methods import LEARNER, short_name
 from analysis.signatures.trajectories import Trajectories
 from coartic import Execution, Task, execute
-from coartic.frames import movements_from
 from coartic.robot import Array
+from coartic.rows import movements_from
 from coartic.task import hands_of
 
 if TYPE_CHECKING:

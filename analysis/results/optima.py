@@ -56,7 +56,7 @@ class Entry(BaseModel):
     searches: dict[str, int] = {}
     """Reward that each search found, by method."""
     solution: tuple[dict[str, Any], ...] = ()
-    """Movements as :func:`coartic.frames.movements_from` reads them, in full precision."""
+    """Movements as :func:`coartic.rows.movements_from` reads them, in full precision."""
     infeasible: str = ""
     """Why no search has a solution."""
 

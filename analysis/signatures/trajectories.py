@@ -14,8 +14,8 @@ from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.subtasks import change_from
 from coartic import Execution, Hand, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
-from coartic.frames import movements_from
 from coartic.robot import Array
+from coartic.rows import movements_from
 
 if TYPE_CHECKING:
     from analysis.study import Study

@@ -15,7 +15,7 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import execute, load_task
-from coartic.frames import movements_from
+from coartic.rows import movements_from
 
 from .checkout import Driver, Ended, adopt_orphans, left_behind, read_json, run, size_of
 from .methods import ATTACKS, Attack, Expectation

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coartic.learner import LearningRun
+from coartic.learning import LearningRun
 from coartic.solution import Movement
 from coartic.task import Task
 
@@ -88,7 +88,7 @@ def movements_from(
     return tuple(movements)
 
 
-def runs_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
+def runs_table(runs: Iterable[LearningRun]) -> pd.DataFrame:
     """One row a run, in the order given; column ``run`` counts them from 0."""
     import pandas as pd
 
@@ -98,7 +98,7 @@ def runs_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
     return frame.astype(dict.fromkeys(integers, "Int64"))
 
 
-def solutions_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
+def solutions_table(runs: Iterable[LearningRun]) -> pd.DataFrame:
     """One row a movement of each run's best trial."""
     import pandas as pd
 
@@ -111,7 +111,7 @@ def solutions_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
     )
 
 
-def learning_frame(runs: Iterable[LearningRun]) -> pd.DataFrame:
+def learning_table(runs: Iterable[LearningRun]) -> pd.DataFrame:
     """One row a trial of each run: its total reward, missing where the trial failed."""
     import pandas as pd
 

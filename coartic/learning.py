@@ -1,0 +1,315 @@
+"""Runs of the dual-process learner (:mod:`coartic.learner`) and everything they found."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.errors import CoarticError, NotApplicableError
+from coartic.exploration import ExplorationCondition, load_condition
+from coartic.initial import InitialSearch, search_initial_hands
+from coartic.learner import (
+    COUNT,
+    LEARNED,
+    Kept,
+    Log,
+    empty_log,
+    empty_tables,
+    learn_kernel,
+    rules_of,
+    work_for,
+)
+from coartic.model import PAPER, MotionModel, checked_model
+from coartic.problem import problem_of
+from coartic.robot import HANDS, Array
+from coartic.solution import Execution, Movement, execute
+from coartic.task import Task, hands_of, letters_of
+from coartic.trials import make_trials
+
+TRIALS = 10_000  # trials of one run (printed)
+METHOD_PREFIX = "dual-process/"
+
+
+@dataclass(frozen=True)
+class Counters:
+    """What one run spent. The replay is not part of it."""
+
+    trials: int
+    """Trials made, trial 0 included."""
+    movement_ticks: int
+    """Control ticks of all trials, those of failed trials included."""
+    forward_kinematics: int
+    """Forward-kinematics evaluations the compiled kernels made. They skip steps that
+    cannot end a movement; a robot would sense its hand on every one of the ticks."""
+    jacobians: int
+    """Jacobian evaluations: one per corrective iteration and per biased movement."""
+    corrective_iterations: int
+    corrections: int
+    """Corrective movements made."""
+    failed_trials: int
+    """Trials that did not hit every goal: the corrective process did not converge, or
+    the variant has none for stored targets."""
+
+
+@dataclass(frozen=True)
+class LearningRun:
+    """One run of the learner and everything it found."""
+
+    task: Task
+    condition: ExplorationCondition
+    model: MotionModel
+    seed: int
+    initial_search: InitialSearch
+    """Hands of trial 0, and what a policy spent on finding them."""
+    rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
+    """Total reward of each trial, shape ``(trials,)``; masked where the trial failed."""
+    best_trial: int | None
+    """First trial with the highest total reward; None where none was completed."""
+    initial: tuple[Movement, ...]
+    """Movements of trial 0; none where it failed."""
+    solution: tuple[Movement, ...]
+    """Movements of the best trial."""
+    replay: tuple[Movement, ...]
+    """Movements of one noiseless greedy trial with the final tables."""
+    replay_completed: bool
+    values: Array
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand."""
+    targets: Array
+    """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
+    counters: Counters
+    wall_s: float
+    cpu_s: float
+
+    @property
+    def first_hands(self) -> str:
+        """Hands of trial 0."""
+        return self.initial_search.hands
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """Whether each trial hit every goal; the others failed and taught nothing."""
+        return ~np.ma.getmaskarray(self.rewards)
+
+    @property
+    def method(self) -> str:
+        """Method id of the learner under this condition."""
+        return f"{METHOD_PREFIX}{self.condition.id}"
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"infeasible"`` where no trial was completed."""
+        return "ok" if self.best_trial is not None else "infeasible"
+
+    @property
+    def reason(self) -> str:
+        """Why the run has no solution; empty where it has one."""
+        if self.best_trial is not None:
+            return ""
+        return (
+            f"the corrective process failed in all {self.counters.trials} trials; "
+            "no trial hit every goal"
+        )
+
+    @property
+    def reward(self) -> int | None:
+        """Learned reward: the highest total reward of any trial, max Q of state 1."""
+        return None if self.best_trial is None else int(self.rewards[self.best_trial])
+
+    @property
+    def hands(self) -> str | None:
+        """Hand sequence of the best trial."""
+        return _hands(self.solution) if self.best_trial is not None else None
+
+    @property
+    def initial_reward(self) -> int | None:
+        """Reward of trial 0."""
+        return int(self.rewards[0]) if self.completed[0] else None
+
+    @property
+    def replay_reward(self) -> int | None:
+        """Reward of the noiseless greedy trial with the final tables."""
+        if not self.replay_completed:
+            return None
+        return -sum(movement.ticks or 0 for movement in self.replay)
+
+    @property
+    def replay_hands(self) -> str | None:
+        """Hand sequence of the replay."""
+        return _hands(self.replay) if self.replay_completed else None
+
+    def execute(self) -> Execution:
+        """Execute the best trial again, apart from the learner."""
+        if self.best_trial is None:
+            raise CoarticError(f"nothing to execute: {self.reason}")
+        return execute(self.task, self.solution, model=self.model)
+
+
+def learn(
+    task: Task,
+    condition: str | ExplorationCondition,
+    *,
+    seed: int,
+    trials: int = TRIALS,
+    model: MotionModel = PAPER,
+) -> LearningRun:
+    """Run the learner on a task under an exploration condition.
+
+    The result depends on the arguments alone. Raises NotApplicableError where the
+    condition does not fit the task, CoarticError for an unknown condition and
+    ValueError for a negative seed, fewer than one trial, or a model that no movement can
+    be made with. Source: paper, Figure 3.
+    """
+    condition = load_condition(condition)
+    reason = condition.why_not(task)
+    if reason is not None:
+        raise NotApplicableError(reason)
+    if trials < 1:
+        raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
+    checked_model(model, radius=task.radius)
+    search = search_initial_hands(task, condition.hands, model=model)
+    if not getattr(learn_kernel, "signatures", True):
+        _Learning(task, condition, model, search.hands, seed, 0).perform()  # compiles it
+    learning = _Learning(task, condition, model, search.hands, seed, trials)
+    wall, cpu = time.perf_counter(), time.thread_time()
+    best_trial, replayed = learning.perform()
+    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    kept = learning.kept
+    return LearningRun(
+        task=task,
+        condition=condition,
+        model=model,
+        seed=seed,
+        initial_search=search,
+        rewards=np.ma.array(kept.rewards, mask=~kept.completed),
+        best_trial=int(best_trial) if best_trial >= 0 else None,
+        initial=_movements(kept.first),
+        solution=_movements(kept.best) if best_trial >= 0 else (),
+        replay=_movements(kept.replay),
+        replay_completed=bool(replayed),
+        values=learning.tables.value,
+        targets=learning.tables.target,
+        counters=_counters(trials, learning.work.counts),
+        wall_s=wall,
+        cpu_s=cpu,
+    )
+
+
+class _Learning:
+    """The arguments of one call of the kernel, and what it fills."""
+
+    def __init__(
+        self,
+        task: Task,
+        condition: ExplorationCondition,
+        model: MotionModel,
+        first_hands: str,
+        seed: int,
+        trials: int,
+    ) -> None:
+        goals, dof = len(task.goals), task.robot.dof
+        codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
+        self.first_hands = np.array(codes, dtype=np.int64)
+        self.problem = problem_of(task, model, nullspace_gain=condition.nullspace_gain)
+        self.rules = rules_of(task, condition)
+        self.tables = empty_tables(goals, dof)
+        self.kept = Kept(
+            rewards=np.zeros(trials, dtype=np.int64),
+            completed=np.zeros(trials, dtype=np.bool_),
+            first=empty_log(goals, dof),
+            best=empty_log(goals, dof),
+            replay=empty_log(goals, dof),
+        )
+        self.log = empty_log(goals, dof)
+        self.rng = np.random.default_rng(seed)
+        self.work = work_for(task)
+
+    def perform(self) -> tuple[int, bool]:
+        """Make all trials; best trial (or -1), replay completed."""
+        result: tuple[int, bool] = learn_kernel(
+            self.first_hands,
+            self.problem,
+            self.rules,
+            self.tables,
+            self.kept,
+            self.log,
+            self.rng,
+            self.work,
+        )
+        return result
+
+
+def learn_many(
+    task: Task,
+    condition: str | ExplorationCondition,
+    *,
+    seeds: Iterable[int],
+    trials: int = TRIALS,
+    model: MotionModel = PAPER,
+    jobs: int = -1,
+    on_done: Callable[[LearningRun], None] | None = None,
+) -> list[LearningRun]:
+    """Run :func:`learn` for many seeds in parallel; one run per seed, in their order.
+
+    ``jobs`` threads work at once, -1 for one per core; the kernels hold no lock and
+    the number changes nothing but the time. ``on_done`` is called after each run.
+    """
+    from joblib import Parallel, delayed
+
+    condition = load_condition(condition)
+    ordered: Sequence[int] = list(seeds)
+
+    def one(seed: int) -> LearningRun:
+        run = learn(task, condition, seed=seed, trials=trials, model=model)
+        if on_done is not None:
+            on_done(run)
+        return run
+
+    runs: list[LearningRun] = Parallel(n_jobs=jobs, prefer="threads")(
+        delayed(one)(seed) for seed in ordered
+    )
+    return runs
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them, so that no run's time contains it."""
+    from coartic.task import load_task
+
+    task = load_task("ascending")
+    learn(task, "EC1", seed=0, trials=1).execute()
+    make_trials(task, "RRR", np.empty((0, len(task.goals), task.robot.dof)))
+
+
+def _counters(trials: int, counts: NDArray[np.int64]) -> Counters:
+    iterations = int(counts[COUNT.iterations])
+    return Counters(
+        trials=trials,
+        movement_ticks=int(counts[COUNT.ticks]),
+        forward_kinematics=int(counts[COUNT.evaluations]),
+        jacobians=iterations + int(counts[COUNT.biased]),
+        corrective_iterations=iterations,
+        corrections=int(counts[COUNT.corrections]),
+        failed_trials=int(counts[COUNT.failed]),
+    )
+
+
+def _movements(log: Log) -> tuple[Movement, ...]:
+    return tuple(
+        Movement(
+            goal=int(log.goal[row]) + 1,
+            hand=HANDS[log.hand[row]],
+            kind="learned" if log.kind[row] == LEARNED else "corrective",
+            target=np.array(log.target[row]),
+            ticks=int(log.ticks[row]),
+        )
+        for row in range(int(log.count[0]))
+    )
+
+
+def _hands(movements: tuple[Movement, ...]) -> str:
+    by_goal = {movement.goal: movement.hand for movement in movements}
+    return letters_of([by_goal[goal] for goal in sorted(by_goal)])

@@ -1,0 +1,52 @@
+"""A task as the kernels read it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from coartic.compiled import inlined
+from coartic.corrective import Corrector
+from coartic.model import MotionModel
+from coartic.movement import Goal
+from coartic.robot import Arm
+from coartic.task import Task
+
+
+class Problem(NamedTuple):
+    """Task and constants."""
+
+    start: Any  # (dof,)
+    goals: Any  # (G, 2)
+    radius: float
+    left: Arm
+    right: Arm
+    corrector: Corrector
+    model: MotionModel
+
+
+def problem_of(task: Task, model: MotionModel, *, nullspace_gain: float = 0.0) -> Problem:
+    """The task for a kernel; ``nullspace_gain`` is that of the corrective process."""
+    locked = task.locked_base
+    return Problem(
+        start=np.array(task.q0),
+        goals=np.array(task.goal_array),
+        radius=float(task.radius),
+        left=task.robot.arm("left"),
+        right=task.robot.arm("right"),
+        corrector=Corrector("x" not in locked, "y" not in locked, float(nullspace_gain)),
+        model=model,
+    )
+
+
+@inlined
+def arm_of(problem: Any, hand: int) -> Any:
+    """The arm of a hand: 0 left, 1 right."""
+    return problem.left if hand == 0 else problem.right
+
+
+@inlined
+def goal_of(problem: Any, number: int) -> Any:
+    """A goal, from 0."""
+    return Goal(problem.goals[number, 0], problem.goals[number, 1], problem.radius)
