@@ -40,7 +40,8 @@ from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import problems_inline, read_text
 from coartic.learning import METHOD_PREFIX
 from coartic.method import Method
-from coartic.record import SEARCH, Values
+from coartic.record import SEARCH
+from coartic.stored import Values
 from coartic.text import LONGEST_LINE, did_you_mean, plain
 
 ENTRY_POINTS = "coartic.methods"

@@ -16,8 +16,9 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from coartic import CoarticError
+from coartic.codec import encode, read_record
 from coartic.files import clear_leftovers, write_atomically
-from coartic.record import Record, RecordError, encode, read_record
+from coartic.record import Record, RecordError
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from benchmarks.declaration import (
 )
 from benchmarks.provenance import environment, process_peak_mb
 from benchmarks.sandbox import THREADS
-from coartic import CoarticError, MotionModel, NotApplicableError, parse_task
+from coartic import CoarticError, MotionModel, NotApplicableError, Task, parse_task
 from coartic.errors import SolutionError
 from coartic.learning import warm_up
 from coartic.method import (
@@ -38,7 +38,7 @@ from coartic.method import (
     Session,
     UndeclaredError,
 )
-from coartic.record import PlainMovement
+from coartic.scores import PlainMovement
 
 _solved_before: set[str] = set()
 
@@ -72,23 +72,10 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
 
     Raises ForeignCodeError where this process runs other code than the job's.
     """
-    specification = job["specification"]
+    specification, foreign = job["specification"], job["foreign"]
     name = specification["method"]
-    foreign = None if job["foreign"] is None else Foreign(**job["foreign"])
-    try:
-        method_class = _method(name, foreign)
-        code = (
-            built_in_code(method_class.__module__) if foreign is None else _foreign_code(foreign)
-        )
-    except CoarticError as error:
-        raise ForeignCodeError(f"method {name!r}: {error}") from None
-    if code != job["code"]:
-        raise ForeignCodeError(
-            f"method {name!r} has code {code} here and {job['code']} where the suite was "
-            "started; install the same version everywhere"
-        )
+    method_class = _method_as_asked(name, None if foreign is None else Foreign(**foreign), job)
     task = parse_task(specification["task"], "specification", reach=job["reach"])
-    method = method_class(method_class.Parameters(**specification["parameters"]))
     session = Session(
         task,
         specification["seed"],
@@ -97,33 +84,13 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
         trial_budget=specification["trial_budget"],
         trusted=foreign is None,
     )
+    method = method_class(method_class.Parameters(**specification["parameters"]))
     warm = name in _solved_before
     _solved_before.add(name)
-
-    status, reason = "ok", ""
-    stated: dict[str, Any] = {}
     wall, cpu = time.perf_counter(), time.process_time()
-    try:
-        reason_not = reason_against(method_class, task, specification["parameters"])
-        if reason_not is not None:
-            raise MethodError("infeasible", reason_not)
-        stated = _stated(method.solve(session), session)
-    except MethodError as error:
-        status, reason, stated = error.outcome, str(error), {"details": error.details}
-    except UndeclaredError as error:
-        status, reason = "crashed", str(error)
-    except BudgetError as error:
-        status, reason = "crashed", f"the method did not keep to its budget: {error}"
-    except (_ResultError, SolutionError) as error:
-        status, reason = "solver-failed", str(error)
-    except NotApplicableError as error:
-        status, reason = "infeasible", str(error)
-    except (Exception, SystemExit, KeyboardInterrupt) as error:
-        status, reason = "crashed", brief(error)
+    stated = _outcome(method, specification["parameters"], task, session)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     return {
-        "status": status,
-        "reason": reason,
         **stated,
         "used": sorted(session.used),
         "meter": session.meter.as_dict(),
@@ -141,6 +108,47 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
             "command": job["command"],
         },
     }
+
+
+def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) -> type[Method]:
+    """The method of a job, with the job's code. Raises ForeignCodeError otherwise."""
+    try:
+        method = _method(name, foreign)
+        code = built_in_code(method.__module__) if foreign is None else _foreign_code(foreign)
+    except CoarticError as error:
+        raise ForeignCodeError(f"method {name!r}: {error}") from None
+    if code != job["code"]:
+        raise ForeignCodeError(
+            f"method {name!r} has code {code} here and {job['code']} where the suite was "
+            "started; install the same version everywhere"
+        )
+    return method
+
+
+def _outcome(
+    method: Method, parameters: dict[str, Any], task: Task, session: Session
+) -> dict[str, Any]:
+    """Status, reason, and the result as plain data where there is one."""
+    status, reason = "ok", ""
+    stated: dict[str, Any] = {}
+    try:
+        reason_not = reason_against(type(method), task, parameters)
+        if reason_not is not None:
+            raise MethodError("infeasible", reason_not)
+        stated = _stated(method.solve(session), session)
+    except MethodError as error:
+        status, reason, stated = error.outcome, str(error), {"details": error.details}
+    except UndeclaredError as error:
+        status, reason = "crashed", str(error)
+    except BudgetError as error:
+        status, reason = "crashed", f"the method did not keep to its budget: {error}"
+    except (_ResultError, SolutionError) as error:
+        status, reason = "solver-failed", str(error)
+    except NotApplicableError as error:
+        status, reason = "infeasible", str(error)
+    except (Exception, SystemExit, KeyboardInterrupt) as error:
+        status, reason = "crashed", brief(error)
+    return {"status": status, "reason": reason, **stated}
 
 
 class _ResultError(ValueError):

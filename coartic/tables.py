@@ -21,18 +21,9 @@ from pydantic import Field
 from coartic.errors import NotApplicableError
 from coartic.initial import hand_sequences, ranked_sequences
 from coartic.method import Information, Meter
-from coartic.record import (
-    Count,
-    Environment,
-    Plain,
-    PlainMovement,
-    Reason,
-    Record,
-    Seed,
-    TaskContent,
-    Values,
-    content_hash,
-)
+from coartic.record import Environment, Record
+from coartic.scores import PlainMovement
+from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
 from coartic.task import Task, parse_task
 from coartic.text import Line
 

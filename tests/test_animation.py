@@ -24,7 +24,8 @@ from coartic import (
     load_task,
     trajectory,
 )
-from coartic.record import decode, encode, solved
+from coartic.codec import decode, encode
+from coartic.scores import solved
 from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
 

@@ -14,7 +14,7 @@ from coartic import (
     load_task,
 )
 from coartic.errors import SolutionError
-from coartic.record import MOST_STEPS, solved
+from coartic.scores import MOST_STEPS, solved
 from tests.support.strategies import PAPER_CELLS, tiny_task
 
 

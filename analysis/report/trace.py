@@ -22,7 +22,7 @@ from analysis.report.trace_file import (
 )
 from analysis.results.optima import SHIPPED
 from coartic import CoarticError, builtin_tasks
-from coartic.record import content_hash
+from coartic.stored import content_hash
 from coartic.text import one_line, shell_line
 
 _COMPANIONS = {

@@ -18,7 +18,7 @@ from analysis.report.numbers import Number
 from analysis.report.tables.methods import READING_OF_METHODS
 from analysis.report.text import heads, texts
 from coartic import CoarticError
-from coartic.record import content_hash
+from coartic.stored import content_hash
 from coartic.text import json_text, shell_line
 
 if TYPE_CHECKING:

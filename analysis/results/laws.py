@@ -21,7 +21,8 @@ from pydantic import ValidationError
 from coartic import PAPER, CoarticError, parse_task
 from coartic.inputs import read_bytes
 from coartic.inputs import problems_inline
-from coartic.record import Record, RecordError, read_record, run_seed
+from coartic.codec import read_record
+from coartic.record import Record, RecordError, run_seed
 from coartic.tables import (
     BUILT_IN,
     FORMAT,

@@ -18,7 +18,7 @@ from analysis.results.laws import read_manifest
 from benchmarks.store import Store
 from benchmarks.tables import write_tables
 from coartic import PAPER, CoarticError
-from coartic.record import solved
+from coartic.scores import solved
 
 from .checkout import PART_OF_A_FOLDER, Ended, in_process
 from .edits import accepted, edits, finished

@@ -1,0 +1,111 @@
+"""Scores: a solution executed apart from its method, as it is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from coartic.errors import IncompleteError, SolutionError
+from coartic.model import MotionModel
+from coartic.movement import configuration
+from coartic.robot import Hand
+from coartic.solution import Execution, Kind, Movement, execute, other_arm_travel
+from coartic.stored import Amount, Count, Plain, Reward
+from coartic.task import Task
+
+MOST_MOVEMENTS = 10_000
+"""Movements of one solution."""
+MOST_STEPS = 1_000_000
+"""Movement steps along one solution, its targets visited in order: thousands do."""
+
+
+class PlainMovement(Plain):
+    """A movement as it is stored; see :class:`coartic.solution.Movement`."""
+
+    goal: Annotated[int, Field(ge=1)]
+    hand: Hand
+    kind: Kind
+    target: tuple[float, ...] | None = None
+    ticks: Count | None = None
+    waypoints: tuple[tuple[float, ...], ...] | None = None
+
+    @classmethod
+    def of(cls, movement: Movement) -> PlainMovement:
+        """A movement as plain data; pydantic's ValidationError for one that is none."""
+        target, waypoints = movement.target, movement.waypoints
+        return cls(
+            goal=movement.goal,
+            hand=movement.hand,
+            kind=movement.kind,
+            target=None if target is None else tuple(np.asarray(target, np.float64).tolist()),
+            ticks=movement.ticks,
+            waypoints=None
+            if waypoints is None
+            else tuple(tuple(np.asarray(point, np.float64).tolist()) for point in waypoints),
+        )
+
+    def movement(self) -> Movement:
+        """The movement itself."""
+        return Movement(
+            goal=self.goal,
+            hand=self.hand,
+            kind=self.kind,
+            target=None if self.target is None else np.array(self.target),
+            ticks=self.ticks,
+            waypoints=None if self.waypoints is None else np.array(self.waypoints),
+        )
+
+
+class Solved(Plain):
+    """A solution as it was executed, and its score."""
+
+    reward: Reward
+    hands: Annotated[str, Field(pattern="^[LR]+$")]
+    ticks_by_goal: tuple[Count, ...]
+    corrections: Count
+    """Corrective movements that were needed."""
+    other_arm_travel: Amount
+    """Of the arm that is not chosen, rad."""
+    movements: Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
+
+    def brief(self) -> str:
+        """The score in words."""
+        return f"{self.reward} with {self.hands}, ticks {list(self.ticks_by_goal)}"
+
+
+def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solved:
+    """Execute a solution apart from its method: the only score that counts.
+
+    Raises SolutionError where it breaks the task's rules, IncompleteError where it does not
+    hit every goal, and what :func:`coartic.solution.execute` raises.
+    """
+    if len(solution) > MOST_MOVEMENTS:
+        raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are kept")
+    corners = [task.q0]
+    for movement in solution:
+        path = () if movement.waypoints is None else movement.waypoints
+        corners += [configuration(task.robot, point) for point in path]
+        if movement.target is not None:
+            corners.append(configuration(task.robot, movement.target))
+    steps = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()) / model.step
+    if steps > MOST_STEPS:
+        raise SolutionError(f"its way is {steps:.0f} steps long; at most {MOST_STEPS} are made")
+    execution = execute(task, solution, model=model)
+    if not execution.completed:
+        raise IncompleteError(execution.reason)
+    return _scored(task, execution)
+
+
+def _scored(task: Task, execution: Execution) -> Solved:
+    assert execution.reward is not None
+    return Solved(
+        reward=execution.reward,
+        hands=execution.hands,
+        ticks_by_goal=execution.ticks_by_goal(),
+        corrections=execution.corrections,
+        other_arm_travel=other_arm_travel(task, execution),
+        movements=tuple(map(PlainMovement.of, execution.movements)),
+    )
