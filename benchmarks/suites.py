@@ -50,6 +50,7 @@ from coartic.tables import (
     Plan,
     PlanLimits,
     PlannedCell,
+    label_of,
     trials_in,
     variant_of,
 )
@@ -196,7 +197,7 @@ class Cell:
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
 
 def suites() -> dict[str, Suite]:

@@ -27,7 +27,7 @@ from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, cont
 from coartic.task import Task, parse_task
 from coartic.text import Line
 
-FORMAT = 4  # of manifest and tables; raised when one of them changes its meaning
+FORMAT: Literal[5] = 5  # of manifest and tables; raised when one of them changes its meaning
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""
@@ -39,6 +39,7 @@ RUNS = pa.schema(
         ("task", pa.string()),
         ("method", pa.string()),
         ("variant", pa.string()),  # parameters that differ from the method's defaults
+        ("label", pa.string()),  # the method with its variant
         ("run", pa.int32()),  # 0-based
         ("seed", pa.int64()),
         ("status", pa.string()),  # ok, infeasible, solver-failed, timeout, crashed
@@ -132,6 +133,11 @@ class PlannedCell(Plain):
     """All of them, as its runs have them."""
     run_ids: tuple[Line, ...]
 
+    @property
+    def label(self) -> str:
+        """The method with its variant."""
+        return label_of(self.method, self.variant)
+
 
 class Plan(Plain):
     """What a suite asked for, all of it."""
@@ -160,7 +166,7 @@ class PlanLimits(Plain):
 class Manifest(Plain):
     """``manifest.json``: what was asked for and with what it was made."""
 
-    format: Literal[4] = 4
+    format: Literal[5] = FORMAT
     specification: Plan
     limits: PlanLimits
     environment: Environment
@@ -190,6 +196,11 @@ def variant_of(parameters: Mapping[str, Any], defaults: Mapping[str, Any]) -> st
         for name, value in parameters.items()
         if name not in defaults or value != defaults[name]
     )
+
+
+def label_of(method: str, variant: str) -> str:
+    """A method with its variant, as everything names it that has no room for both."""
+    return f"{method} {variant}".strip()
 
 
 def tables_of(manifest: Manifest, records: Mapping[str, Record]) -> dict[str, pa.Table]:
@@ -230,6 +241,7 @@ def _run_row(suite: str, cell: PlannedCell, record: Record) -> dict[str, Any]:
         "task": cell.task,
         "method": cell.method,
         "variant": cell.variant,
+        "label": cell.label,
         "run": record.run,
         "seed": specification.seed,
         "status": record.status,

@@ -44,6 +44,7 @@ from benchmarks.store import Store
 from benchmarks.suites import Cell
 from coartic import CoarticError, cli, load_task
 from coartic.record import Commit
+from coartic.tables import label_of
 from coartic.text import json_text, one_line, plain, printed, shell_line
 from tests.support.commands import call
 from tests.support.made_up import replanned
@@ -341,6 +342,7 @@ def named(results):
         commit=EVIL,
         packages=EVIL,
     )
+    runs["label"] = list(map(label_of, runs.method, runs.variant))
     failed = runs.status != "ok"
     runs.loc[failed, "reason"] = EVIL
     runs.loc[failed, "status"] = f"crashed{EVIL}"

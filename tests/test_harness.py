@@ -39,7 +39,7 @@ from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables, suite_of
 
 FIRST_COLUMNS = [
-    *"run_id suite task method variant run seed status reason hands reward".split(),
+    *"run_id suite task method variant label run seed status reason hands reward".split(),
     *"replay_reward replay_hands initial_reward initial_hands best_trial trials".split(),
 ]
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"

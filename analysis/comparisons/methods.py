@@ -16,6 +16,7 @@ from analysis.results.optima import locks_base
 from analysis.statistics.spread import sd
 from analysis.words import tally
 from coartic.method import Information
+from coartic.tables import label_of
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -80,7 +81,7 @@ class MethodRow:
     @property
     def label(self) -> str:
         """Name of the method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
     @property
     def evaluations(self) -> float:

@@ -32,6 +32,7 @@ from analysis.statistics.estimates import (
 from analysis.study import CellKey, Study, load
 from coartic import CoarticError
 from coartic.robot import Array
+from coartic.tables import label_of
 
 SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
 """Spends whose medians are compared; the last one is wall time, s."""
@@ -104,7 +105,7 @@ class VersionRow:
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
     def spent(self, name: str) -> tuple[float, float]:
         """What A and B spent, of :data:`SPENT`."""

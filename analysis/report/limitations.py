@@ -87,10 +87,9 @@ def _failures(study: Study) -> Iterator[str]:
         yield f"*Failures.* None: all {len(runs)} runs have a solution, executed and scored."
     for key, own in failed.groupby(["task", "status"], sort=False):
         task, status = map(str, key)
-        labels = (own.method + " " + own.variant).str.strip()
         cells = ", ".join(
             f"{code(str(label))} ({count} of {len(study.cells[task, str(label)].runs)})"
-            for label, count in labels.value_counts(sort=False).items()
+            for label, count in own.label.value_counts(sort=False).items()
         )
         others = ", and other reasons" if own.reason.nunique() > 1 else ""
         yield (

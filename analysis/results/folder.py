@@ -10,7 +10,7 @@ import pandas as pd
 
 from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
-from coartic.tables import Manifest
+from coartic.tables import Manifest, label_of
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class CellRuns:
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
     @property
     def good(self) -> pd.DataFrame:

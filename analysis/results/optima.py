@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict
 from analysis.results.folder import Results, load_results
 from analysis.results.laws import BASE
 from coartic import CoarticError, Task
+from coartic.tables import label_of
 from coartic.files import write_atomically
 from coartic.record import SEARCH
 from coartic.text import one_line
@@ -204,7 +205,7 @@ def _searches(runs: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], p
     other_arm = asked.map(lambda parameters: parameters.get("other_arm", "free"))
     kept = good[(base == BASE) & (other_arm == arm)]
     for (task, method, variant), own in kept.groupby(["task", "method", "variant"], sort=False):
-        yield (str(task), f"{method} {variant}".strip()), own
+        yield (str(task), label_of(str(method), str(variant))), own
 
 
 def _from_runs(runs: pd.DataFrame) -> Optimum:

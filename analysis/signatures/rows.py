@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from coartic.tables import label_of
+
 NO_RUN = "no run has a solution"
 ONE_HAND = "the task has one hand"
 NO_INITIAL = "the corrective process alone does not complete the task"
@@ -86,7 +88,7 @@ class SignatureRow(Value):
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return f"{self.method} {self.variant}".strip()
+        return label_of(self.method, self.variant)
 
 
 Measure = Callable[..., Iterator[Value]]
