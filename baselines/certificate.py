@@ -22,7 +22,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import clarabel
@@ -131,8 +131,8 @@ class _Relaxation:
     def __init__(
         self, task: Task, hands: tuple[Hand, ...], merged: tuple[int, ...], still: bool
     ) -> None:
-        robot, dof, goals = task.robot, task.robot.dof, len(hands)
-        arms = [robot.arm(hand) for hand in hands]
+        dof, goals = task.robot.dof, len(hands)
+        arms = [task.robot.arm(hand) for hand in hands]
         self.hands = letters_of(hands)
         self.moves = goals - len(merged)
         links = [(g, k) for g in range(goals) for k in range(len(arms[g].links))]
@@ -155,58 +155,35 @@ class _Relaxation:
         self._relative = np.array([k + 1 for _, k in links])
         self._lengths = np.array([arms[g].links[k] for g, k in links])
 
-        rows: list[Array] = []
-        right: list[float] = []
-        self._cones: list[object] = []
-
-        def add(entries: dict[int, float], constant: float) -> None:
-            """One row of a cone: it holds ``constant + entries · x``."""
-            dense = np.zeros(self._size)
-            for column, value in entries.items():
-                dense[column] -= value
-            rows.append(dense)
-            right.append(constant)
-
-        def change(g: int, joint: int) -> None:
-            if g:
-                add({g * dof + joint: 1.0, (g - 1) * dof + joint: -1.0}, 0.0)
-            else:
-                add({joint: 1.0}, -q0[joint])
-
-        held = 0
+        cones = _Cones(self._size)
         for g, hand in enumerate(hands):
-            stiff = {{"x": 0, "y": 1}[axis] for axis in task.locked_base}
-            for other in HANDS:
-                if other != hand and (still or other not in task.hands):
-                    stiff |= set(range(dof)[robot.joints(other)])
-            for joint in range(dof) if g in merged else sorted(stiff):
-                change(g, joint)
-                held += 1
-        if held:
-            self._cones.append(clarabel.ZeroConeT(held))
+            stiff = range(dof) if g in merged else _stiff_joints(task, hand, still)
+            for joint in stiff:
+                cones.add_change(q0, g, joint)
+        cones.close(clarabel.ZeroConeT)
         for g, arm in enumerate(arms):
-            add({int(lengths[g]): 1.0}, 0.0)
+            cones.add({int(lengths[g]): 1.0}, 0.0)
             for joint in range(dof):
-                change(g, joint)
-            self._cones.append(clarabel.SecondOrderConeT(dof + 1))
+                cones.add_change(q0, g, joint)
+            cones.close(clarabel.SecondOrderConeT)
             own = [
-                (int(column), link)
+                (int(column), arm.links[k])
                 for column, (goal, k) in zip(self._directions, links, strict=True)
                 if goal == g
-                for link in [arm.links[k]]
             ]
-            add({}, task.radius)
+            cones.add({}, task.radius)
             for axis, shoulder in enumerate((arm.shoulder_x, arm.shoulder_y)):
                 reach = {column + axis: link for column, link in own}
-                add({g * dof + axis: 1.0, **reach}, shoulder - task.goals[g][axis])
-            self._cones.append(clarabel.SecondOrderConeT(3))
+                cones.add({g * dof + axis: 1.0, **reach}, shoulder - task.goals[g][axis])
+            cones.close(clarabel.SecondOrderConeT)
             for column, _ in own:
-                add({}, 1.0)
-                add({column: 1.0}, 0.0)
-                add({column + 1: 1.0}, 0.0)
-                self._cones.append(clarabel.SecondOrderConeT(3))
-        self._fixed = sparse.csr_matrix(np.array(rows))
-        self._right = np.array(right)
+                cones.add({}, 1.0)
+                cones.add({column: 1.0}, 0.0)
+                cones.add({column + 1: 1.0}, 0.0)
+                cones.close(clarabel.SecondOrderConeT)
+        self._cones = cones.closed
+        self._fixed = sparse.csr_matrix(np.array(cones.rows))
+        self._right = np.array(cones.right)
         self._settings = clarabel.DefaultSettings()
         self._settings.verbose = False
         self._settings.max_threads = 1
@@ -285,6 +262,48 @@ class _Relaxation:
             np.tile(self._angles, (count, 1))
         )
         return sparse.csr_matrix(entries + angles), (offsets + turn * middle).ravel()
+
+
+class _Cones:
+    """Rows ``constant + entries · x`` of cones, as Clarabel has them, one cone after another."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self.rows: list[Array] = []
+        self.right: list[float] = []
+        self.closed: list[object] = []
+        self._in_closed = 0
+
+    def add(self, entries: dict[int, float], constant: float) -> None:
+        """A row of the cone that is closed next."""
+        dense = np.zeros(self._size)
+        for column, value in entries.items():
+            dense[column] -= value
+        self.rows.append(dense)
+        self.right.append(constant)
+
+    def add_change(self, q0: Array, g: int, joint: int) -> None:
+        """The change of a joint on the way to a goal, from 0."""
+        if g:
+            self.add({g * len(q0) + joint: 1.0, (g - 1) * len(q0) + joint: -1.0}, 0.0)
+        else:
+            self.add({joint: 1.0}, -q0[joint])
+
+    def close(self, kind: Callable[[int], object]) -> None:
+        """Make a cone of the rows since the last one, if there are any."""
+        count = len(self.rows) - self._in_closed
+        if count:
+            self.closed.append(kind(count))
+        self._in_closed = len(self.rows)
+
+
+def _stiff_joints(task: Task, hand: Hand, still: bool) -> list[int]:
+    """Joints that cannot move on the way to a goal of this hand."""
+    stiff = {{"x": 0, "y": 1}[axis] for axis in task.locked_base}
+    for other in HANDS:
+        if other != hand and (still or other not in task.hands):
+            stiff |= set(range(task.robot.dof)[task.robot.joints(other)])
+    return sorted(stiff)
 
 
 def _normals(half: Array) -> Array:

@@ -36,6 +36,7 @@ _DERIVATIVES: dict[Cost, int] = {
     "acceleration": 1,
     "jerk": 2,
 }
+_CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
@@ -119,36 +120,20 @@ class TrajectoryProblem:
         right = casadi.SX.sym("right", goals)  # 1 where the right hand is chosen
         weights = casadi.SX.sym("weights", 2)  # of path length and of depth
 
-        misses, q = [], q0
+        limits, q = [], q0
         for g in range(goals):
             q = q + steps[:, g]
-            positions = {hand: robot.symbolic_hand(q, hand) for hand in hands}
-            hand = (
-                right[g] * positions["right"] + (1 - right[g]) * positions["left"]
-                if len(hands) == 2
-                else positions[hands[0]]
-            )
-            misses.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
-        limits = list(misses)
-        lower = [-np.inf] * goals
+            hand = _chosen_hand({hand: robot.symbolic_hand(q, hand) for hand in hands}, right[g])
+            limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
             # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
             limits += [casadi.sumsqr(steps[:, g]) - lengths[g] ** 2 for g in range(goals)]
-            lower += [-np.inf] * goals
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
         else:
-            objective = sum(
-                (
-                    _segment_cost(
-                        cost,
-                        steps[:, g],
-                        durations[g],
-                        [(r[:, g], r[:, g + 1]) for r in rates],
-                    )
-                    for g in range(goals)
-                ),
-                casadi.SX(0),
-            )
+            ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
+            costs = [_segment_cost(cost, steps[:, g], durations[g], ends[g]) for g in range(goals)]
+            objective = sum(costs, casadi.SX(0))
+        lower = [-np.inf] * len(limits)
         upper = [0.0] * len(limits)
         if order:
             limits.append(casadi.sum1(durations) - goals)
@@ -185,40 +170,20 @@ class TrajectoryProblem:
         segments' durations vary at a constant total (smoothness costs only). A solve that
         fails is a plan that has not converged.
         """
-        goals, dof, order = self.goals, self.robot.dof, self._order
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
-        step_bound = np.where(instance.held, 0.0, np.inf)
-
-        at = np.sqrt((steps**2).sum(axis=1))
-        low, high = np.zeros(goals), np.full(goals, np.inf)
-        if self.cost != "path-length":
-            at, high = np.zeros(goals), np.zeros(goals)
-        elif lengths is not None:
-            given = ~np.isnan(lengths)
-            at[given] = low[given] = high[given] = lengths[given]
-        times = np.ones(goals)
-        shortest, longest = times, times
-        if free_times and order:
-            times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
-            times = np.maximum(times * (goals / times.sum()), 0.1)
-            times *= goals / times.sum()
-            shortest = np.full(goals, _SHORTEST[self.cost])
-            longest = np.full(goals, float(goals))
+        step_bound = np.where(instance.held, 0.0, np.inf).ravel()
+        rate_bound = self._rate_bound(instance)
+        at, low, high = self._length_bounds(steps, lengths)
+        times, shortest, longest = self._time_bounds(steps, free_times)
         rim = instance.radius - _RIM
-        chosen = np.zeros(goals)
+        chosen = np.zeros(self.goals)
         chosen[[] if deep is None else list(deep)] = 1.0
         deepest = 0.0 if deep is None else rim
-        # A rate is zero at rest (start and end) and for joints held on either side.
-        still = np.vstack([instance.held[:1] | True, instance.held])
-        still[:-1] |= instance.held
-        still[-1] = True
-        rate_bound = np.tile(np.where(still, 0.0, np.inf).ravel(), order)
-
         solution = self._solver(
             x0=np.concatenate([steps.ravel(), at, times, [0.0], np.zeros(rate_bound.size)]),
-            lbx=np.concatenate([-step_bound.ravel(), low, shortest, [0.0], -rate_bound]),
-            ubx=np.concatenate([step_bound.ravel(), high, longest, [deepest], rate_bound]),
+            lbx=np.concatenate([-step_bound, low, shortest, [0.0], -rate_bound]),
+            ubx=np.concatenate([step_bound, high, longest, [deepest], rate_bound]),
             lbg=self._lower,
             ubg=self._upper,
             p=np.concatenate(
@@ -232,24 +197,52 @@ class TrajectoryProblem:
                 ]
             ),
         )
+        return self._plan(instance, solution)
+
+    def _rate_bound(self, instance: Instance) -> Array:
+        """Most of every rate: 0 at rest (start and end) and for joints held on either side."""
+        still = np.vstack([instance.held[:1] | True, instance.held])
+        still[:-1] |= instance.held
+        still[-1] = True
+        return np.tile(np.where(still, 0.0, np.inf).ravel(), self._order)
+
+    def _length_bounds(self, steps: Array, lengths: Array | None) -> tuple[Array, Array, Array]:
+        """Lengths of the segments to start from, with their least and most."""
+        if self.cost != "path-length":
+            return np.zeros(self.goals), np.zeros(self.goals), np.zeros(self.goals)
+        at = np.sqrt((steps**2).sum(axis=1))
+        low, high = np.zeros(self.goals), np.full(self.goals, np.inf)
+        if lengths is not None:
+            given = ~np.isnan(lengths)
+            at[given] = low[given] = high[given] = lengths[given]
+        return at, low, high
+
+    def _time_bounds(self, steps: Array, free: bool) -> tuple[Array, Array, Array]:
+        """Durations of the segments to start from, with their least and most."""
+        goals = self.goals
+        if not (free and self._order):
+            return np.ones(goals), np.ones(goals), np.ones(goals)
+        times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
+        times = np.maximum(times * (goals / times.sum()), 0.1)
+        times *= goals / times.sum()
+        return times, np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
+
+    def _plan(self, instance: Instance, solution: dict[str, Any]) -> Plan:
+        """What IPOPT gave; its word is checked: every limit it was given holds."""
+        goals, dof = self.goals, self.robot.dof
         x = np.asarray(solution["x"]).ravel()
         limits = np.asarray(solution["g"]).ravel()
         statistics = self._solver.stats()
         end = goals * dof
-        configurations = instance.q0 + np.cumsum(x[:end].reshape(goals, dof), axis=0)
-        # IPOPT's word is checked: every limit it was given holds.
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
-        converged = statistics["return_status"] in (
-            "Solve_Succeeded",
-            "Solved_To_Acceptable_Level",
-        ) and bool(np.isfinite(x).all() and violation < 1e-8)
         return Plan(
-            converged=converged,
+            converged=statistics["return_status"] in _CONVERGED
+            and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
-            configurations=configurations,
+            configurations=instance.q0 + np.cumsum(x[:end].reshape(goals, dof), axis=0),
             cost=float(solution["f"]),
             durations=x[end + goals : end + 2 * goals],
-            rates=x[end + 2 * goals + 1 :].reshape(order, goals + 1, dof),
+            rates=x[end + 2 * goals + 1 :].reshape(self._order, goals + 1, dof),
             spent={
                 "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
                 "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),
@@ -258,6 +251,13 @@ class TrajectoryProblem:
                 "solver_iterations": statistics["iter_count"],
             },
         )
+
+
+def _chosen_hand(positions: dict[Hand, Any], right: Any) -> Any:
+    """Position of the hand that a parameter chooses, 1 for the right one."""
+    if len(positions) == 1:
+        return next(iter(positions.values()))
+    return right * positions["right"] + (1 - right) * positions["left"]
 
 
 def _segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
