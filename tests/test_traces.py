@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import analysis.study
+from analysis.report.document import Document
+from analysis.report.numbers import Number
 from analysis.report.trace import trace, trace_text
-from analysis.report.trace_file import FILE
+from analysis.report.trace_file import FILE, trace_json
 from analysis.results import optima as shipped
 from analysis.results.folder import load_results
 from analysis.statistics import estimates as statistics
@@ -562,6 +564,31 @@ def test_what_the_command_makes(home, records):
     assert len(both) == 2
     assert f"  makes {runs} runs, of which these 4\n" in text
     assert "makes" not in trace_text(trace(home, "coarticTwoArmedOneECThreeReward"))
+
+
+@pytest.mark.parametrize(
+    ("command", "shown", "anew"),
+    [
+        (("__main__.py", "run", "paper"), ["python", "-m", "coartic", "run", "paper"], True),
+        (("coartic", "run", "paper"), ["coartic", "run", "paper"], True),
+        (("coartic", "run", "/home/a/own.toml"), ["coartic", "run", "own.toml"], False),
+        (("own.py",), ["own.py"], False),
+    ],
+)
+def test_runs_are_made_anew_without_files_of_the_users_own(study, tmp_path, command, shown, anew):
+    """However coartic was started."""
+    manifest = study.results.manifest
+    environment = manifest.environment.model_copy(update={"command": command})
+    manifest = manifest.model_copy(update={"environment": environment})
+    started = Study(replace(study.results, manifest=manifest))
+    cells = {key: tuple(cell.runs.run_id) for key, cell in started.cells.items()}
+    number = Number("coarticX", "x", 1.0, 1, "ticks", cells=(next(iter(cells)),))
+    text = trace_json(started, Document("t", (), runs=cells), [number])
+    (tmp_path / FILE).write_text(text, encoding="utf-8")
+    found = trace(tmp_path, "coarticX")
+    assert list(found.environment.command) == shown
+    assert bool(found.sources[0].command) == anew
+    assert ("\nanew: coartic run" in trace_text(found)) == anew
 
 
 SEARCH, BOUND = "optimum/dynamic-programming", "optimum/branch-and-bound"

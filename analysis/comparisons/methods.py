@@ -14,8 +14,8 @@ from analysis.results.optima import locks_base
 from analysis.statistics.spread import sd
 from analysis.words import tally
 from coartic.method import Information
-from coartic.tables import label_of
 from coartic.record import SEARCH
+from coartic.tables import label_of
 
 if TYPE_CHECKING:
     from analysis.study import Study
