@@ -82,7 +82,7 @@ class Study:
     @cached_property
     def optima(self) -> dict[tuple[str, str], Optimum]:
         """Best known solutions by task and other arm (``free``, ``still``)."""
-        return optima(self.results)
+        return optima(self)
 
     @cached_property
     def method_rows(self) -> dict[CellKey, MethodRow]:

@@ -6,9 +6,8 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-import analysis.report.build
 from analysis import load
-from tests.support.reports import SVG
+from tests.support import reports
 from tests.support.suites import run_and_write, traced_cells, with_environment
 
 # Continuous integration tries the same examples every time; people, new ones.
@@ -18,13 +17,10 @@ settings.load_profile("ci" if os.environ.get("CI") else "people")
 
 
 @pytest.fixture
-def undrawn(monkeypatch):
+def undrawn():
     """Reports without figures, which take long and have tests of their own."""
-    monkeypatch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
-    monkeypatch.setattr(
-        analysis.report.build, "rendered",
-        lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
-    )  # fmt: skip
+    with reports.undrawn():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -11,15 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import analysis.study
+from analysis.report.document import Document
+from analysis.report.numbers import Number
 from analysis.report.trace import trace, trace_text
-from analysis.report.trace_file import FILE
+from analysis.report.trace_file import FILE, trace_json
 from analysis.results import optima as shipped
 from analysis.results.folder import load_results
 from analysis.statistics import estimates as statistics
 from analysis.study import Study
 from benchmarks.suites import Cell
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
-from tests.support.reports import compiled, report_of
+from tests.support.reports import compiled, document_of, report_of
 from tests.support.suites import KNOWN, run_and_write, with_environment
 
 
@@ -502,6 +505,39 @@ def test_what_no_runs_are_behind(home):
         assert trace_text(found).splitlines()[-1] == f"runs: none; this value is {origin}"
 
 
+def values(document):
+    """Raw values by table, column and row."""
+    return {
+        (table.id, column.name, row.key): value
+        for table in document.tables()
+        for row in table.rows
+        for column, value in zip(table.columns, row.values, strict=True)
+    }
+
+
+def test_every_column_says_what_it_rests_on(study, monkeypatch):
+    """With another optimum those change that say that they rest on it."""
+    document = document_of(study)
+    columns = {(t.id, column.name): column for t in document.tables() for column in t.columns}
+    assert [key for key, c in columns.items() if c.kind != "text" and not c.rests_on] == []
+    better = {"free": 9, "still": 6}
+    others = {
+        (task, arm): replace(best, reward=best.reward + better[arm], bound=None)
+        for (task, arm), best in study.optima.items()
+    }
+    monkeypatch.setattr(analysis.study, "optima", lambda study: others)
+    other = values(document_of(Study(study.results)))
+    before = values(document)
+    both = before.keys() & other.keys()  # methods that come near the optimum no more have no row
+    assert len(both) > 0.9 * len(before)
+    changed = {key[:2] for key in both if repr(before[key]) != repr(other[key])}
+    saying = {key for key, column in columns.items() if "optimum" in column.rests_on}
+    assert changed - saying == set()
+    kinds = [{re.sub(r"\d+", "", name) for _, name in keys} for keys in (saying, changed)]
+    assert kinds[0] == kinds[1]  # within_1 of all, where one or another changes
+    assert len(changed) > 40
+
+
 def test_a_cell_of_a_table_says_how(home):
     found = trace(home, "methods-ascending", ("dual-process/EC1", "reward"))
     assert found.how.startswith("reward (ticks), SD, 95 % interval. Reward: of the runs that")
@@ -528,6 +564,31 @@ def test_what_the_command_makes(home, records):
     assert len(both) == 2
     assert f"  makes {runs} runs, of which these 4\n" in text
     assert "makes" not in trace_text(trace(home, "coarticTwoArmedOneECThreeReward"))
+
+
+@pytest.mark.parametrize(
+    ("command", "shown", "anew"),
+    [
+        (("__main__.py", "run", "paper"), ["python", "-m", "coartic", "run", "paper"], True),
+        (("coartic", "run", "paper"), ["coartic", "run", "paper"], True),
+        (("coartic", "run", "/home/a/own.toml"), ["coartic", "run", "own.toml"], False),
+        (("own.py",), ["own.py"], False),
+    ],
+)
+def test_runs_are_made_anew_without_files_of_the_users_own(study, tmp_path, command, shown, anew):
+    """However coartic was started."""
+    manifest = study.results.manifest
+    environment = manifest.environment.model_copy(update={"command": command})
+    manifest = manifest.model_copy(update={"environment": environment})
+    started = Study(replace(study.results, manifest=manifest))
+    cells = {key: tuple(cell.runs.run_id) for key, cell in started.cells.items()}
+    number = Number("coarticX", "x", 1.0, 1, "ticks", cells=(next(iter(cells)),))
+    text = trace_json(started, Document("t", (), runs=cells), [number])
+    (tmp_path / FILE).write_text(text, encoding="utf-8")
+    found = trace(tmp_path, "coarticX")
+    assert list(found.environment.command) == shown
+    assert bool(found.sources[0].command) == anew
+    assert ("\nanew: coartic run" in trace_text(found)) == anew
 
 
 SEARCH, BOUND = "optimum/dynamic-programming", "optimum/branch-and-bound"

@@ -26,11 +26,11 @@ from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.register import Claim, Finding
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.signatures.subtasks import postures_before
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval, short
+from coartic.record import SEARCH
 from coartic.task import hands_of
 
 CLOSE = 0.10
@@ -151,7 +151,7 @@ def _informed(data: Data, task: str) -> list[str]:
         for (name, label), cell in data.study.cells.items()
         if name == task
         and " " not in label
-        and not label.startswith((LEARNER, OPTIMUM))
+        and not label.startswith((LEARNER, SEARCH))
         and len(cell.good) == len(cell.runs) > 0
         and set(data.study.method_rows[task, label].told) - UNINFORMED
     ]

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 
 from analysis.results.folder import CellRuns
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.results.optima import locks_base
 from analysis.statistics.spread import sd
 from analysis.words import tally
 from coartic.method import Information
+from coartic.record import SEARCH
 from coartic.tables import label_of
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def method_rows(study: Study) -> list[MethodRow]:
 
     def place(row: MethodRow) -> tuple[int, bool, float]:
         worst_last = math.inf if math.isnan(row.reward) else -row.reward
-        return order[row.task], not row.method.startswith(OPTIMUM), worst_last
+        return order[row.task], not row.method.startswith(SEARCH), worst_last
 
     return sorted((_row(study, cell) for cell in study.cells.values()), key=place)
 

@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.methods import LEARNER
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.across_tasks import (
     gap_share,
     interquartile_mean,
@@ -26,6 +25,7 @@ from analysis.statistics.across_tasks import (
 )
 from analysis.statistics.estimates import FEWEST, SEED, Inference
 from coartic.initial import initial_hands
+from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def everywhere(scores: pd.DataFrame) -> list[str]:
     return [
         str(name)
         for name, count in tasks.items()
-        if most > 1 and count == most and not str(name).startswith(OPTIMUM)
+        if most > 1 and count == most and not str(name).startswith(SEARCH)
     ]
 
 

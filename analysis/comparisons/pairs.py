@@ -29,7 +29,6 @@ from analysis.comparisons.methods import TOLD
 from analysis.comparisons.targets import SHARES
 from analysis.methods import LEARNER
 from analysis.results.folder import CellRuns
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import (
     SEED,
     Inference,
@@ -43,6 +42,7 @@ from analysis.statistics.hypotheses import bootstrap_test, holm, permutation_tes
 from analysis.statistics.power import runs_needed, smallest_difference
 from analysis.statistics.spread import sd
 from coartic.exploration import CONDITIONS
+from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def pairs(study: Study) -> Iterator[Pair]:
         still = _keeping_still(most)
         for label, cell in cells.items():
             condition = label.removeprefix(LEARNER)
-            if condition in plain or cell.method.startswith(OPTIMUM):
+            if condition in plain or cell.method.startswith(SEARCH):
                 continue
             own = cell.method.removeprefix(LEARNER).split("-")[0]
             kind: Kind = "method"

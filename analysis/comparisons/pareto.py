@@ -11,9 +11,9 @@ import pandas as pd
 from analysis.comparisons.methods import solve_times
 from analysis.comparisons.progress import LABELS
 from analysis.results.folder import CellRuns
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.results.optima import locks_base
 from analysis.statistics.resampling import resampled
+from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _solving(study: Study, task: str) -> list[CellRuns]:
         for key, row in study.method_rows.items()
         if key[0] == task
         and row.solved == row.runs > 0
-        and not (cell := study.cells[key]).method.startswith(OPTIMUM)
+        and not (cell := study.cells[key]).method.startswith(SEARCH)
         and not locks_base(cell.runs)
     ]
 

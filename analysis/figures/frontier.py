@@ -28,9 +28,9 @@ from analysis.figures.style import (
     styled,
 )
 from analysis.methods import short_name
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import CONFIDENCE
 from coartic import Task
+from coartic.record import SEARCH
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -62,7 +62,7 @@ def frontier(
         raise ValueError(f"unknown spends {unknown}; known: {list(SPENDS)}")
     found = known_tasks(study, tasks)
     labels = [
-        label for label in chosen(study, list(found), methods) if not label.startswith(OPTIMUM)
+        label for label in chosen(study, list(found), methods) if not label.startswith(SEARCH)
     ]
     frame = study.anytime
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict
@@ -28,7 +28,9 @@ from coartic.files import write_atomically
 from coartic.record import SEARCH
 from coartic.text import one_line
 
-METHODS = SEARCH  # methods that search for it
+if TYPE_CHECKING:
+    from analysis.study import Study
+
 DATA = Path(__file__).with_name("optima.json")
 SHIPPED = f"shipped data (analysis/results/{DATA.name})"
 
@@ -93,15 +95,15 @@ class Optimum:
         return f"{'proven' if self.proven else 'not proven'}; {self.source}"
 
 
-def optima(results: Results) -> dict[tuple[str, str], Optimum]:
+def optima(study: Study) -> dict[tuple[str, str], Optimum]:
     """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
 
     What the shipped data say where the task is the same in all that matters, bettered by
     what the folder's own searches found; these are named as its source wherever they give it.
     """
     found: dict[tuple[str, str], Optimum] = {}
-    for name, task in results.tasks.items():
-        own = results.runs[results.runs.task == name]
+    for name, task in study.tasks.items():
+        own = study.runs[study.runs.task == name]
         for arm in ARMS:
             searches = dict(_searches(own, arm))
             candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from contextlib import contextmanager
 from html.parser import HTMLParser
 
 import pytest
@@ -25,14 +26,28 @@ LATEX = r"""\documentclass{article}
 """
 
 
-def report_of(study, folder):
-    """A report whose figures are empty: drawing takes long, and has tests of its own."""
+@contextmanager
+def undrawn():
+    """Reports whose figures are empty: drawing takes long, and has tests of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
         patch.setattr(
-            analysis.report.build, "rendered",
+            analysis.report.build,
+            "rendered",
             lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
-        )  # fmt: skip
+        )
+        yield
+
+
+def document_of(study):
+    """The document of a report without figures."""
+    with undrawn():
+        return build(study).document
+
+
+def report_of(study, folder):
+    """A report without figures, written into a folder."""
+    with undrawn():
         write(build(study), study, folder)
     return folder
 

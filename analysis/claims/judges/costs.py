@@ -13,9 +13,9 @@ from analysis.claims.register import Finding
 from analysis.comparisons.methods import TOLD
 from analysis.methods import LEARNER
 from analysis.report.document import Column, RestsOn, Row, Value
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.words import NONE, short
 from coartic.method import Information
+from coartic.record import SEARCH
 
 _TASKS = tuple(task for task, _ in BEST)
 NEAR = 0.05
@@ -29,7 +29,7 @@ def _labels(data: Data, wanted: Callable[[str], bool]) -> list[str]:
             label
             for task, label in data.study.cells
             if task in _TASKS
-            and not label.startswith(OPTIMUM)
+            and not label.startswith(SEARCH)
             and wanted(data.study.method_rows[task, label].told)
         )
     )

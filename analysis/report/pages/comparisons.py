@@ -15,8 +15,8 @@ from analysis.report.legends import with_legends
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.methods import overall_table
 from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.statistics.estimates import LEVEL, RESAMPLES
+from coartic.record import SEARCH
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -122,7 +122,7 @@ def _across(study: Study) -> Iterator[Block]:
         left = [
             name
             for name in dict.fromkeys(study.scores.method)
-            if name not in complete and not name.startswith(OPTIMUM)
+            if name not in complete and not name.startswith(SEARCH)
         ]
         if left:
             yield Prose((f"Not run on all of these tasks: {escaped(', '.join(left))}.",))

@@ -15,8 +15,8 @@ from analysis.comparisons.targets import Target
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Estimate, RestsOn, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
-from analysis.results.optima import METHODS as OPTIMUM
 from analysis.words import typographic
+from coartic.record import SEARCH
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -222,7 +222,7 @@ def _on_fronts(rows: pd.DataFrame) -> Iterator[Value]:
 
 def _of_methods(frame: pd.DataFrame, task: str) -> pd.DataFrame:
     """Rows of a task without the optimum's searches, which are what the others are held to."""
-    return frame[(frame.task == task) & ~frame.method.str.startswith(OPTIMUM)]
+    return frame[(frame.task == task) & ~frame.method.str.startswith(SEARCH)]
 
 
 def _number(value: Value) -> float:

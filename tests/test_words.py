@@ -5,7 +5,7 @@ import math
 import pytest
 
 from analysis.statistics import estimates as statistics
-from analysis.table import interval, short, tally
+from analysis.words import interval, short, tally
 
 
 @pytest.mark.parametrize(
