@@ -65,7 +65,13 @@ def replanned(manifest, **update):
 
 def fake_results(tmp_path, runs, *, task="two-armed-1", method="dual-process/EC2"):
     frame = pd.DataFrame(runs).assign(
-        task=task, method=method, variant="", commit="abc", packages="p", replay_reward=None
+        task=task,
+        method=method,
+        variant="",
+        label=method,
+        commit="abc",
+        packages="p",
+        replay_reward=None,
     )
     frame = frame.assign(run_id=[f"run-{k}" for k in range(len(frame))])
     frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
