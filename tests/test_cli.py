@@ -38,7 +38,12 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
         "methods.csv",
     }
     page = (out / "comparison.md").read_text(encoding="utf-8")
-    for words in ("| −303.0 | 2.9 | 20 |", "| −319 | −319 |"):
+    for words in (
+        "| −303.0 | 2.9 | 20 |",
+        "| −319 | −319 |",
+        "*Reconstructed.* two-armed-1",
+        "LRLR −533",
+    ):
         assert words in page
     assert "are not comparable" in page  # 60 trials against 10 000
     assert "−303.0 ± 2.9" in text
