@@ -160,10 +160,10 @@ def test_the_commands(monkeypatch, capsys, tmp_path, odd, few_figures):
     assert code == 0
     assert "A_b x dual-process/EC4: 1 runs" in out
     for arguments, words_ in (
-        ([macro + "s"], f"did you mean {macro}"),
-        (["methods-a-c", "x", "y"], "did you mean methods-a-b"),
-        ([row[0], "dual-process/EC5", "reward"], "did you mean dual-process/EC4"),
-        ([row[0], row[1], "rewards"], "did you mean reward"),
+        ([macro + "s"], f"did you mean '{macro}'"),
+        (["methods-a-c", "x", "y"], "did you mean 'methods-a-b"),
+        ([row[0], "dual-process/EC5", "reward"], "did you mean 'dual-process/EC4"),
+        ([row[0], row[1], "rewards"], "did you mean 'reward"),
         ([row[0]], "name a row and a column"),
     ):
         code, out, error = call(monkeypatch, capsys, "trace", *arguments, "--in", folder)

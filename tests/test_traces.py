@@ -434,10 +434,10 @@ def test_a_report_does_not_know_where_it_lies(study, home, tmp_path):
 
 def test_what_a_report_does_not_have(home, tmp_path):
     for arguments, words in (
-        (("coarticAscendingECOneRewrd",), "did you mean coarticAscendingECOneReward"),
-        (("methods-ascendin",), "did you mean methods-ascending"),
-        (("methods-ascending", ("dual-proces/EC1", "reward")), "did you mean dual-process/EC1?"),
-        (("methods-ascending", ("dual-process/EC1", "rewrd")), "did you mean reward"),
+        (("coarticAscendingECOneRewrd",), "did you mean 'coarticAscendingECOneReward"),
+        (("methods-ascendin",), "did you mean 'methods-ascending"),
+        (("methods-ascending", ("dual-proces/EC1", "reward")), "did you mean 'dual-process/EC1'?"),
+        (("methods-ascending", ("dual-process/EC1", "rewrd")), "did you mean 'reward"),
         (("methods-ascending",), "name a row and a column"),
         (("coarticAscendingECOneReward", ("a", "b")), "is a macro"),
     ):

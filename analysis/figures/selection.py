@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ from analysis.methods import LEARNER, METHODS
 from analysis.results.folder import CellRuns
 from coartic import CoarticError, Task
 from coartic.robot import Array
+from coartic.text import did_you_mean
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -57,13 +57,8 @@ def known_methods(study: Study, methods: Sequence[str]) -> None:
     known = list(dict.fromkeys(label for _, label in study.cells))
     for label in methods:
         if label not in known:
-            near = difflib.get_close_matches(label, known, n=3, cutoff=0.5)
-            hint = (
-                f"did you mean {' or '.join(map(repr, near))}?"
-                if near
-                else f"it has {', '.join(known)}"
-            )
-            raise missing(study, f"no method {label!r}; {hint}")
+            hint = did_you_mean(label, known) or f"; it has {', '.join(known)}"
+            raise missing(study, f"no method {label!r}{hint}")
 
 
 def known_tasks(study: Study, tasks: Sequence[str] | None) -> dict[str, Task]:

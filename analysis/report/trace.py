@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +22,7 @@ from analysis.report.trace_file import (
 from analysis.results.optima import SHIPPED
 from coartic import CoarticError, builtin_tasks
 from coartic.stored import content_hash
-from coartic.text import one_line, shell_line
+from coartic.text import did_you_mean, one_line, shell_line
 
 _COMPANIONS = {
     "SD": "SD over runs of: ",
@@ -111,7 +110,7 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
         found = _of_table(content, name, where)
     else:
         known = [*macros, *content.tables]
-        raise CoarticError(f"no macro or table {name!r} in {home}{_nearest(name, known)}")
+        raise CoarticError(f"no macro or table {name!r} in {home}{did_you_mean(name, known)}")
     return Trace(
         name=found.name,
         text=found.text,
@@ -186,9 +185,9 @@ def _of_table(content: TraceFile, name: str, where: Sequence[str]) -> _Found:
         )
     row, asked = where
     if row not in table.rows:
-        raise CoarticError(f"table {name} has no row {row!r}{_nearest(row, table.rows)}")
+        raise CoarticError(f"table {name} has no row {row!r}{did_you_mean(row, table.rows)}")
     if asked not in columns:
-        raise CoarticError(f"table {name} has no column {asked!r}{_nearest(asked, columns)}")
+        raise CoarticError(f"table {name} has no column {asked!r}{did_you_mean(asked, columns)}")
     entry, place = table.rows[row], columns.index(asked)
     column = table.columns[place]
     known = _optima(content, column, entry)
@@ -262,8 +261,3 @@ def _results_folder(folder: Path, specification: str) -> Path | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return folder if same else None
-
-
-def _nearest(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
