@@ -16,19 +16,19 @@ works = ["shah2013"]
 """
 MEASURE = '''
 
-def hits(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def hits(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Goals that a run hits."""
     yield mean_of(signature, Place(), [float(len(run.hits)) for run in cell.runs])
 '''
-SIGNATURE = """    Signature(
-        "goals hit",
-        within.hits,
-        "goals",
-        "goals",
-        "how many goals a run hits",
-        "hit",
-        table="main-signatures",
-    ),
+SIGNATURE = """
+[[within]]
+name = "goals hit"
+measure = "analysis.signatures.within.hits"
+unit = "goals"
+extent = "goals"
+meaning = "how many goals a run hits"
+heading = "hit"
+table = "main-signatures"
 """
 CLAIM = """
 
@@ -135,7 +135,7 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     append("analysis/methods.toml", LOOK)
     # A signature: a function, a row.
     append("analysis/signatures/within.py", MEASURE)
-    change("analysis/signatures/register.py", "WITHIN = (\n", f"WITHIN = (\n{SIGNATURE}")
+    append("analysis/signatures/register.toml", SIGNATURE)
     # A claim: a judge and its entry.
     append("analysis/claims/one_armed.py", CLAIM)
     # A figure: a file, an import and a row.

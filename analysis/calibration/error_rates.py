@@ -107,8 +107,8 @@ def checks() -> list[Check]:
         for a, b in pairs
         for name, test in _TESTS.items()
     ]
-    found += [_known_test(each, tail) for each in every for tail in _ONE_TAILED]
-    found += [_flip_test(each, normal, tail) for each in (normal, two) for tail in _ONE_TAILED]
+    found += [_known_test(each, tail) for each in every for tail in _SIGNS]
+    found += [_flip_test(each, normal, tail) for each in (normal, two) for tail in _SIGNS]
     found += [_covers(normal, runs) for runs in (5, 10)]
     for each in every:
         found += [_covers(each), _covers_difference(each, normal), _covers(each, middle=True)]
@@ -118,11 +118,14 @@ def checks() -> list[Check]:
         above, below = (_equivalent(each, normal, side) for side in (1, -1))
         found += [check for pair in zip(above, below, strict=True) for check in pair]
     for each in every:
-        found += [_covers_studentised(each, None), _covers_studentised(each, normal)]
+        found += [
+            _covers_studentised("mean", each),
+            _covers_studentised("difference", each, normal),
+        ]
     return found
 
 
-_ONE_TAILED: tuple[hypotheses.Alternative, ...] = ("greater", "less")
+_SIGNS: dict[hypotheses.Alternative, str] = {"greater": ">", "less": "<"}
 _TESTS = {
     "bootstrap test": hypotheses.bootstrap_test,
     "permutation test": hypotheses.permutation_test,
@@ -161,23 +164,17 @@ def _agrees(found: Equivalence) -> bool:
 
 
 def _known_test(population: Population, tail: hypotheses.Alternative) -> Check:
-    def test(values: Array, **options: Any) -> statistics.Inference:
-        return hypotheses.bootstrap_test(values, population.mean, tail, **options)
-
-    data = f"{population.name} {_sign(tail)} value"
+    test = partial(hypotheses.bootstrap_test, second=population.mean, alternative=tail)
+    data = f"{population.name} {_SIGNS[tail]} value"
     subject = "bootstrap test against a known value"
     return _check(subject, data, _rejects, test, population.sample())
 
 
 def _flip_test(first: Population, second: Population, tail: hypotheses.Alternative) -> Check:
     test = partial(hypotheses.sign_flip_test, alternative=tail)
-    data = f"{first.name} {_sign(tail)} {second.name}"
+    data = f"{first.name} {_SIGNS[tail]} {second.name}"
     subject = "sign-flip test, one-tailed"
     return _check(subject, data, _rejects, test, first.centred, second.centred)
-
-
-def _sign(tail: hypotheses.Alternative) -> str:
-    return ">" if tail == "greater" else "<"
 
 
 def _covers(population: Population, runs: int = RUNS, *, middle: bool = False) -> Check:
@@ -199,16 +196,15 @@ def _covers_difference(first: Population, second: Population) -> Check:
     )
 
 
-def _covers_studentised(first: Population, second: Population | None) -> Check:
+def _covers_studentised(name: str, *populations: Population) -> Check:
     """The interval of the equivalence test, of a mean or a difference; its margin is idle."""
 
     def infer(a: Array, b: Array | float = 0.0, **options: Any) -> Equivalence:
         return bootstrap_equivalence(a, b, 1.0, **options)
 
-    subject = f"studentised bootstrap interval of a {'difference' if second else 'mean'}"
-    data = f"{first.name} - {second.name}" if second else first.name
-    samples = [each.centred for each in (first, second) if each is not None]
-    return _check(subject, data, _misses(0.0), infer, *samples)
+    subject = f"studentised bootstrap interval of a {name}"
+    data = " - ".join(each.name for each in populations)
+    return _check(subject, data, _misses(0.0), infer, *[each.centred for each in populations])
 
 
 def _covers_improvement(theta: float) -> Check:
