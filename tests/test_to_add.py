@@ -16,7 +16,7 @@ works = ["shah2013"]
 """
 MEASURE = '''
 
-def hits(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def hits(cell: Trajectories, signature: Signature) -> Rows:
     """Goals that a run hits."""
     yield mean_of(signature, Place(), [float(len(run.hits)) for run in cell.runs])
 '''

@@ -103,10 +103,10 @@ def tests(*, planted: bool) -> list[Check]:
     """Every test of a signature on every kind of scatter: without an effect, or with one.
 
     Planted shifts between contexts are of 1.25 SD of a joint, in a direction that leaves the hand
-    in place (non-motor-equivalent part: that moves it); the lead is of all 12 ticks or of the
-    last 6. ΔV z: standard deviations that move the hand are half, or twice, the others. Locus:
-    1 SD of a joint per length unit (4 where a family is not plain, :data:`LOCI`). Sacrifice: the
-    first subtask is 5 ticks longer, its SD, and the whole 7 shorter, its SD.
+    in place (non-motor-equivalent part: that moves it). ΔV z: standard deviations that move the
+    hand are half, or twice, the others. Locus: 1 SD of a joint per length unit (4 where a family
+    is not plain, :data:`LOCI`). Sacrifice: the first subtask is 5 ticks longer, its SD, and the
+    whole 7 shorter, its SD.
     """
     found: list[Check] = []
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, product
@@ -14,7 +14,7 @@ import numpy as np
 from analysis.signatures.context import context_dependence, distance, lead_time, permutation_p
 from analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
 from analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from analysis.signatures.rows import Place, Signature, SignatureRow
+from analysis.signatures.rows import Place, Rows, Signature
 from analysis.signatures.trajectories import Trajectories, last_ticks, postures
 from analysis.statistics import spread
 from analysis.statistics.estimates import SEED
@@ -68,12 +68,12 @@ class Contexts:
         return permutation_p(first, second, rng_of(signature, self.place), basis=basis)
 
 
-def context_distance(contexts: Contexts, signature: Signature) -> Iterator[SignatureRow]:
+def context_distance(contexts: Contexts, signature: Signature) -> Rows:
     """Distance of mean postures."""
     yield signature.at(contexts.place, value=distance(*contexts.postures), n=contexts.n)
 
 
-def dependence(contexts: Contexts, signature: Signature) -> Iterator[SignatureRow]:
+def dependence(contexts: Contexts, signature: Signature) -> Rows:
     """The distance in pooled standard deviations, with its test."""
     why = "one run a context: no spread within contexts, no test" if contexts.single else ""
     value = context_dependence(*contexts.postures)
@@ -83,7 +83,7 @@ def dependence(contexts: Contexts, signature: Signature) -> Iterator[SignatureRo
     yield signature.at(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
 
 
-def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Iterator[SignatureRow]:
+def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Rows:
     """The difference that leaves the hand in place, and the one that moves it."""
     first, second = contexts.postures
     task = contexts.first.task
@@ -100,7 +100,7 @@ def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Iterat
         yield signature.at(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
 
 
-def lead(contexts: Contexts, signature: Signature) -> Iterator[SignatureRow]:
+def lead(contexts: Contexts, signature: Signature) -> Rows:
     """How long before the hit contexts differ."""
     place, n = contexts.place, contexts.n
     if contexts.single:
@@ -134,7 +134,7 @@ class Members:
         return next(iter(self.of_task.values()))
 
 
-def slopes(members: Members, slope: Signature, norm: Signature) -> Iterator[SignatureRow]:
+def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
     """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
     family, task = members.family, members.first.task
     position = dict(zip(family.tasks, family.positions.tolist(), strict=True))

@@ -84,7 +84,9 @@ class SignatureRow:
         return label_of(self.method, self.variant)
 
 
-Measure = Callable[..., Iterator[SignatureRow]]
+Rows = Iterator[SignatureRow]
+"""What a measure yields."""
+Measure = Callable[..., Rows]
 """Takes what is measured (:class:`~.trajectories.Trajectories`, a pair of contexts or a family
 of tasks), then the signatures that it measures, in the order of the register."""
 

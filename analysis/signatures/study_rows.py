@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from analysis.signatures.between import Contexts, Members
 from analysis.signatures.context import context_pairs
 from analysis.signatures.locus import LEAST, families, variants
 from analysis.signatures.register import CONTEXTS, FAMILIES, WITHIN
-from analysis.signatures.rows import Measure, Place, Signature, SignatureRow
+from analysis.signatures.rows import Measure, Place, Rows, Signature, SignatureRow
 from analysis.signatures.trajectories import Trajectories
 from coartic.robot import HANDS
 
@@ -62,7 +62,7 @@ def signature_rows(study: Study) -> list[SignatureRow]:
     return rows
 
 
-def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Iterator[SignatureRow]:
+def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
     """Of every shared goal with every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
         every = [Contexts(first, second, goal, hand) for hand in HANDS]
@@ -74,9 +74,7 @@ def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Iterator
             yield from _without(CONTEXTS, "no hand hit the goal in both contexts", place)
 
 
-def _measured(
-    signatures: Sequence[Signature], what: Trajectories | Contexts | Members
-) -> Iterator[SignatureRow]:
+def _measured(signatures: Sequence[Signature], what: Trajectories | Contexts | Members) -> Rows:
     """Values of all signatures, those with the same measure together."""
     measures: dict[Measure, list[Signature]] = {}
     for signature in signatures:
@@ -85,9 +83,7 @@ def _measured(
         yield from measure(what, *measured)
 
 
-def _without(
-    signatures: Sequence[Signature], why: str, place: Place = _NOWHERE
-) -> Iterator[SignatureRow]:
+def _without(signatures: Sequence[Signature], why: str, place: Place = _NOWHERE) -> Rows:
     return (signature.without(why, place) for signature in signatures)
 
 

@@ -6,7 +6,7 @@ A measure takes :class:`~.trajectories.Trajectories`, then the signatures that i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from analysis.signatures.rows import (
     ONE_RUN,
     Measure,
     Place,
+    Rows,
     Signature,
     SignatureRow,
 )
@@ -39,23 +40,19 @@ from analysis.statistics.estimates import SEED
 from coartic.robot import Array
 
 
-def against_initial(
-    cell: Trajectories, first: Signature, total: Signature
-) -> Iterator[SignatureRow]:
+def against_initial(cell: Trajectories, first: Signature, total: Signature) -> Rows:
     """Mean change of the first subtask and of the whole, from the initial solution."""
     yield from _changes(cell, cell.against_initial, first, total)
 
 
-def against_same_hands(
-    cell: Trajectories, first: Signature, total: Signature
-) -> Iterator[SignatureRow]:
+def against_same_hands(cell: Trajectories, first: Signature, total: Signature) -> Rows:
     """The same, from the corrective process with each run's own hands."""
     yield from _changes(cell, cell.against_same_hands, first, total)
 
 
 def _changes(
     cell: Trajectories, changes: NDArray[np.int64], first: Signature, total: Signature
-) -> Iterator[SignatureRow]:
+) -> Rows:
     if len(changes):
         yield mean_of(first, Place(goal=1), changes[:, 0])
         yield mean_of(total, Place(), changes.sum(axis=1))
@@ -67,7 +64,7 @@ def _no_reference(cell: Trajectories) -> str:
     return NO_INITIAL if cell.runs else NO_RUN
 
 
-def sacrificed(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that sacrifice the first subtask, against their own hands."""
     changes = cell.against_same_hands
     if not len(changes):
@@ -81,7 +78,7 @@ def sacrificed(cell: Trajectories, signature: Signature) -> Iterator[SignatureRo
     yield replace(shown, p=p, why_not=why)
 
 
-def against_isolated_reach(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def against_isolated_reach(cell: Trajectories, signature: Signature) -> Rows:
     """Mean excess of each subtask over an isolated reach."""
     missing = "the corrective process reaches the goal from the posture before with no hand"
     values = [excess(run) for run in cell.runs]
@@ -91,7 +88,7 @@ def against_isolated_reach(cell: Trajectories, signature: Signature) -> Iterator
 def of_two_hands(measure: Measure) -> Measure:
     """Restrict a measure to solved tasks with two hands."""
 
-    def restricted(cell: Trajectories, *signatures: Signature) -> Iterator[SignatureRow]:
+    def restricted(cell: Trajectories, *signatures: Signature) -> Rows:
         if len(cell.task.hands) < 2 or not cell.runs:
             why = ONE_HAND if cell.runs else NO_RUN
             return (signature.without(why) for signature in signatures)
@@ -101,7 +98,7 @@ def of_two_hands(measure: Measure) -> Measure:
 
 
 @of_two_hands
-def hand_entropy(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def hand_entropy(cell: Trajectories, signature: Signature) -> Rows:
     """Entropy of the hand sequences."""
     counts = pd.Series(cell.sequences).value_counts()
     yield signature.at(
@@ -113,7 +110,7 @@ def hand_entropy(cell: Trajectories, signature: Signature) -> Iterator[Signature
 
 
 @of_two_hands
-def as_in_isolation(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def as_in_isolation(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that hit each goal with the hand that is quickest for it by itself."""
     by_run = map(isolated_agreement, cell.runs)
     for number, agrees in enumerate(zip(*by_run, strict=True), 1):
@@ -121,7 +118,7 @@ def as_in_isolation(cell: Trajectories, signature: Signature) -> Iterator[Signat
 
 
 @of_two_hands
-def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs with a hand sequence that is best by the corrective process alone."""
     best = cell.best_hands
     if best:
@@ -132,7 +129,7 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Iterator
 
 
 @of_two_hands
-def preshapings(cell: Trajectories, *signatures: Signature) -> Iterator[SignatureRow]:
+def preshapings(cell: Trajectories, *signatures: Signature) -> Rows:
     """All preshaping, that seen from the base, that since the last hit; but at the last goal."""
     measures = (preshaping, preshaping_from_base, preshaping_since_hit)
     initial = cell.initial
@@ -146,12 +143,12 @@ def preshapings(cell: Trajectories, *signatures: Signature) -> Iterator[Signatur
 
 
 @of_two_hands
-def travel_of_the_other_arm(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def travel_of_the_other_arm(cell: Trajectories, signature: Signature) -> Rows:
     """Mean travel of the arm that is not chosen, by subtask."""
     yield from by_goal(signature, len(cell.task.goals), [travel(run) for run in cell.runs])
 
 
-def base_reversals(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
     """Mean number of reversals of each base coordinate."""
     reversals = [reversals_of(run) for run in cell.runs]
     for k, name in enumerate("xy"):
@@ -162,7 +159,7 @@ def base_reversals(cell: Trajectories, signature: Signature) -> Iterator[Signatu
             yield mean_of(signature, place, [run[k] for run in reversals])
 
 
-def turning(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
+def turning(cell: Trajectories, signature: Signature) -> Rows:
     """Mean turning angle at every goal but the last."""
     goals = len(cell.task.goals)
     if goals < 2:
@@ -174,7 +171,7 @@ def turning(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     yield from by_goal(signature, goals - 1, turns, "a subtask without displacement")
 
 
-def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Iterator[SignatureRow]:
+def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Rows:
     """Smoothness of the chosen hand's path."""
     found = [smoothness(run) for run in cell.runs]
     short = "every subtask is too short, or its path is without jerk"
@@ -184,7 +181,7 @@ def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Iterator[Si
 
 def synergies(
     cell: Trajectories, within: Signature, across: Signature, delta: Signature, z: Signature
-) -> Iterator[SignatureRow]:
+) -> Rows:
     """Variance over runs by what it does to the hand, over runs with the commonest hands."""
     runs, n = cell.typical, len(cell.typical)
     if n < 2:
@@ -209,9 +206,7 @@ def synergies(
         yield z.at(place, **test, n=n, why_not=why)
 
 
-def by_goal(
-    signature: Signature, goals: int, values: Sequence[Array], missing: str = ""
-) -> Iterator[SignatureRow]:
+def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: str = "") -> Rows:
     """Means at the first ``goals`` goals of ``values``, a row of them a run."""
     for number in range(1, goals + 1):
         own = [run[number - 1] for run in values]
