@@ -13,7 +13,6 @@ import pandas as pd
 from analysis.comparisons.methods import TOLD
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
-from analysis.results.folder import Results
 from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.rows import SignatureRow
 from analysis.signatures.trajectories import Trajectories
@@ -74,11 +73,6 @@ class Data:
     _cells: list[tuple[str, str]] = field(default_factory=list)
 
     @property
-    def results(self) -> Results:
-        """The stored results."""
-        return self.study.results
-
-    @property
     def run_ids(self) -> tuple[str, ...]:
         """Runs read since :meth:`forget`."""
         return tuple(dict.fromkeys(self._runs))
@@ -99,11 +93,17 @@ class Data:
         self._runs += run_ids
 
     def recorded(
-        self, read: Callable[[Data, str], Read], method: str
-    ) -> tuple[Read, tuple[tuple[str, str], ...]]:
-        """What ``read`` gives of a method, and the cells that it has read: tasks and labels."""
+        self, read: Callable[[Data, str], Read | None], method: str
+    ) -> tuple[Read | None, tuple[tuple[str, str], ...]]:
+        """What ``read`` gives of a method, and the cells that it has read: tasks and labels.
+
+        None where the folder lacks what it reads.
+        """
         before = len(self._cells)
-        found = read(self, method)
+        try:
+            found = read(self, method)
+        except MissingError:
+            found = None
         return found, tuple(dict.fromkeys(self._cells[before:]))
 
     def runs(self, task: str, method: str) -> pd.DataFrame:
@@ -185,7 +185,7 @@ class Data:
 
     def task(self, name: str) -> Task:
         """A task of the folder."""
-        known = self.results.tasks
+        known = self.study.results.tasks
         if name not in known:
             raise MissingError(f"this folder has no task {name}")
         return known[name]
@@ -204,7 +204,7 @@ class Data:
 
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""
-        table = self.results.sequences
+        table = self.study.results.sequences
         own = table[table.task == task] if len(table) else table
         if not len(own):
             raise MissingError(
@@ -217,7 +217,7 @@ class Data:
     def best_sequences(self, task: str) -> tuple[list[str], float]:
         """Hand sequences that are best by the corrective process alone, and their reward."""
         known = self.sequences(task)
-        best = best_sequences(self.results.sequences, task)
+        best = best_sequences(self.study.results.sequences, task)
         if not best:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"

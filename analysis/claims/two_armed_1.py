@@ -9,16 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.claims.data import ONE, Data, MissingError, rewards_of
-from analysis.claims.judges.hands import better_hands
-from analysis.claims.judges.shares import (
+from analysis.claims.judges.hands import (
     AS_OFTEN,
     MOST,
     NEARLY_ALL,
     as_often,
+    better_hands,
     nearly_all,
-    not_nearly_all,
 )
-from analysis.claims.register import Claim, Finding
+from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
 from analysis.statistics.estimates import FEWEST, SEED, mean
@@ -29,9 +29,10 @@ from coartic.robot import Array
 # Before learning
 
 
+@decides("right-hand-better", "exact: reward of the corrective process alone")
 def _right_hand_better(data: Data) -> Finding:
     known = data.sequences(ONE)
-    right, left = known.get("RRRR", math.nan), known.get("LLLL", math.nan)
+    right, left = (known.get(hands, math.nan) for hands in ("RRRR", "LLLL"))
     if math.isnan(right + left):
         raise MissingError("the corrective process alone has no reward with RRRR or LLLL")
     printed = published_initial(ONE)
@@ -43,6 +44,7 @@ def _base_steps(start: Array, configurations: Array) -> Array:
     return np.diff(np.append(start[0], configurations[:, 0]))
 
 
+@decides("initial-base-reverses", "exact: base positions at the goals")
 def _initial_base_reverses(data: Data) -> Finding:
     steps = _base_steps(data.task(ONE).q0, data.initial(ONE).configurations)
     return Finding(
@@ -55,14 +57,21 @@ def _initial_base_reverses(data: Data) -> Finding:
 # Exploration condition 2
 
 
+@decides("ec2-sequences", f"{AS_OFTEN}; of RRLR")
 def _ec2_sequences(data: Data) -> Finding:
     return as_often(data, ONE, "EC2", "RRLR")
 
 
+@decides("ec2-rrlr-better", "one-tailed bootstrap test of two samples")
 def _ec2_rrlr_better(data: Data) -> Finding:
     return better_hands(data, ONE, "EC2", "RRLR", "RRRR")
 
 
+@decides(
+    "no-reversal",
+    "exact: base positions at the goals, runs under condition 2 that learned RRLR, initial "
+    "solution",
+)
 def _no_reversal(data: Data) -> Finding:
     cell = data.cell(ONE, f"{LEARNER}EC2")
     runs = [run for run in cell.runs if run.execution.hands == "RRLR"]
@@ -78,6 +87,10 @@ def _no_reversal(data: Data) -> Finding:
     )
 
 
+@decides(
+    "ec2-improves",
+    "one-tailed bootstrap test of noiseless replays against the initial reward",
+)
 def _ec2_improves(data: Data) -> Finding:
     replays = data.replays(ONE, "EC2", "RRRR")
     if len(replays) < FEWEST:
@@ -92,9 +105,13 @@ def _ec2_improves(data: Data) -> Finding:
     )
 
 
+@decides(
+    "ec2-unreliable",
+    f"exact binomial test that fewer than {NEARLY_ALL:.0%} of all runs leave RRRR",
+)
 def _ec2_unreliable(data: Data) -> Finding:
     found = Counter(data.learned(ONE, "EC2").hands)
-    seen = not_nearly_all(found.total() - found["RRRR"], found.total())
+    seen = nearly_all(found.total() - found["RRRR"], found.total(), "less")
     return replace(seen, evidence=f"RRRR is left in {seen.evidence}; {tally(found)}")
 
 
@@ -108,14 +125,21 @@ def _lrlr_in_all(data: Data, condition: str) -> Finding:
     return replace(seen, evidence=f"LRLR in {seen.evidence}{others}")
 
 
+@decides("ec3-alternates", MOST)
 def _ec3_alternates(data: Data) -> Finding:
     return _lrlr_in_all(data, "EC3")
 
 
+@decides("ec4-keeps-lrlr", MOST)
 def _ec4_keeps_lrlr(data: Data) -> Finding:
     return _lrlr_in_all(data, "EC4")
 
 
+@decides(
+    "ec3-better-than-ec2",
+    "one-tailed bootstrap test against the runs of condition 2 with its best hand sequence "
+    f"(by mean reward, at least {FEWEST} runs)",
+)
 def _ec3_better_than_ec2(data: Data) -> Finding:
     runs = data.learned(ONE, "EC2")
     groups = {str(h): rewards_of(g) for h, g in runs.groupby("hands") if len(g) >= FEWEST}
@@ -132,6 +156,7 @@ def _ec3_better_than_ec2(data: Data) -> Finding:
     )
 
 
+@decides("ec3-as-exhaustive", MOST)
 def _ec3_as_exhaustive(data: Data) -> Finding:
     best, reward = data.best_sequences(ONE)
     found = Counter(data.learned(ONE, "EC3").hands)
@@ -140,6 +165,10 @@ def _ec3_as_exhaustive(data: Data) -> Finding:
     return replace(seen, evidence=f"{text} {seen.evidence}")
 
 
+@decides(
+    "ec3-beats-exhaustive",
+    "one-tailed bootstrap test against the best corrective-only reward",
+)
 def _ec3_beats_exhaustive(data: Data) -> Finding:
     rewards = data.rewards(ONE, "EC3")
     _, best = data.best_sequences(ONE)
@@ -151,150 +180,3 @@ def _ec3_beats_exhaustive(data: Data) -> Finding:
         f"{interval(mean(rewards, seed=SEED))} against {best:.0f} (published {published[1]})",
         (test,),
     )
-
-
-_EC2 = "Results, Exploration Condition 2"
-_EC3 = "Results, Exploration Condition 3"
-_EC4 = "Results, Exploration Condition 4"
-
-TWO_ARMED_1: tuple[Claim, ...] = (
-    Claim(
-        "right-hand-better",
-        "In two-armed task 1 the right hand alone does better than the left hand alone, which is "
-        "why the initial solution uses it.",
-        "Two-armed tasks",
-        "exact: reward of the corrective process alone",
-        _right_hand_better,
-        _EC2,
-        "The configurations using just the right hand were more rewarding",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "initial-base-reverses",
-        "In the initial solution of two-armed task 1 the base moves left to hit goals 1 and 3 "
-        "while its net movement is to the right.",
-        "Two-armed tasks",
-        "exact: base positions at the goals",
-        _initial_base_reverses,
-        _EC2,
-        "the base of the robot moved to the left",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "ec2-sequences",
-        "In two-armed task 1, about half the runs under condition 2 find RRLR (11 of 20), the "
-        "others keep RRRR.",
-        "Two-armed tasks",
-        f"{AS_OFTEN}; of RRLR",
-        _ec2_sequences,
-        _EC2,
-        "The best hand recruitment sequence found after learning used the left",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "ec2-rrlr-better",
-        "In two-armed task 1, runs under condition 2 that find RRLR get more than those that keep "
-        "RRRR.",
-        "Two-armed tasks",
-        "one-tailed bootstrap test of two samples",
-        _ec2_rrlr_better,
-        _EC2,
-        "the learned solution continued to use just the right hand",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "no-reversal",
-        "In two-armed task 1 the base goes right only once RRLR is learned; before, it reverses.",
-        "Two-armed tasks",
-        "exact: base positions at the goals, runs under condition 2 that learned RRLR, initial "
-        "solution",
-        _no_reversal,
-        _EC2,
-        "in contrast to the initial solution, the base always moves",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "ec2-improves",
-        "In two-armed task 1, runs under condition 2 that keep the hands of the initial solution "
-        "(RRRR) still improve on it.",
-        "Two-armed tasks",
-        "one-tailed bootstrap test of noiseless replays against the initial reward",
-        _ec2_improves,
-        _EC2,
-        "Although it did improve performance",
-        fitted=True,
-    ),
-    Claim(
-        "ec2-unreliable",
-        "In two-armed task 1, condition 2 does not reliably find better hands than RRRR within "
-        "10 000 trials (nine of 20 runs do not).",
-        "Two-armed tasks",
-        f"exact binomial test that fewer than {NEARLY_ALL:.0%} of all runs leave RRRR",
-        _ec2_unreliable,
-        _EC2,
-        "did not produce enough exploration to reliably find a better",
-        fitted=True,
-    ),
-    Claim(
-        "ec3-alternates",
-        "In two-armed task 1, condition 3 alternates hands (LRLR) in every run.",
-        "Two-armed tasks",
-        MOST,
-        _ec3_alternates,
-        _EC3,
-        "adopted the hand recruitment sequence of alternating hands",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "ec3-better-than-ec2",
-        "In two-armed task 1, the hands found under condition 3 are better than those found under "
-        "condition 2.",
-        "Two-armed tasks",
-        "one-tailed bootstrap test against the runs of condition 2 with its best hand sequence "
-        f"(by mean reward, at least {FEWEST} runs)",
-        _ec3_better_than_ec2,
-        _EC3,
-        "a hand recruitment sequence that is better than that found under",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "ec3-as-exhaustive",
-        "In two-armed task 1, condition 3 finds the hands that are best among all sequences with "
-        "the corrective process alone.",
-        "Two-armed tasks",
-        MOST,
-        _ec3_as_exhaustive,
-        _EC3,
-        "produced the same hand recruitment sequence as would DASel alone",
-        fitted=True,
-    ),
-    Claim(
-        "ec3-beats-exhaustive",
-        "In two-armed task 1, condition 3 is better than trying every hand sequence with the "
-        "corrective process alone.",
-        "Two-armed tasks",
-        "one-tailed bootstrap test against the best corrective-only reward",
-        _ec3_beats_exhaustive,
-        _EC3,
-        "the overall performance with exploration at AModChosen and DASel was better",
-        fitted=True,
-    ),
-    Claim(
-        "ec4-keeps-lrlr",
-        "In two-armed task 1, condition 4 keeps the hands of condition 3 (LRLR).",
-        "Two-armed tasks",
-        MOST,
-        _ec4_keeps_lrlr,
-        _EC4,
-        "remained the same as that found under exploration condition 3",
-        "Figure 8",
-        fitted=True,
-    ),
-)
