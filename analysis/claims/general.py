@@ -38,7 +38,7 @@ decides("resembles-squared-changes", TEST)(resembles("squared-changes"))
     "each task and condition",
     CELLS,
 )
-def _learning_improves(data: Data, cells: Cells) -> Finding:
+def _learning_improves(cells: Cells, data: Data) -> Finding:
     tests, parts = [], []
     for task, condition in cells:
         initial = float(data.learned(task, condition).initial_reward.iloc[0])
@@ -57,7 +57,7 @@ def _learning_improves(data: Data, cells: Cells) -> Finding:
     "exact: failed trials of the learner, hand sequences without a reward",
     CELLS,
 )
-def _corrective_ensures(data: Data, cells: Cells) -> Finding:
+def _corrective_ensures(cells: Cells, data: Data) -> Finding:
     trials = failed = sequences = missed = 0
     for task, condition in cells:
         runs = data.learned(task, condition)
@@ -81,7 +81,7 @@ def _corrective_ensures(data: Data, cells: Cells) -> Finding:
     "shortest way from the same posture (the shortest that a search finds)",
     CELLS,
 )
-def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
+def _corrective_near_shortest(cells: Cells, data: Data) -> Finding:
     parts, all_excess = [], []
     for name in dict.fromkeys(task for task, _ in cells):
         task, initial = data.task(name), data.initial(name)
@@ -110,7 +110,7 @@ def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
     "shortest path is at least as good (letters of what is told: docs/methods.md)",
     BEST,
 )
-def _less_experience(data: Data, cells: Cells) -> Finding:
+def _less_experience(cells: Cells, data: Data) -> Finding:
     parts, holds = [], True
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
@@ -139,7 +139,7 @@ def _less_experience(data: Data, cells: Cells) -> Finding:
     "gradients and Hessians of costs, quadratic programs",
     BEST,
 )
-def _low_computation(data: Data, cells: Cells) -> Finding:
+def _low_computation(cells: Cells, data: Data) -> Finding:
     parts, below, above = [], [], []
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
@@ -185,7 +185,7 @@ def _informed(data: Data, task: str) -> list[str]:
     "holds, the smallest p times their number (Bonferroni)",
     BEST,
 )
-def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
+def _beats_inaccurate(cells: Cells, data: Data) -> Finding:
     tests, parts = [], []
     for task, condition in cells:
         rewards = data.rewards(task, condition)

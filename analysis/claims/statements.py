@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ def decides(name: str, test: str) -> Callable[[Judge], Judge]:
     return enter
 
 
-JudgeOfCells = Callable[[Data, Cells], Finding]
+JudgeOfCells = Callable[[Cells, Data], Finding]
 
 
 def decides_apart(name: str, test: str, cells: Cells) -> Callable[[JudgeOfCells], JudgeOfCells]:
@@ -57,7 +58,7 @@ def decides_apart(name: str, test: str, cells: Cells) -> Callable[[JudgeOfCells]
         for which in _APART:
             two = which == "two-armed"
             own = tuple(cell for cell in cells if cell[0].startswith("two-armed") == two)
-            decides(f"{name}-{which}", test)(lambda data, own=own: judge(data, own))
+            decides(f"{name}-{which}", test)(partial(judge, own))
         return judge
 
     return enter
