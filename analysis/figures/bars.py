@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, spoken
 from analysis.figures.selection import CONDITIONS, has, known_tasks, missing, rewards_of, solved
 from analysis.figures.style import (
     GREY,
@@ -78,10 +78,6 @@ def bars(
         axes.set_title(heading(found[name]))
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     letters(panels)
-    values = "; ".join(
-        f"{row['task']}, {short_name(row['method'])}: {row['reward']:.1f}"
-        for row in data.to_dict("records")
-    )
     return Plot(
         id="learned-reward",
         title="Learned reward by condition",
@@ -95,7 +91,7 @@ def bars(
             "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
             f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(found[name] for name in labels)}"
         ),
-        alt=f"Bars of mean learned reward with intervals. {values}.",
+        alt=f"Bars of mean learned reward with intervals. {spoken(data, 'reward', 1)}.",
         figure=figure,
         data=data,
     )

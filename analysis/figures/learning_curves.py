@@ -9,23 +9,20 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, spoken
 from analysis.figures.selection import CONDITIONS, has, known_tasks, missing
 from analysis.figures.style import (
-    GREY,
-    INK,
-    SMALL,
-    TWO,
+    INITIAL,
+    OPTIMUM,
     dagger,
-    grid,
-    heading,
-    letters,
+    entry,
+    legend,
     log_axis,
     looks,
     styled,
+    task_panels,
 )
 from analysis.methods import short_name
 from coartic import CoarticError, Task
@@ -73,21 +70,11 @@ def learning_curves(
     shown = {name: found[name] for name in data.task.unique()}
     asked = list(methods or _DEFAULT)
     labels = sorted(data.method.unique(), key=asked.index)
-    rows, columns, height = grid(len(shown), 2.15, 0.45)
-    figure = Figure(figsize=(TWO, height), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[len(shown) :]:
-        axes.set_axis_off()
-    for place, (axes, task) in enumerate(zip(panels, shown.values(), strict=False)):
+    figure, panels = task_panels(shown.values(), 2.15, 0.45, "trial", "reward (ticks)")
+    for axes, task in zip(panels, shown.values(), strict=True):
         _panel(axes, study, task, data[data.task == task.name], labels, log=log)
-        axes.set_ylabel("" if place % columns else "reward (ticks)")
-        axes.set_xlabel("trial" if place + columns >= len(shown) else "")
-    letters(panels[: len(shown)])
     _legend(figure, labels)
-    ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
-    words = "; ".join(
-        f"{row['task']}, {short_name(row['method'])}: {row['best']:.0f}" for row in ends
-    )
+    ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "best")
     return Plot(
         id="learning-curves",
         title="Learning curves",
@@ -98,7 +85,7 @@ def learning_curves(
             "initial solution; dotted: optimum with all joints free. Axes are cut below where "
             f"trials fall far short of the initial solution.{dagger(shown.values())}"
         ),
-        alt=f"Curves of reward against trial. Mean best reward at the end: {words}.",
+        alt=f"Curves of reward against trial. Mean best reward at the end: {ends}.",
         figure=figure,
         data=data,
     )
@@ -152,8 +139,10 @@ def _curves(
 def _running(rewards: Array, window: int) -> Array:
     """Mean of the last ``window`` trials of all runs: (runs, n) to (n,), NaN where none."""
     known = ~np.isnan(rewards)
-    total = np.concatenate([[0.0], np.cumsum(np.where(known, rewards, 0.0).sum(axis=0))])
-    count = np.concatenate([[0], np.cumsum(known.sum(axis=0))])
+    total, count = (
+        np.concatenate([[0.0], np.cumsum(values.sum(axis=0))])
+        for values in (np.where(known, rewards, 0.0), known)
+    )
     end = np.arange(1, rewards.shape[1] + 1)
     start = np.maximum(end - window, 0)
     trials = count[end] - count[start]
@@ -178,32 +167,23 @@ def _panel(
     except CoarticError:
         initial = None
     if initial is not None:
-        axes.axhline(initial, color=GREY, linewidth=0.8, linestyle=(0, (5, 1.2, 1, 1.2)))
+        axes.axhline(initial, **INITIAL)
         floor, top = initial, max(top, initial)
     optimum = study.optima.get((task.name, "free"))
     if optimum is not None:
-        axes.axhline(optimum.reward, color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)))
+        axes.axhline(optimum.reward, **OPTIMUM)
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
     if log:
         log_axis(axes)
     axes.set_xlim(1, max(2, data.trial.max()))
-    axes.set_title(heading(task))
 
 
 def _legend(figure: Figure, labels: Sequence[str]) -> None:
-    style = looks(labels)
     handles = [
-        Line2D([], [], color=style[label].color, linestyle=style[label].dash, linewidth=1.3,
-               label=short_name(label))
-        for label in labels
-    ]  # fmt: skip
-    handles += [
-        Line2D(
-            [], [], color=GREY, linewidth=0.8, linestyle=(0, (5, 1.2, 1, 1.2)), label="initial"
-        ),
-        Line2D([], [], color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)), label="optimum"),
+        entry(short_name(label), color=look.color, linestyle=look.dash, linewidth=1.3)
+        for label, look in looks(labels).items()
     ]
-    columns = min(len(handles), 4)
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=SMALL)
+    handles += [entry("initial", **INITIAL), entry("optimum", **OPTIMUM)]
+    legend(figure, handles, min(len(handles), 4))
