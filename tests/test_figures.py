@@ -22,7 +22,7 @@ from analysis.figures.configurations import (
 from analysis.figures.context import context
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
-from analysis.figures.plot import FORMATS, _settle, save, svg_text, write
+from analysis.figures.plot import FORMATS, _settle, save, svg_text
 from analysis.figures.profiles import profiles
 from analysis.figures.published import published
 from analysis.figures.recruitment import recruitment
@@ -121,7 +121,7 @@ def test_a_folder_without_the_learner(alone):
     assert figures.plots[0].id == "tasks"
     with pytest.raises(CoarticError, match=r"no solved run of dual-process/EC1 on descending"):
         configurations(alone, [("descending", ["dual-process/EC1"])])
-    with pytest.raises(CoarticError, match=r"no task ascending"):
+    with pytest.raises(CoarticError, match=r"no task 'ascending'"):
         configurations(alone, [("ascending", [])])
     with pytest.raises(CoarticError, match=r"no task 'nope'; it has descending"):
         bars(alone, tasks=["nope"])
@@ -415,8 +415,6 @@ def test_files_are_the_same_every_time(study, tmp_path):
 
 def test_files_that_cannot_be_written(study, tmp_path):
     plot = tasks_plot([load_task("ascending")])
-    with pytest.raises(CoarticError, match=r"x\.bmp: the name of a figure must end in"):
-        write(plot, tmp_path / "x.bmp")
     (tmp_path / "file").write_text("")
     with pytest.raises(CoarticError, match="cannot write to"):
         save(plot, tmp_path / "file")

@@ -8,8 +8,6 @@ from dataclasses import replace
 
 from analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
 from analysis.claims.evidence import Arm, by_optimum, estimate_of, measured, of_either_optimum
-from analysis.claims.judges import costs, presence  # noqa: F401  (they enter themselves)
-from analysis.claims.judges.resemblance import TEST, resembles
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
@@ -19,9 +17,6 @@ from analysis.report.document import Column, RestsOn, Row
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import SEED, difference_of_means, mean
 from analysis.words import NONE, interval
-
-for _cost in ("acceleration", "jerk"):
-    decides(f"resembles-{_cost}", TEST)(resembles(_cost))
 
 _EQUIVALENT = f"within ± {MARGIN:.0%}"
 

@@ -13,9 +13,9 @@ from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     conditions,
     general,
     one_armed,
-    two_armed_1,
-    two_armed_2,
+    two_armed,
 )
+from analysis.claims.judges import costs, presence, resemblance  # noqa: F401
 from analysis.claims.register import Claim, Judged, judge_claims
 from analysis.claims.statements import JUDGED, STATEMENTS
 
@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from analysis.study import Study
 
 CLAIMS: tuple[Claim, ...] = tuple(JUDGED[name] for name in STATEMENTS)
+_COLUMNS = (
+    *("id", "section", "statement", "verdict", "fitted", "evidence", "test"),
+    *("p", "adjusted_p", "contrary_p", "adjusted_contrary_p"),
+    *("place", "quote", "figure", "runs", "sources"),
+)
 
 
 def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
@@ -39,26 +44,13 @@ def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
     ``figure`` (of the paper), ``runs`` (ids, space-separated), ``sources`` (what else it rests
     on).
     """
-    return pd.DataFrame(
-        [
-            {
-                "id": entry.claim.id,
-                "section": entry.claim.section,
-                "statement": entry.claim.statement,
-                "verdict": entry.verdict,
-                "fitted": entry.claim.fitted,
-                "evidence": entry.evidence,
-                "test": entry.claim.test,
-                "p": entry.p,
-                "adjusted_p": entry.adjusted_p,
-                "contrary_p": entry.contrary_p,
-                "adjusted_contrary_p": entry.adjusted_contrary_p,
-                "place": entry.claim.place,
-                "quote": entry.claim.quote,
-                "figure": entry.claim.figure,
-                "runs": " ".join(entry.run_ids),
-                "sources": ", ".join(entry.sources),
-            }
-            for entry in judged
-        ]
-    )
+    rows = [
+        {
+            **vars(entry.claim),
+            **vars(entry),
+            "runs": " ".join(entry.run_ids),
+            "sources": ", ".join(entry.sources),
+        }
+        for entry in judged
+    ]
+    return pd.DataFrame(rows, columns=_COLUMNS)

@@ -17,8 +17,7 @@ from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.rows import SignatureRow
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST
-from coartic import Execution, Task, corrective_trial, initial_hands
-from coartic.errors import NotApplicableError
+from coartic import Execution, Task
 from coartic.method import Information
 from coartic.robot import Array
 
@@ -142,9 +141,14 @@ class Data:
         self.note(tuple(found.run_id))
         return found
 
-    def rewards(self, task: str, condition: str) -> Array:
-        """Learned rewards, shape ``(runs,)``."""
-        return rewards_of(self.learned(task, condition))
+    def rewards(self, task: str, condition: str, hands: str | None = None) -> Array:
+        """Learned rewards of runs (that learned ``hands``), shape ``(runs,)``."""
+        found = rewards_of(self.learned(task, condition, hands))
+        if len(found) < FEWEST:
+            raise MissingError(
+                f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
+            )
+        return found
 
     def replays(self, task: str, condition: str, hands: str | None = None) -> Array:
         """Rewards of noiseless replays of runs (that learned ``hands``), shape ``(runs,)``.
@@ -156,15 +160,6 @@ class Data:
         if not np.isfinite(replays).all():
             raise MissingError(f"a run of {condition} on {task} has no replay")
         return replays
-
-    def group(self, task: str, condition: str, hands: str) -> Array:
-        """Learned rewards of the runs that learned a hand sequence, shape ``(runs,)``."""
-        found = rewards_of(self.learned(task, condition, hands))
-        if len(found) < FEWEST:
-            raise MissingError(
-                f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
-            )
-        return found
 
     def cell(self, task: str, method: str) -> Trajectories:
         """Executed solutions; raises MissingError where there are none."""
@@ -192,12 +187,8 @@ class Data:
 
     def initial(self, name: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
-        task = self.task(name)
-        try:
-            execution = corrective_trial(task, initial_hands(task))
-        except NotApplicableError:
-            execution = None
-        if execution is None or not execution.completed:
+        execution = Trajectories(self.task(name), "", "", ()).initial
+        if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
         self._others.append(f"the corrective process on {name}")
         return execution

@@ -13,9 +13,8 @@ import numpy as np
 
 from analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
 from analysis.claims.judges.reach import shortest_reach
-from analysis.claims.judges.resemblance import TEST, resembles
 from analysis.claims.register import Finding
-from analysis.claims.statements import decides, decides_apart
+from analysis.claims.statements import decides_apart
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
 from analysis.signatures.subtasks import postures_before
@@ -28,8 +27,6 @@ from coartic.task import hands_of
 CLOSE = 0.10
 """Of a way beyond the shortest: "close to the shortest distance"."""
 _PLAN = "trajectory-optimisation/"
-
-decides("resembles-squared-changes", TEST)(resembles("squared-changes"))
 
 
 @decides_apart(

@@ -16,11 +16,13 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import EngFormatter, NullFormatter
 
 from analysis.methods import METHODS, Color, Dash
 from coartic import Task
 
+amount = EngFormatter(sep="")
+"""A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
 INCH = 25.4  # mm
 ONE = 85 / INCH
 """Width of one journal column, inches."""
@@ -198,19 +200,10 @@ def on(color: str) -> str:
     return "#111111" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.42 else "#fdfdfd"
 
 
-def amount(value: float, _: object = None) -> str:
-    """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
-    if not value:
-        return "0"
-    sizes = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-    size, unit = next(((s, u) for s, u in sizes if abs(value) >= 0.999 * s), sizes[-1])
-    return f"{value / size:.3g}{unit}"
-
-
 def log_axis(axes: Axes) -> None:
     """A logarithmic x axis with plain numbers at whole decades."""
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(amount))
+    axes.xaxis.set_major_formatter(amount)
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 

@@ -69,7 +69,7 @@ def nearly_all(
 
 def better_hands(data: Data, task: str, condition: str, better: str, worse: str) -> Finding:
     """Test of the learned rewards of the runs that learned the one and the other."""
-    a, b = data.group(task, condition, better), data.group(task, condition, worse)
+    a, b = (data.rewards(task, condition, hands) for hands in (better, worse))
     test = bootstrap_test(a, b, seed=SEED)
     printed = published_cell(task, condition)
     assert printed is not None

@@ -1,4 +1,4 @@
-"""The paper's claims about two-armed task 1 (exploration conditions 2 to 4)."""
+"""The paper's claims about two-armed tasks 1 and 2."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import ONE, Data, MissingError, rewards_of
+from analysis.claims.data import ONE, TWO, Data, MissingError, rewards_of
 from analysis.claims.judges.hands import (
     AS_OFTEN,
     MOST,
@@ -26,7 +26,7 @@ from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval, tally
 from coartic.robot import Array
 
-# Before learning
+# Two-armed task 1: before learning
 
 
 @decides("right-hand-better", "exact: reward of the corrective process alone")
@@ -54,7 +54,7 @@ def _initial_base_reverses(data: Data) -> Finding:
     )
 
 
-# Exploration condition 2
+# Two-armed task 1: exploration condition 2
 
 
 @decides("ec2-sequences", f"{AS_OFTEN}; of RRLR")
@@ -115,7 +115,7 @@ def _ec2_unreliable(data: Data) -> Finding:
     return replace(seen, evidence=f"RRRR is left in {seen.evidence}; {tally(found)}")
 
 
-# Exploration conditions 3 and 4
+# Two-armed task 1: exploration conditions 3 and 4
 
 
 def _lrlr_in_all(data: Data, condition: str) -> Finding:
@@ -180,3 +180,53 @@ def _ec3_beats_exhaustive(data: Data) -> Finding:
         f"{interval(mean(rewards, seed=SEED))} against {best:.0f} (published {published[1]})",
         (test,),
     )
+
+
+# Two-armed task 2
+
+
+@decides("best-is-rrrr", "exact: rewards of all hand sequences; a tie leaves it open")
+def _best_is_rrrr(data: Data) -> Finding:
+    best, reward = data.best_sequences(TWO)
+    printed = published_exhaustive(TWO)
+    assert printed is not None
+    shown = f"{' and '.join(best)} {reward:.0f} (published {printed[0]} {printed[1]})"
+    text = f"best of the corrective process alone: {shown}"
+    if "RRRR" not in best:
+        return Finding(False, text)
+    return Finding(True, text) if len(best) == 1 else Finding(None, f"{text}: a tie")
+
+
+@decides("half-choose-rlrr", f"{AS_OFTEN}; of RLRR")
+def _half_choose_rlrr(data: Data) -> Finding:
+    return as_often(data, TWO, "EC3", "RLRR")
+
+
+@decides(
+    "ec3-departs",
+    "exact: runs with a hand sequence that is not among the best of the corrective process",
+)
+def _ec3_departs(data: Data) -> Finding:
+    best, reward = data.best_sequences(TWO)
+    found = Counter(data.learned(TWO, "EC3").hands)
+    away = sum(count for hands, count in found.items() if hands not in best)
+    text = (
+        f"{tally(found)}; best of the corrective process alone {' and '.join(best)} "
+        f"({reward:.0f}): {away} of {found.total()} runs depart from it"
+    )
+    if away:
+        return Finding(True, text)
+    if len(best) > 1:
+        return Finding(None, f"{text}. With a tie, to choose among the best is no departure")
+    return Finding(False, text)
+
+
+@decides("rlrr-better", "one-tailed bootstrap test of two samples")
+def _rlrr_better(data: Data) -> Finding:
+    return better_hands(data, TWO, "EC3", "RLRR", "RRRR")
+
+
+@decides("ec4-mixed", "exact: more than one hand sequence")
+def _ec4_mixed(data: Data) -> Finding:
+    found = Counter(data.learned(TWO, "EC4").hands)
+    return Finding(len(found) > 1, f"{tally(found)} of {found.total()} runs")
