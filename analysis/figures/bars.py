@@ -15,7 +15,7 @@ from scipy import stats
 from analysis.comparisons.paper import published_of
 from analysis.figures.configurations import initial_solution
 from analysis.figures.plot import Plot, spoken
-from analysis.figures.selection import CONDITIONS, has, known_tasks, missing, rewards_of, solved
+from analysis.figures.selection import CONDITIONS, has, missing, rewards_of, solved
 from analysis.figures.style import (
     GREY,
     INK,
@@ -40,30 +40,23 @@ STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 
 
 @styled
-def bars(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Mean learned reward of each method, as a bar from the initial solution up.
 
     By default the paper's conditions on the tasks where the folder has more than one of
     them. Each method is tested against the one to its left, the first against the initial
     solution: one-tailed bootstrap tests, adjusted over the figure by Holm. Raises
-    CoarticError where a task or all of a task's methods are missing.
+    CoarticError where there is no such task.
     """
-    found = known_tasks(study, tasks)
-    labels = {
-        name: [label for label in (methods or _conditions(name)) if has(study, name, label)]
-        for name in found
-    }
-    if tasks is None:
-        labels = {name: own for name, own in labels.items() if len(own) > (methods is None)}
-    empty = [name for name, own in labels.items() if not own]
-    if empty or not labels:
-        raise missing(
-            study,
-            f"no solved runs of {', '.join(methods or CONDITIONS)} on "
-            f"{', '.join(empty) or 'one task, more than one of them'}",
-        )
+    least = 2 if methods is None else 1
+    labels = {}
+    for name in study.tasks:
+        own = [label for label in (methods or _conditions(name)) if has(study, name, label)]
+        if len(own) >= least:
+            labels[name] = own
+    if not labels:
+        asked = ", ".join(methods or CONDITIONS)
+        raise missing(study, f"no solved runs of {asked} on one task, more than one of them")
     data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
     adjusted = holm(data.p.tolist())
     data = data.assign(p_holm=adjusted).reset_index(drop=True)
@@ -75,7 +68,7 @@ def bars(
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
-        axes.set_title(heading(found[name]))
+        axes.set_title(heading(study.tasks[name]))
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     letters(panels)
     return Plot(
@@ -89,7 +82,7 @@ def bars(
             "bootstrap test that the mean is higher than what stands to the left "
             f"({RESAMPLES} resamples, seed {SEED}), Holm-adjusted over the figure: "
             "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
-            f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(found[name] for name in labels)}"
+            f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(study.tasks[name] for name in labels)}"
         ),
         alt=f"Bars of mean learned reward with intervals. {spoken(data, 'reward', 1)}.",
         figure=figure,

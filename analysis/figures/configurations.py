@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from analysis.figures.plot import Plot
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.figures.selection import CONDITIONS, known_tasks, missing, solved
+from analysis.figures.selection import CONDITIONS, missing, solved
 from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, entry, number, styled
 from analysis.methods import short_name
 from analysis.signatures.trajectories import Trajectories
@@ -145,7 +145,9 @@ def configurations(
     has a row for each of so many :func:`common_sequences`. Raises CoarticError for what the
     folder lacks.
     """
-    known_tasks(study, [task for task, _ in rows])
+    unknown = [task for task, _ in rows if task not in study.tasks]
+    if unknown:
+        raise missing(study, f"no task {', '.join(unknown)}")
     shown: list[Solution] = []
     for task, methods in rows:
         shown.append(initial_solution(study, task))

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.bars import stars
 from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.selection import chosen, missing
 from analysis.figures.style import (
     BLUE,
     GREY,
@@ -40,21 +40,17 @@ _PARTS = {"motor-equivalent part": "equivalent", "non-motor-equivalent part": "o
 
 
 @styled
-def context(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Motor-equivalent and non-motor-equivalent part of the difference between contexts.
 
-    One panel for each goal that two tasks of the folder share before they differ, both
-    among ``tasks`` where these are named. Raises CoarticError where no method has runs on two
-    such tasks, or there are more than :data:`MOST` panels.
+    One panel for each goal that two tasks of the folder share before they differ. Raises
+    CoarticError where no method has runs on two such tasks, or there are more than
+    :data:`MOST` panels.
     """
-    data = _parts(study, methods, tasks)
+    data = _parts(study, methods)
     places = list(data.groupby(["task", "where"], sort=False))
     if len(places) > MOST:
-        raise missing(
-            study, f"{len(places)} pairs of tasks share a goal, more than {MOST}: name some tasks"
-        )
+        raise missing(study, f"{len(places)} pairs of tasks share a goal, more than {MOST}")
     rows = sum(len(group) + 4 for _, group in places)
     figure = Figure(figsize=(ONE, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
     heights = [len(group) + 1 for _, group in places]
@@ -96,13 +92,10 @@ def context(
     )
 
 
-def _parts(
-    study: Study, methods: Sequence[str] | None, tasks: Sequence[str] | None
-) -> pd.DataFrame:
+def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:
     """One row a place and method: both parts, with p raw and adjusted over all rows."""
-    names, frame = set(known_tasks(study, tasks)), study.signatures
+    frame = study.signatures
     frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
-    frame = frame[frame.task.isin(names) & frame.against.isin(names)]
     labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
     frame = frame[frame.label.isin(labels)]
     if not len(frame):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from analysis.comparisons.progress import SPENDS
 from analysis.figures.plot import Plot, spoken
-from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.selection import chosen, missing
 from analysis.figures.style import (
     INK,
     OPTIMUM,
@@ -44,42 +44,25 @@ _RING: Any = {"color": INK, "markerfacecolor": "none"}
 
 
 @styled
-def frontier(
-    study: Study,
-    *,
-    spends: Sequence[str] = SPENDS,
-    methods: Sequence[str] | None = None,
-    tasks: Sequence[str] | None = None,
-) -> list[Plot]:
+def frontier(study: Study, *, methods: Sequence[str] | None = None) -> list[Plot]:
     """Best reward so far against each spend, one figure a spend, one panel a task.
 
     Methods that plan are a point at all that they spend; those that spend nothing of a kind
-    stand at the left edge. Raises CoarticError where there is nothing to draw and ValueError
-    for a spend that is not one of :data:`analysis.comparisons.progress.SPENDS`.
+    stand at the left edge. Raises CoarticError where there is nothing to draw.
     """
-    unknown = [spend for spend in spends if spend not in SPENDS]
-    if unknown:
-        raise ValueError(f"unknown spends {unknown}; known: {list(SPENDS)}")
-    found = known_tasks(study, tasks)
-    labels = [
-        label for label in chosen(study, list(found), methods) if not label.startswith(SEARCH)
-    ]
+    found = study.tasks
+    labels = [name for name in chosen(study, list(found), methods) if not name.startswith(SEARCH)]
     frame = study.anytime
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
-    pareto = study.pareto
-    front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]
+    keys = ["task", "method", "spend"]
+    front = pd.MultiIndex.from_frame(study.pareto[study.pareto.front.astype(bool)][keys])
+    frame = frame.assign(front=pd.MultiIndex.from_frame(frame[keys]).isin(front))
     plots = []
-    for spend in spends:
-        rows = frame[frame.spend == spend]
-        if not len(rows):
-            continue
-        ends = front[front.spend == spend]
-        on_front = set(zip(ends.task, ends.method, strict=True))
-        data = rows.assign(
-            front=[pair in on_front for pair in zip(rows.task, rows.method, strict=True)]
-        ).reset_index(drop=True)
-        shown = {name: task for name, task in found.items() if name in set(data.task)}
-        plots.append(_plot(study, spend, data, shown, labels))
+    for spend in SPENDS:
+        data = frame[frame.spend == spend].reset_index(drop=True)
+        if len(data):
+            shown = {name: task for name, task in found.items() if name in set(data.task)}
+            plots.append(_plot(study, spend, data, shown, labels))
     if not plots:
         raise missing(study, "no run of the methods has a solution and a known spend")
     return plots

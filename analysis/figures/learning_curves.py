@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.configurations import initial_solution
 from analysis.figures.plot import Plot, spoken
-from analysis.figures.selection import CONDITIONS, has, known_tasks, missing
+from analysis.figures.selection import CONDITIONS, has, missing
 from analysis.figures.style import (
     INITIAL,
     OPTIMUM,
@@ -38,28 +38,17 @@ _DEFAULT = (*CONDITIONS, "random-search/climbing", "cma-es/bandit")
 
 
 @styled
-def learning_curves(
-    study: Study,
-    *,
-    methods: Sequence[str] | None = None,
-    tasks: Sequence[str] | None = None,
-    log: bool = True,
-    window: int = WINDOW,
-) -> Plot:
+def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Reward of methods that learn by trial, one panel a task.
 
-    By default the learner's conditions, hill climbing and CMA-ES. ``log``: trials on a
-    logarithmic axis. ``window``: trials averaged. Raises CoarticError where there is nothing
-    to draw and ValueError for a window below 1.
+    By default the learner's conditions, hill climbing and CMA-ES. Raises CoarticError where
+    there is nothing to draw.
     """
-    if window < 1:
-        raise ValueError(f"window {window}: it is a number of trials, at least 1")
-    found = known_tasks(study, tasks)
     learning = study.results.learning()
     by_run = {str(run): rows for run, rows in learning.groupby("run_id", sort=False)}
     parts = [
-        _curves(study, name, label, by_run, log=log, window=window)
-        for name in found
+        _curves(study, name, label, by_run)
+        for name in study.tasks
         for label in (methods or _default(study, name))
         if has(study, name, label)
     ]
@@ -67,12 +56,12 @@ def learning_curves(
     if not parts:
         raise missing(study, f"no run of {', '.join(methods or _DEFAULT)} that learns by trial")
     data = pd.concat(parts, ignore_index=True)
-    shown = {name: found[name] for name in data.task.unique()}
+    shown = {name: study.tasks[name] for name in data.task.unique()}
     asked = list(methods or _DEFAULT)
     labels = sorted(data.method.unique(), key=asked.index)
     figure, panels = task_panels(shown.values(), 2.15, 0.45, "trial", "reward (ticks)")
     for axes, task in zip(panels, shown.values(), strict=True):
-        _panel(axes, study, task, data[data.task == task.name], labels, log=log)
+        _panel(axes, study, task, data[data.task == task.name], labels)
     _legend(figure, labels)
     ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "best")
     return Plot(
@@ -81,7 +70,7 @@ def learning_curves(
         caption=(
             "Best reward so far (thick; mean over runs, band: middle half of the runs) and "
             "reward of the trials themselves (thin; mean over runs, averaged over the last "
-            f"{window} trials, fewer at the start; failed trials are left out). Dash-dotted: "
+            f"{WINDOW} trials, fewer at the start; failed trials are left out). Dash-dotted: "
             "initial solution; dotted: optimum with all joints free. Axes are cut below where "
             f"trials fall far short of the initial solution.{dagger(shown.values())}"
         ),
@@ -99,15 +88,7 @@ def _default(study: Study, task: str) -> list[str]:
     return others if two else labels
 
 
-def _curves(
-    study: Study,
-    task: str,
-    label: str,
-    by_run: dict[str, pd.DataFrame],
-    *,
-    log: bool,
-    window: int,
-) -> pd.DataFrame:
+def _curves(study: Study, task: str, label: str, by_run: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Both curves of a method at chosen trials; empty where it does not learn by trial."""
     ids = [str(run) for run in study.cells[task, label].good.run_id if str(run) in by_run]
     if not ids:
@@ -117,9 +98,7 @@ def _curves(
     rewards = np.array([run[:length] for run in runs])
     best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards), axis=1)
     best[np.isinf(best)] = np.nan
-    running = _running(rewards, window)
-    spaced = np.geomspace(1, length, POINTS) if log else np.linspace(1, length, POINTS)
-    at = np.unique(np.round(spaced).astype(np.int64))
+    at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
     # Until every run has a solution there is no mean of them.
     low, high = np.quantile(best[:, at - 1], [0.25, 0.75], axis=0)
     return pd.DataFrame(
@@ -131,27 +110,22 @@ def _curves(
             "best": best[:, at - 1].mean(axis=0),
             "best_low": low,
             "best_high": high,
-            "trials": running[at - 1],
+            "trials": _running(rewards)[at - 1],
         }
     )
 
 
-def _running(rewards: Array, window: int) -> Array:
-    """Mean of the last ``window`` trials of all runs: (runs, n) to (n,), NaN where none."""
-    known = ~np.isnan(rewards)
-    total, count = (
-        np.concatenate([[0.0], np.cumsum(values.sum(axis=0))])
-        for values in (np.where(known, rewards, 0.0), known)
+def _running(rewards: Array) -> Array:
+    """Mean of the last trials of all runs: (runs, n) to (n,), NaN where none."""
+    sums, counts = (
+        pd.Series(values.sum(axis=0)).rolling(WINDOW, min_periods=1).sum()
+        for values in (np.nan_to_num(rewards), ~np.isnan(rewards))
     )
-    end = np.arange(1, rewards.shape[1] + 1)
-    start = np.maximum(end - window, 0)
-    trials = count[end] - count[start]
-    sums = total[end] - total[start]
-    return np.where(trials > 0, sums / np.maximum(trials, 1), np.nan)
+    return (sums / counts).to_numpy()
 
 
 def _panel(
-    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str], *, log: bool
+    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
 ) -> None:
     style = looks(labels)
     for label, rows in data.groupby("method", sort=False):
@@ -175,8 +149,7 @@ def _panel(
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
-    if log:
-        log_axis(axes)
+    log_axis(axes)
     axes.set_xlim(1, max(2, data.trial.max()))
 
 

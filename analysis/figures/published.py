@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from analysis.figures.plot import Plot
-from analysis.figures.selection import CONDITIONS, known_tasks, missing
+from analysis.figures.selection import CONDITIONS, missing
 from analysis.figures.style import (
     BLUE,
     GREY,
@@ -43,15 +43,13 @@ _MARKS = {
 
 
 @styled
-def published(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def published(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Difference of every mean reward to the printed one, with interval and margin.
 
     Cells with the paper's number of trials, by default of its conditions; where it reports
     hand sequences, those too. Raises CoarticError where the folder has none of the paper's cells.
     """
-    found, labels = known_tasks(study, tasks), methods or CONDITIONS
+    found, labels = study.tasks, methods or CONDITIONS
     places = [(name, label) for name in found for label in labels]
     whole = {(row.cell.task, row.cell.label): row for row in paper_rows(study) if row.comparable}
     sequences = sequence_rows(study)

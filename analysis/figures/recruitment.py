@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from analysis.comparisons.paper import published_of
 from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, has, known_tasks, missing, solved
+from analysis.figures.selection import chosen, has, missing, solved
 from analysis.figures.style import (
     GREY,
     INK,
@@ -40,15 +40,13 @@ _EDGE: Any = {"edgecolor": INK, "linewidth": 0.4}
 
 
 @styled
-def recruitment(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Shares of hand sequences of each method, one panel a task with two hands.
 
     Where the paper prints the number of runs of each sequence, its shares stand below ours.
     Raises CoarticError where no method was run on a task with two hands.
     """
-    found = {name: task for name, task in known_tasks(study, tasks).items() if len(task.hands) > 1}
+    found = {name: task for name, task in study.tasks.items() if len(task.hands) > 1}
     if not found:
         raise missing(study, "no task with two hands")
     labels = chosen(study, list(found), methods)
