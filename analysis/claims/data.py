@@ -172,9 +172,8 @@ class Data:
         """The first value of a signature (at a goal); MissingError without one."""
         self.runs(task, method)
         for row in self.study.signature_rows:
-            if (row.task, row.label, row.signature) == (task, method, name) and (
-                goal in (None, row.place.goal) and not math.isnan(row.value)
-            ):
+            wanted = (row.task, row.label, row.signature) == (task, method, name)
+            if wanted and goal in (None, row.place.goal) and not math.isnan(row.value):
                 return row
         raise MissingError(f"{name} of {method} on {task} has no value")
 
