@@ -10,10 +10,6 @@ from analysis.report.tables.common import finite, table, with_interval
 from analysis.statistics.equivalence import MARGIN
 from analysis.statistics.estimates import FEWEST
 
-_SPENDS = dict(
-    zip(SPENT, ("trials", "ticks", "kinematics", "Jacobians", "solve time"), strict=True)
-)
-
 
 def differing_table(found: VersionComparison) -> DataTable | None:
     """What was asked for, and where it was run, as far as it differs."""
@@ -46,7 +42,7 @@ def versions_table(found: VersionComparison) -> DataTable | None:
             Column("paired", "paired"),
             Column("p_adjusted", "adjusted p", "p", digits=4, rests_on=("runs",)),
             Column("verdict", "verdict"),
-            *(_number(name, header, "×") for name, header in _SPENDS.items()),
+            *(_number(name, header, "×") for name, header in SPENT.items()),
             Column("remarks", "remarks"),
         ),
         [Row(f"{row.task} {row.label}", _values(row)) for row in found.rows],
