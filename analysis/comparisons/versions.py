@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import solve_times
+from analysis.comparisons.methods import median, solve_times
 from analysis.comparisons.surroundings import Differing, codes, differing_tasks, surroundings
 from analysis.results.folder import CellRuns
 from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
@@ -212,12 +212,11 @@ def _row(
     )
     if differing or failed:
         return row
-    spent: dict[str, Any] = {
-        f"{name}_{side}": _spent(runs, name)
-        for name in SPENT
-        for side, runs in (("a", a), ("b", b))
-    }
-    row = replace(row, mean_a=float(a.reward.mean()), mean_b=float(b.reward.mean()), **spent)
+    found: dict[str, Any] = {"mean_a": float(a.reward.mean()), "mean_b": float(b.reward.mean())}
+    for side, good in (("a", a), ("b", b)):
+        spent = good.assign(solve_s=solve_times(good))
+        found |= {f"{name}_{side}": median(spent[name]) for name in SPENT}
+    row = replace(row, **found)
     if row.identical == len(a) == len(b):
         return replace(row, verdict="identical", paired=True, difference=0.0)
     return _with_difference(row, a, b)
@@ -250,17 +249,11 @@ def _with_difference(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> Versi
     return replace(row, margin=margin, verdict=agreed.verdict)
 
 
-def _spent(runs: pd.DataFrame, name: str) -> float:
-    values = (solve_times(runs) if name == "solve_s" else runs[name]).dropna()
-    return float(values.median()) if len(values) else math.nan
-
-
 def _only(study: Study, other: Study) -> dict[str, list[str]]:
     """Cells that the other has not."""
     found: dict[str, list[str]] = {}
-    for task, label in study.cells:
-        if (task, label) not in other.cells:
-            found.setdefault(label, []).append(task)
+    for task, label in (key for key in study.cells if key not in other.cells):
+        found.setdefault(label, []).append(task)
     return found
 
 
