@@ -11,6 +11,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from analysis.comparisons.progress import BestSoFar, cells_by_optimum
+from analysis.results.folder import CellRuns
 from analysis.statistics.estimates import CONFIDENCE
 from analysis.statistics.survival import kaplan_meier_median
 from coartic.robot import Array
@@ -66,26 +67,23 @@ def targets(study: Study, *, shares: Sequence[float] = SHARES) -> pd.DataFrame:
     locks, for which it is no optimum; of the optimum with the other arm still neither have
     methods that move that arm.
     """
-    rows = [
-        Target(cell.task, cell.label, other_arm, spend, share, *_target(runs, spend, best, share))
-        for other_arm, best, cell, spend, runs in cells_by_optimum(study)
-        for share in shares
-    ]
+    rows = [_target(*place, share) for place in cells_by_optimum(study) for share in shares]
     return pd.DataFrame(rows, columns=Target._fields)
 
 
 def _target(
-    runs: Sequence[BestSoFar], spend: str, optimum: float, share: float
-) -> tuple[int, int, int, float, float, float, float, float, float]:
-    """What follows those fields of a :class:`Target`."""
+    other_arm: str, optimum: int, cell: CellRuns, spend: str, runs: list[BestSoFar], share: float
+) -> Target:
     target = math.ceil(optimum - share * abs(optimum) - 1e-9)
     times, horizon = _times(runs, spend, target)
     count = int(np.isfinite(times).sum())
     chance = binomtest(count, len(runs)).proportion_ci(CONFIDENCE, method="exact")
     seen = np.isfinite(times) & (times <= horizon)
     median = kaplan_meier_median(np.minimum(times, horizon), seen)
-    limits = chance.low, chance.high, median.value, median.low, median.high
-    return target, len(runs), count, *limits, horizon
+    return Target(
+        *(cell.task, cell.label, other_arm, spend, share, target, len(runs), count),
+        *(chance.low, chance.high, median.value, median.low, median.high, horizon),
+    )
 
 
 def _times(runs: Sequence[BestSoFar], spend: str, target: float) -> tuple[Array, float]:

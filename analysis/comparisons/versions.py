@@ -171,14 +171,11 @@ def compare_versions(first: Study, second: Study) -> VersionComparison:
 def _rows(first: Study, second: Study) -> list[VersionRow]:
     """One a cell that both folders have, p-values adjusted over all of them."""
     tasks, ours, theirs = differing_tasks(first, second), codes(first), codes(second)
-    rows = [
-        _row(
-            *(cell, second.cells[key], tasks.get(cell.task)),
-            other_code=ours[cell.method] != theirs[cell.method],
-        )
-        for key, cell in first.cells.items()
-        if key in second.cells
-    ]
+    rows = []
+    for key, cell in first.cells.items():
+        if key in second.cells:
+            other = ours[cell.method] != theirs[cell.method]
+            rows.append(_row(cell, second.cells[key], tasks.get(cell.task), other_code=other))
     adjusted = holm([row.p for row in rows])
     return [replace(row, p_adjusted=p) for row, p in zip(rows, adjusted, strict=True)]
 
