@@ -538,7 +538,7 @@ def test_report_in_latex(report):
         found = set(COMMANDS.findall(text))
         assert found <= ours, (path.name, found - ours)
         assert set(re.findall(r"\\begin\{(\w+)\}", text)) <= {
-            *("table", "tabular", "tabularx", "xltabular"),
+            *("table", "tabular", "tabularx", "longtable"),
         }
         assert balanced(text)
         assert "{evil}" not in text
