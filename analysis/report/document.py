@@ -11,7 +11,6 @@ headers and values are plain text.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -127,25 +126,22 @@ class DataTable:
         if len({row.key for row in self.rows}) < len(self.rows):
             raise ValueError(f"table {self.id}: two rows have the same key")
         for row in self.rows:
-            if len(row.values) != len(names):
-                raise ValueError(
-                    f"table {self.id}, row {row.key!r}: {len(row.values)} values for "
-                    f"{len(names)} columns"
-                )
-            unknown = set(row.cells_by_column) - set(names)
-            if unknown:
-                raise ValueError(f"table {self.id}, row {row.key!r}: no columns {unknown}")
-            for column, value in zip(self.columns, row.values, strict=True):
-                if not isinstance(value, float | int | str | Estimate | None):
-                    raise ValueError(
-                        f"table {self.id}, row {row.key!r}: {column.name} is {value!r}, a "
-                        f"{type(value).__name__}; numbers are Python's"
-                    )
-                if value is not None and isinstance(value, str) != (column.kind == "text"):
-                    raise ValueError(
-                        f"table {self.id}, row {row.key!r}: {column.name} is of kind "
-                        f"{column.kind}, its value is {value!r}"
-                    )
+            for problem in self._problems(row):
+                raise ValueError(f"table {self.id}, row {row.key!r}: {problem}")
+
+    def _problems(self, row: Row) -> Iterator[str]:
+        names = [column.name for column in self.columns]
+        if len(row.values) != len(names):
+            yield f"{len(row.values)} values for {len(names)} columns"
+        unknown = set(row.cells_by_column) - set(names)
+        if unknown:
+            yield f"no columns {unknown}"
+        for column, value in zip(self.columns, row.values, strict=True):
+            if not isinstance(value, float | int | str | Estimate | None):
+                of = type(value).__name__
+                yield f"{column.name} is {value!r}, a {of}; numbers are Python's"
+            elif value is not None and isinstance(value, str) != (column.kind == "text"):
+                yield f"{column.name} is of kind {column.kind}, its value is {value!r}"
 
 
 @dataclass(frozen=True)
@@ -253,12 +249,6 @@ class Document:
     def figures(self) -> list[FigureBlock]:
         """All figures, in order."""
         return [block for block in self.blocks() if isinstance(block, FigureBlock)]
-
-
-def missing(value: Value) -> bool:
-    """Whether there is no value: None, NaN, or an estimate of NaN."""
-    number = value.value if isinstance(value, Estimate) else value
-    return number is None or (isinstance(number, float) and math.isnan(number))
 
 
 def _check_id(name: str) -> None:

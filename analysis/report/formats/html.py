@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
-from itertools import groupby
 from typing import NamedTuple, get_args
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -20,13 +19,12 @@ from analysis.markup import inline
 from analysis.report.document import (
     Block,
     CellKey,
-    DataTable,
     Document,
     FigureBlock,
     PlayerBlock,
     Row,
 )
-from analysis.report.text import Part, parts
+from analysis.report.text import Part, by_column
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
 
@@ -77,7 +75,7 @@ def _template() -> Template:
     page.filters |= {
         "inline": inline,
         "true_minus": true_minus,
-        "columns": columns,
+        "by_column": by_column,
         "small_print": small_print,
         "cell_view": cell_view,
         "stretches": stretches,
@@ -95,11 +93,6 @@ def _on_one_line(value: object) -> object:
 
 def _resource(name: str) -> str:
     return (files("analysis.report") / name).read_text(encoding="utf-8")
-
-
-def columns(table: DataTable) -> list[list[Part]]:
-    """The parts of each column: a page shows SDs and intervals as small print of the values."""
-    return [list(own) for _, own in groupby(parts(table), key=lambda part: part.index)]
 
 
 def small_print(own: list[Part]) -> str:
