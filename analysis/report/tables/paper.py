@@ -67,6 +67,11 @@ _PAPER = (
 )
 
 
+def beside_paper(study: Study) -> tuple[DataTable | None, ...]:
+    """The three tables of this module, as far as there are any."""
+    return published_table(study), sequences_table(study), exhaustive_table(study)
+
+
 def published_table(study: Study) -> DataTable | None:
     """Learned rewards of the paper's cells, published and ours."""
     rows = paper_rows(study)
