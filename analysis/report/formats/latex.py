@@ -3,7 +3,7 @@
 Columns that are not for print are left out, methods have the names that figures show. Columns of
 many words share what the others leave of the line (tabularx); a table of few words that is wider
 than the line is scaled down to it. Tables longer than a page are longtables, which need one
-column of text; their columns of many words share half of the line.
+column of text; their columns of many words share two fifths of the line.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def latex_table(table: DataTable) -> str:
     """One table: numbers in S columns as wide as they need, text and intervals beside them."""
     shown = [part for part in parts(table) if part.column.printed]
     broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
-    width = f"p{{{0.5 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
+    width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
     kinds = "".join(
         rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
         for part in shown
