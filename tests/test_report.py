@@ -107,7 +107,7 @@ def test_documents_that_do_not_fit_are_refused():
         DataTable("t", "", (Column("a", "a", "number"),), (Row("r", (np.int64(3),)),))
     for name in ("With Space", "runs", "", "a/b", "../up"):
         with pytest.raises(ValueError, match="id "):
-            Section(name, "A")
+            Document("t", (Section(name, "A"),))
     with pytest.raises(ValueError, match="both ends"):
         Estimate(1.0, low=0.0)
 

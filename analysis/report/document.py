@@ -119,7 +119,6 @@ class DataTable:
     """Whether a page shows its caption alone until more is asked for."""
 
     def __post_init__(self) -> None:
-        _check_id(self.id)
         names = [column.name for column in self.columns]
         if not names or len(set(names)) < len(names):
             raise ValueError(f"table {self.id}: column names {names} must differ")
@@ -158,9 +157,6 @@ class FigureBlock:
     svg: str
     """An SVG document."""
 
-    def __post_init__(self) -> None:
-        _check_id(self.id)
-
 
 @dataclass(frozen=True)
 class PlayerBlock:
@@ -172,9 +168,6 @@ class PlayerBlock:
     """In inline markup."""
     data: str
     """JSON as :func:`analysis.report.player.player_json` makes it."""
-
-    def __post_init__(self) -> None:
-        _check_id(self.id)
 
 
 Block = Prose | Bullets | DataTable | FigureBlock | PlayerBlock
@@ -191,9 +184,6 @@ class Section:
     folded: bool = False
     """Whether a page shows its title alone until more is asked for."""
 
-    def __post_init__(self) -> None:
-        _check_id(self.id)
-
     def walk(self) -> Iterator[Section]:
         """This section and all below it, in order."""
         yield self
@@ -203,7 +193,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report. Raises ValueError where ids are used twice or a cell is unknown."""
+    """A whole report.
+
+    Raises ValueError where an id is none that can name a file, or is used twice, and where a cell
+    is unknown.
+    """
 
     title: str
     sections: tuple[Section, ...]
@@ -219,6 +213,11 @@ class Document:
             for block in self.blocks()
             if isinstance(block, DataTable | FigureBlock | PlayerBlock)
         ]
+        for name in ids:
+            if not _ID.fullmatch(name):
+                raise ValueError(f"id {name!r}: small letters and digits, joined by - or .")
+            if name == "runs":
+                raise ValueError("id 'runs' is kept for the list of runs")
         twice = {name for name in ids if ids.count(name) > 1}
         if twice:
             raise ValueError(f"ids used twice: {', '.join(sorted(twice))}")
@@ -249,10 +248,3 @@ class Document:
     def figures(self) -> list[FigureBlock]:
         """All figures, in order."""
         return [block for block in self.blocks() if isinstance(block, FigureBlock)]
-
-
-def _check_id(name: str) -> None:
-    if not _ID.fullmatch(name):
-        raise ValueError(f"id {name!r}: small letters and digits, joined by - or .")
-    if name == "runs":
-        raise ValueError("id 'runs' is kept for the list of runs")

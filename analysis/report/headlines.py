@@ -35,6 +35,23 @@ if TYPE_CHECKING:
 
 _INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
 """Exploration condition under which the paper speaks of a task's initial solution."""
+Kind = tuple[str, int, str]
+"""Meaning, decimals and unit."""
+_KINDS: dict[str, Kind] = {
+    "Optimum": ("best reward known, other arm free", 0, "ticks"),
+    "OptimumStill": ("best reward known, other arm still", 0, "ticks"),
+    "PublishedInitialReward": ("published reward of the initial solution", 0, "ticks"),
+    "Gap": ("gap to the optimum", 1, "ticks"),
+    "GapPercent": ("gap to the optimum", 1, "% of the optimum"),
+    "GapStill": ("gap to the optimum, other arm still", 1, "ticks"),
+    "GapStillPercent": ("gap to the optimum, other arm still", 1, "% of the optimum"),
+    "Trials": ("median of physical trials of a run", 0, "trials"),
+    "Evaluations": ("median of forward kinematics and Jacobians of a run", 0, "evaluations"),
+    "SolveSeconds": ("median of wall time of solving", 3, "s"),
+    "InitialReward": ("reward of the initial solution", 0, "ticks"),
+    "PublishedReward": ("published mean reward", 1, "ticks"),
+}
+"""By the end of the macro's name."""
 
 
 def headline_numbers(study: Study) -> list[Number]:
@@ -73,41 +90,29 @@ class _About:
     of: str
     cells: tuple[Cell, ...] = ()
 
-    def value(
-        self, what: str, meaning: str, value: float, digits: int, unit: str, **known: Any
-    ) -> Number:
-        """``known``: further fields of the number."""
+    def value(self, what: str, value: float, kind: Kind | None = None, **known: Any) -> Number:
+        """``kind``: of :data:`_KINDS` by default; ``known``: further fields of the number."""
+        meaning, digits, unit = kind or _KINDS[what]
         fields = {"cells": self.cells, "of": self.of, **known}
         return Number(f"{PREFIX}{self.stem}{what}", meaning, value, digits, unit, **fields)
 
-    def inferred(
-        self, what: str, meaning: str, found: Inference, digits: int, unit: str, **known: Any
-    ) -> Number:
+    def inferred(self, what: str, found: Inference, kind: Kind, **known: Any) -> Number:
         interval = {"low": found.low, "high": found.high, "n": sum(found.n), "how": _how(found)}
-        return self.value(what, meaning, found.estimate, digits, unit, **interval, **known)
+        return self.value(what, found.estimate, kind, **interval, **known)
 
 
 def _tasks(study: Study, names: Names) -> Iterator[Number]:
     for task in study.tasks:
         about = _About(names.tasks[task], task)
-        for arm, suffix in (("free", "Optimum"), ("still", "OptimumStill")):
+        for arm, what in (("free", "Optimum"), ("still", "OptimumStill")):
             best = study.optima.get((task, arm))
             if best is not None:
-                yield about.value(
-                    suffix,
-                    f"best reward known, other arm {arm}",
-                    best.reward,
-                    0,
-                    "ticks",
-                    how=best.how,
-                    cells=best.cells,
-                    origin="" if best.cells else f"the optimum of the {SHIPPED}",
-                )
+                origin = "" if best.cells else f"the optimum of the {SHIPPED}"
+                yield about.value(what, best.reward, how=best.how, cells=best.cells, origin=origin)
         printed = published_initial(task)
         if printed is not None:
-            meaning = "published reward of the initial solution"
             source = _published(_INITIAL[task], derived=printed[2])
-            yield about.value("PublishedInitialReward", meaning, printed[1], 0, "ticks", **source)
+            yield about.value("PublishedInitialReward", printed[1], **source)
 
 
 def _published(condition: int, *, derived: bool) -> dict[str, Any]:
@@ -137,8 +142,8 @@ def _reward(about: _About, cell: CellRuns) -> Number:
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
     found = mean(rewards, seed=SEED)
-    meaning = f"mean learned reward{solved}"
-    return about.inferred("Reward", meaning, found, 1, "ticks", sd=sd(rewards))
+    kind = (f"mean learned reward{solved}", 1, "ticks")
+    return about.inferred("Reward", found, kind, sd=sd(rewards))
 
 
 def _gaps(study: Study, about: _About, reward: Number) -> Iterator[Number]:
@@ -146,41 +151,34 @@ def _gaps(study: Study, about: _About, reward: Number) -> Iterator[Number]:
     ((task, label),) = about.cells
     row = study.method_rows[task, label]
     free, still = (study.optima.get((task, arm)) for arm in ("free", "still"))
-    gaps = [("Gap", "gap to the optimum", free, row.gap)]
+    gaps = [("Gap", free, row.gap)]
     if still is not None and (free is None or still.reward != free.reward):
-        gaps.append(("GapStill", "gap to the optimum, other arm still", still, row.gap_still))
-    for what, meaning, best, known in gaps:
+        gaps.append(("GapStill", still, row.gap_still))
+    for what, best, known in gaps:
         if best is None or math.isnan(known):
             continue
-        units = [("", 1.0, "ticks")]
-        if best.reward:
-            units.append(("Percent", 100 / -best.reward, "% of the optimum"))
-        for suffix, scale, unit in units:
+        how = f"{reward.how}; from the optimum {best.reward}: {best.how}"
+        cells = tuple(dict.fromkeys([*about.cells, *best.cells]))
+        for suffix, scale in (("", 1.0), ("Percent", 100 / -best.reward if best.reward else 0)):
             # The higher the reward, the smaller the gap.
             gap, low, high = (
                 (best.reward - value) * scale for value in (reward.value, reward.high, reward.low)
             )
-            how = f"{reward.how}; from the optimum {best.reward}: {best.how}"
-            cells = tuple(dict.fromkeys([*about.cells, *best.cells]))
-            yield about.value(
-                f"{what}{suffix}", meaning, gap, 1, unit, low=low, high=high, how=how, cells=cells
-            )
+            if scale:
+                yield about.value(f"{what}{suffix}", gap, low=low, high=high, how=how, cells=cells)
 
 
 def _spent(about: _About, cell: CellRuns) -> Iterator[Number]:
     """Medians of what a run spends."""
-    evaluations = "forward kinematics and Jacobians of a run"
-    spent = cell.runs.forward_kinematics + cell.runs.jacobians
-    for what, meaning, values, digits, unit in (
-        ("Trials", "physical trials of a run", cell.runs.trials, 0, "trials"),
-        ("Evaluations", evaluations, spent, 0, "evaluations"),
-        ("SolveSeconds", "wall time of solving", solve_times(cell.good), 3, "s"),
+    for what, values in (
+        ("Trials", cell.runs.trials),
+        ("Evaluations", cell.runs.forward_kinematics + cell.runs.jacobians),
+        ("SolveSeconds", solve_times(cell.good)),
     ):
         known = values.dropna()
         if len(known):
             n = len(known) if len(known) != len(cell.good) else None
-            median = float(known.median())
-            yield about.value(what, f"median of {meaning}", median, digits, unit, n=n)
+            yield about.value(what, float(known.median()), n=n)
 
 
 def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
@@ -189,17 +187,14 @@ def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
         return
     initial = cell.good.initial_reward.dropna().unique()
     if len(initial) == 1:
-        meaning = "reward of the initial solution"
-        how = "deterministic"
-        yield about.value("InitialReward", meaning, float(initial[0]), 0, "ticks", how=how)
+        yield about.value("InitialReward", float(initial[0]), how="deterministic")
     condition = cell.method.removeprefix(LEARNER)
     printed = published_cell(cell.task, condition)
     if printed is not None and printed.summary is not None:
         summary = printed.summary
         source = _published(int(condition.removeprefix("EC")), derived=summary.derived)
         source |= {"sd": math.nan if summary.sd is None else summary.sd, "n": summary.runs}
-        meaning = "published mean reward"
-        yield about.value("PublishedReward", meaning, summary.mean, 1, "ticks", **source)
+        yield about.value("PublishedReward", summary.mean, **source)
 
 
 def _conditions(study: Study, names: Names) -> Iterator[Number]:
@@ -215,9 +210,9 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
             stem = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"
             about = _About(stem, f"{higher} less {lower} on {task}", cells)
             apart = difference_of_means(a, b, seed=SEED)
-            yield about.inferred("Reward", "difference of mean rewards", apart, 1, "ticks")
+            yield about.inferred("Reward", apart, ("difference of mean rewards", 1, "ticks"))
             better = probability_of_improvement(a, b, seed=SEED)
-            yield about.inferred("Improvement", "probability of improvement", better, 2, "")
+            yield about.inferred("Improvement", better, ("probability of improvement", 2, ""))
 
 
 def _hands(study: Study, names: Names) -> Iterator[Number]:
@@ -228,9 +223,9 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
         stem = f"{names.tasks[task]}{names.labels[label]}Hands"
         about = _About(stem, f"{label} on {task}", ((task, label),))
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
-            of = f"of {len(cell.good)} with a solution"
-            meaning = f"runs that learned {hands}"
-            yield about.value(words(str(hands)), meaning, float(count), 0, "runs", how=of)
+            kind = f"runs that learned {hands}", 0, "runs"
+            how = f"of {len(cell.good)} with a solution"
+            yield about.value(words(str(hands)), float(count), kind, how=how)
 
 
 def _signatures(study: Study, names: Names) -> Iterator[Number]:
@@ -247,7 +242,7 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
         place = f" ({row.place})" if str(row.place) else ""
         cells = ((task, label), *([other] if other in study.cells else []))
         about = _About(names.tasks[task] + names.labels[label], f"{label} on {task}", cells)
-        unit = signature.unit.removesuffix(PER_DIMENSION)
+        kind = f"{name}{place}", 2, signature.unit.removesuffix(PER_DIMENSION)
         n = row.n if row.n != len(study.cells[task, label].good) else None
         known = {"low": row.low, "high": row.high, "n": n, "how": "docs/signatures.md"}
-        yield about.value(signature.macro, f"{name}{place}", row.value, 2, unit, **known)
+        yield about.value(signature.macro, row.value, kind, **known)

@@ -79,10 +79,11 @@ def trace_json(study: Study, document: Document, numbers: Iterable[Number]) -> s
         for word in manifest.environment.command
     )
     started = ["python", "-m", "coartic"] if first == "__main__.py" else [first]
+    command = (*started, *rest)
     content = TraceFile(
         specification=content_hash(manifest.specification.model_dump(mode="json")),
-        environment=manifest.environment.model_copy(update={"command": (*started, *rest)}),
-        sources=tuple(_sources(study, document)),
+        environment=manifest.environment.model_copy(update={"command": command}),
+        sources=tuple(_sources(study, document, command)),
         numbers=tuple(numbers),
         optima=tuple((task, arm, best) for (task, arm), best in study.optima.items()),
         tables=tuple(document.tables()),
@@ -105,10 +106,9 @@ def read_trace(home: Path) -> TraceFile:
         ) from None
 
 
-def _sources(study: Study, document: Document) -> Iterator[Source]:
-    manifest = study.results.manifest
+def _sources(study: Study, document: Document, asked: tuple[str, ...]) -> Iterator[Source]:
     commits = study.runs.set_index("run_id").commit.astype(object).fillna("unknown")
-    own_files = any(word.endswith((".toml", ".py")) for word in manifest.environment.command)
+    own_files = any(word.endswith((".toml", ".py")) for word in asked)
     makes: Counter[CellKey] = Counter()
     for (task, label), runs in document.runs.items():
         makes[task, study.cells[task, label].method] += len(runs)
@@ -120,12 +120,13 @@ def _sources(study: Study, document: Document) -> Iterator[Source]:
             label,
             runs,
             tuple(sorted(set(commits[list(runs)]))),
-            _command(manifest.specification, task, method) if made_anew else "",
+            command_of(study.results.manifest.specification, task, method) if made_anew else "",
             makes[task, method],
         )
 
 
-def _command(plan: Plan, task: str, method: str) -> str:
+def command_of(plan: Plan, task: str, method: str) -> str:
+    """Makes the runs of a method on a task anew, of all its variants."""
     options = {
         "--tasks": task,
         "--methods": method,

@@ -57,7 +57,11 @@ class Results:
                 cell.task,
                 cell.method,
                 cell.variant,
-                self.runs[(self.runs.task == cell.task) & (self.runs.label == cell.label)],
+                self.runs[
+                    (self.runs.task == cell.task)
+                    & (self.runs.method == cell.method)
+                    & (self.runs.variant == cell.variant)
+                ],
             )
             for cell in self.manifest.specification.cells
         ]
