@@ -189,6 +189,29 @@ def test_an_interrupt_that_gets_lost_is_raised_again(monkeypatch, capsys, tmp_pa
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_in_the_background_ctrl_c_stays_ignored(monkeypatch, capsys, tmp_path):
+    """As `nohup` and `&` in a script leave it: it is meant for somebody else."""
+
+    class Interrupted(InProcess):
+        def perform(self, jobs):
+            for answer in super().perform(jobs):
+                signal.raise_signal(signal.SIGINT)
+                yield answer
+
+    monkeypatch.setattr(executors, "Local", lambda jobs: Interrupted())
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        code, text, _ = call(
+            monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 2,
+            "--trials", 2, "--out", tmp_path,
+        )  # fmt: skip
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert code == 0
+    assert "2 done in" in text
+
+
 def test_trial_budget(monkeypatch, capsys, tmp_path):
     code, _, _ = call(
         monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 1,

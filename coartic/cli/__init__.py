@@ -63,8 +63,10 @@ def main() -> None:
     warnings.showwarning = lambda message, *_, **__: complain("warning", str(message))
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
     # Ctrl-C ends the process; where something is to be saved before, it is caught there. As an
-    # exception, in the middle of an import, it can get lost.
-    interrupted = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # exception, in the middle of an import, it can get lost. Ignored (nohup, &), it stays so.
+    interrupted = signal.getsignal(signal.SIGINT)
+    if interrupted is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         _check_arguments()
         _check_packages()

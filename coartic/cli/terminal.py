@@ -114,7 +114,9 @@ class Interrupts:
 
     def __init__(self) -> None:
         self._asked = False
-        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        self._before = signal.getsignal(signal.SIGINT)
+        if self._before is not signal.SIG_IGN:  # as it is in the background
+            signal.signal(signal.SIGINT, self._interrupt)
 
     def _interrupt(self, *_: object) -> None:
         self._asked = True

@@ -1,0 +1,172 @@
+"""The README's table "to add": each thing is added by its steps alone, and is in a report."""
+
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.suites import ROOT
+
+METHOD = (ROOT / "tests/example_plugin/coartic_example/__init__.py").read_text(encoding="utf-8")
+LOOK = """
+["nearest-hand"]
+short = "nearest"
+works = ["shah2013"]
+"""
+MEASURE = '''
+
+def hits(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    """Goals that a run hits."""
+    yield mean_of(signature, Place(), [float(len(run.hits)) for run in cell.runs])
+'''
+SIGNATURE = """    Signature(
+        "goals hit",
+        within.hits,
+        "goals",
+        "goals",
+        "how many goals a run hits",
+        "hit",
+        table="main-signatures",
+    ),
+"""
+CLAIM = """
+
+def _all_hit(data: Data) -> Finding:
+    runs = data.cell(ASCENDING, "nearest-hand").runs
+    return Finding(all(len(run.hits) == 3 for run in runs), f"all goals hit in {len(runs)} run")
+
+
+ONE_ARMED += (
+    Claim(
+        "all-goals-hit",
+        "Every goal is hit.",
+        "One-armed tasks",
+        "counted",
+        _all_hit,
+        "Method",
+    ),
+)
+"""
+FIGURE = '''"""Rewards as dots."""
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.figures.plot import Plot
+
+
+def dots(study, *, methods=None):
+    """Reward of every run."""
+    figure = Figure()
+    figure.add_subplot().plot(study.runs.reward.to_numpy(float), "o")
+    data = pd.DataFrame({"reward": study.runs.reward})
+    return Plot("dots", "Rewards", "Rewards.", "Dots.", figure, data)
+'''
+TABLE = '''
+
+def longest_table(study: Study) -> DataTable | None:
+    """The run of most ticks, by task."""
+    column = Column("ticks", "ticks", "number", rests_on=("runs",))
+    least = {name: int(-study.runs.reward[study.runs.task == name].min()) for name in study.tasks}
+    rows = [Row(name, (name, ticks)) for name, ticks in least.items()]
+    return table("longest", "Longest runs.", (Column("task", "task"), column), rows)
+'''
+RUN = """
+import sys
+import analysis
+from analysis.report.build import build
+from benchmarks import Selection, run_suite
+from benchmarks.registry import CLASSES
+from tests.support.reports import undrawn
+from tests.support.suites import InProcess
+
+chosen = Selection(tasks=["ascending"], methods=["nearest-hand", "corrective-alone/given"])
+run_suite("comparison", sys.argv[1], runs=1, select=chosen, executor=InProcess())
+study = analysis.load(sys.argv[1])
+with undrawn():
+    document = build(study).document
+tables = {table.id: table for table in document.tables()}
+assert "nearest-hand" in CLASSES
+assert "nearest-hand" in {row.key for row in tables["methods-ascending"].rows}
+assert "goals_hit" in {column.name for column in tables["main-signatures-ascending"].columns}
+claims = {row.key: row.values for row in tables["claims"].rows}
+assert "supported" in claims["all-goals-hit"]
+assert "dots" in {figure.id for figure in document.figures()}
+assert [row.values for row in tables["longest"].rows] == [("ascending", int(-study.runs.reward.min()))]
+"""
+
+
+@pytest.fixture
+def house(tmp_path):
+    """The sources, to be changed."""
+    for package in ("coartic", "baselines", "benchmarks", "analysis", "tests/support"):
+        shutil.copytree(
+            ROOT / package,
+            tmp_path / package,
+            ignore=shutil.ignore_patterns("__pycache__", "example"),
+        )
+    (tmp_path / "tests/__init__.py").touch()
+    return tmp_path
+
+
+def test_what_is_added_by_its_steps_is_in_a_report(house):
+    def change(path, old, new):
+        text = (house / path).read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{path}: {old!r}"
+        (house / path).write_text(text.replace(old, new), encoding="utf-8")
+
+    def append(path, text):
+        with (house / path).open("a", encoding="utf-8") as file:
+            file.write(text)
+
+    # A method: a file, an import and a line of the list, a row.
+    append("baselines/nearest_hand.py", METHOD)
+    change(
+        "benchmarks/registry.py",
+        "import baselines.optimum\n",
+        "import baselines.nearest_hand\nimport baselines.optimum\n",
+    )
+    change(
+        "benchmarks/registry.py",
+        "    *baselines.optimum.METHODS,\n",
+        "    baselines.nearest_hand.NearestHand,\n    *baselines.optimum.METHODS,\n",
+    )
+    append("analysis/methods.toml", LOOK)
+    # A signature: a function, a row.
+    append("analysis/signatures/within.py", MEASURE)
+    change("analysis/signatures/register.py", "WITHIN = (\n", f"WITHIN = (\n{SIGNATURE}")
+    # A claim: a judge and its entry.
+    append("analysis/claims/one_armed.py", CLAIM)
+    # A figure: a file, an import and a row.
+    append("analysis/figures/dots.py", FIGURE)
+    change(
+        "analysis/figures/register.py",
+        "from analysis.figures.frontier import",
+        "from analysis.figures.dots import dots\nfrom analysis.figures.frontier import",
+    )
+    change(
+        "analysis/figures/register.py",
+        "REGISTER = (\n",
+        'REGISTER = (\n    Entry("dots", dots, "learning"),\n',
+    )
+    # A table: a function and its call.
+    append("analysis/report/tables/paper.py", TABLE)
+    change(
+        "analysis/report/tables/__init__.py",
+        "import exhaustive_table, published_table, sequences_table",
+        "import exhaustive_table, longest_table, published_table, sequences_table",
+    )
+    change(
+        "analysis/report/build.py",
+        "        tables.exhaustive_table(study),\n",
+        "        tables.exhaustive_table(study),\n        tables.longest_table(study),\n",
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, house / "results"],
+        cwd=house,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
