@@ -219,8 +219,9 @@ def _cost(study: Study, figures: list[Block]) -> Section:
         return _section("cost", title, figures)
 
     def of(task: str) -> list[Block]:
-        first, *others = [*cost_tables(study, task), None]
-        return [optima_known(study, task), first, *_tables(*others, folded=True)] if first else []
+        found = list(cost_tables(study, task))
+        folded = [replace(table, folded=True) for table in found[1:]]
+        return [optima_known(study, task), *found[:1], *folded] if found else []
 
     reading = Bullets(tables.READING_OF_COST)
     return _section("cost", title, [*figures, reading], _by_task(study, "cost", of))
