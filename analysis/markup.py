@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
 
 from coartic.text import one_line
 
@@ -45,7 +44,8 @@ _ORDINAL = re.compile(r"^(\d{1,9})([.)])(?=\s|$)")
 class Span:
     """A stretch of text in one style; only links have an address."""
 
-    style: Literal["text", "emphasis", "strong", "code", "link"]
+    style: str
+    """``text``, ``emphasis``, ``strong``, ``code`` or ``link``."""
     text: str
     address: str = ""
 
@@ -57,20 +57,18 @@ def inline(text: str) -> list[Span]:
     for match in _MARKUP.finditer(text):
         plain += text[at : match.start()]
         at = match.end()
-        if match["escaped"]:
-            plain += match["escaped"]
+        kind = match.lastgroup or ""
+        if kind == "escaped":
+            plain += match[kind]
             continue
         if plain:
             spans.append(Span("text", plain))
             plain = ""
-        if match["code"]:
-            spans.append(Span("code", match["code"]))
-        elif match["strong"]:
-            spans.append(Span("strong", _ESCAPED.sub(r"\1", match["strong"])))
-        elif match["emphasis"]:
-            spans.append(Span("emphasis", _ESCAPED.sub(r"\1", match["emphasis"])))
+        if kind == "address":
+            spans.append(Span("link", match["words"], match[kind]))
         else:
-            spans.append(Span("link", match["words"], match["address"]))
+            inner = match[kind]
+            spans.append(Span(kind, inner if kind == "code" else _ESCAPED.sub(r"\1", inner)))
     plain += text[at:]
     return [*spans, Span("text", plain)] if plain else spans
 

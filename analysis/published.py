@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import tomllib
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,7 @@ class SequenceResult:
     """A hand sequence the paper reports for a cell."""
 
     hands: str
-    summary: Summary | None
+    summary: Summary
     runs: int | None
 
 
@@ -46,31 +45,28 @@ class PublishedCell:
 
 def published_initial(task: str) -> tuple[str, int, bool] | None:
     """Hands, reward and whether derived, of a task's initial solution."""
-    entry = _published().get(task, {}).get("initial")
+    entry = _printed(task, "initial")
     if entry is None:
         return None
-    return entry["hands"], entry["reward"], bool(entry.get("derived", False))
+    return entry["hands"], entry["reward"], entry.get("derived", False)
 
 
 def published_exhaustive(task: str) -> tuple[str, int] | None:
     """Best hands and reward of the corrective process alone over all sequences."""
-    entry = _published().get(task, {}).get("exhaustive")
+    entry = _printed(task, "exhaustive")
     return None if entry is None else (entry["hands"], entry["reward"])
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
     """What is printed about a cell; None for a cell that the paper does not have."""
-    entry = _published().get(task, {}).get(condition)
+    entry = _printed(task, condition)
     if entry is None:
         return None
     sequences = tuple(
         SequenceResult(
             item["hands"],
             Summary(
-                item["reward"],
-                item.get("sd"),
-                item.get("runs", RUNS),
-                runs_printed="runs" in item,
+                item["reward"], item.get("sd"), item.get("runs", RUNS), runs_printed="runs" in item
             ),
             item.get("runs"),
         )
@@ -78,10 +74,9 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
     )
     remark = f"higher than {entry['better_than']}" if "better_than" in entry else ""
     if "reward" in entry:
-        summary: Summary | None = Summary(entry["reward"], entry.get("sd"), RUNS)
-    else:
-        summary = pooled([s.summary for s in sequences if s.summary is not None])
-    return PublishedCell(summary, sequences, remark)
+        return PublishedCell(Summary(entry["reward"], entry.get("sd"), RUNS), sequences, remark)
+    known = [sequence.summary for sequence in sequences]
+    return PublishedCell(pooled(known), sequences, remark)
 
 
 def pooled(parts: list[Summary]) -> Summary | None:
@@ -101,7 +96,9 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-@cache
-def _published() -> dict[str, Any]:
-    path = Path(__file__).parent / "published.toml"
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+_PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
+
+
+def _printed(task: str, what: str) -> dict[str, Any] | None:
+    entry: dict[str, Any] | None = _PUBLISHED.get(task, {}).get(what)
+    return entry

@@ -38,6 +38,7 @@ from analysis.report.formats.terminal import terminal_table
 from analysis.report.numbers import Number, numbers_tex
 from analysis.report.pages.versions import versions_document
 from analysis.report.trace import trace, trace_text
+from analysis.report.trace_file import command_of
 from analysis.study import Study
 from analysis.words import MINUS, NONE
 from benchmarks.harness import Progress
@@ -538,7 +539,7 @@ def test_report_in_latex(report):
         found = set(COMMANDS.findall(text))
         assert found <= ours, (path.name, found - ours)
         assert set(re.findall(r"\\begin\{(\w+)\}", text)) <= {
-            *("table", "tabular", "tabularx", "xltabular"),
+            *("table", "tabular", "tabularx", "longtable"),
         }
         assert balanced(text)
         assert "{evil}" not in text
@@ -565,11 +566,21 @@ def test_report_in_csv(report):
     assert EVIL.strip() in labels
 
 
-def test_trace(report):
+def test_trace(report, hostile):
     content = json.loads((report / "trace.json").read_text(encoding="utf-8"))
-    name = next(name for name, entry in content["macros"].items() if entry["cells"])
-    found = trace(report, name)
-    text = trace_text(found)
+    name = next(n["macro"] for n in content["numbers"] if n["cells"])
+    with pytest.raises(CoarticError, match="environment.coartic: should be one line") as caught:
+        trace(report, name)  # what a manifest would not be let in with
+    assert printable(str(caught.value))
+    facts = ("coartic", "model_code", "python", "platform", "processor", "date")
+    content["environment"] |= {
+        **dict.fromkeys(facts, HTML),
+        "command": ["coartic", "run", SHELL],
+        "commit": None,
+        "packages": {HTML: HTML},
+    }
+    (report / "trace.json").write_text(json.dumps(content), encoding="utf-8")
+    text = trace_text(trace(report, name))
     assert printable(text)
     assert text.count("\n# heading") == 0
     asked = next(line for line in text.split("\n") if line.startswith("asked for by: "))
@@ -580,11 +591,8 @@ def test_trace(report):
     )  # fmt: skip
     assert done.stdout.decode().split("\n---\n")[:2] == ["coartic", "run"]
     # The command of one cell, where the task is ours and the names are anybody's.
-    content["suite"]["name"], content["environment"]["command"] = "-x; $(id)", ["coartic"]
-    for cell in content["cells"]:
-        cell["task"], cell["method"] = "ascending", SHELL
-    (report / "trace.json").write_text(json.dumps(content), encoding="utf-8")
-    arguments = shlex.split(trace(report, name).sources[0].command)
+    plan = hostile.manifest.specification.model_copy(update={"suite": "-x; $(id)"})
+    arguments = shlex.split(command_of(plan, "ascending", SHELL))
     assert arguments[:6] == ["coartic", "run", "--tasks", "ascending", "--methods", SHELL]
     assert arguments[-4:] == ["--out", "NEW", "--", "-x; $(id)"]
 

@@ -158,7 +158,7 @@ def test_the_commands(monkeypatch, capsys, tmp_path, odd, few_figures):
     row = ("methods-a-b", "dual-process/EC4", "reward")
     code, out, _ = call(monkeypatch, capsys, "trace", *row, "--in", folder)
     assert code == 0
-    assert "A_b x dual-process/EC4: 1 runs" in out
+    assert "A_b x dual-process/EC4: 1 run, made" in out
     for arguments, words_ in (
         ([macro + "s"], f"did you mean '{macro}'"),
         (["methods-a-c", "x", "y"], "did you mean 'methods-a-b"),

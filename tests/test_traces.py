@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import analysis.study
+from analysis import markup
 from analysis.report.document import Document
 from analysis.report.numbers import Number
 from analysis.report.trace import trace, trace_text
@@ -321,10 +322,10 @@ def macros_of(home):
 def table_cells(home):
     tables = json.loads((home / FILE).read_text(encoding="utf-8"))["tables"]
     return [
-        (name, row, column)
-        for name, table in tables.items()
+        (table["id"], row["key"], column)
+        for table in tables
         for start, columns in COLUMNS.items()
-        if name.startswith(start)
+        if table["id"].startswith(start)
         for row in table["rows"]
         for column in columns.split()
     ]
@@ -364,9 +365,10 @@ def test_the_tex_file_has_the_texts_that_are_traced(home):
 def test_a_wrong_number_would_be_found(what, home, study, records, tmp_path):
     content = json.loads((home / FILE).read_text(encoding="utf-8"))
     name = "coarticTwoArmedOneECThreeReward"
-    macro = content["macros"][name]
-    row = content["tables"]["methods-two-armed-1"]["rows"]["dual-process/EC3"]
-    other = content["macros"]["coarticTwoArmedOneECFourReward"]["cells"]
+    macros = {number["macro"]: number for number in content["numbers"]}
+    macro, other = macros[name], macros["coarticTwoArmedOneECFourReward"]["cells"]
+    (table,) = (t for t in content["tables"] if t["id"] == "methods-two-armed-1")
+    (row,) = (r for r in table["rows"] if r["key"] == "dual-process/EC3")
     cell = ("methods-two-armed-1", "dual-process/EC3", "reward")
     (tmp_path / "report").mkdir()
 
@@ -377,15 +379,15 @@ def test_a_wrong_number_would_be_found(what, home, study, records, tmp_path):
 
     check()
     if what == "text":
-        macro["texts"][""] = f"{float(macro['texts']['']) + 0.2:.1f}"
+        macro["value"] += 0.2
     elif what == "cells":
         macro["cells"] = other
     elif what == "run":
-        content["cells"][macro["cells"][0]]["runs"][0] = records.by_cell[
-            "two-armed-1", "dual-process/EC4"
-        ][0]["run_id"]
+        (source,) = (s for s in content["sources"] if [s["task"], s["label"]] == macro["cells"][0])
+        other_runs = records.by_cell["two-armed-1", "dual-process/EC4"]
+        source["run_ids"][0] = other_runs[0]["run_id"]
     elif what == "table text":
-        row["texts"][1] = row["texts"][1].replace("± ", "± 1")
+        row["values"][1]["sd"] += 10
     else:
         row["cells"] = other
     with pytest.raises(AssertionError):
@@ -444,10 +446,9 @@ def test_what_a_report_does_not_have(home, tmp_path):
         with pytest.raises(CoarticError, match=re.escape(words)):
             trace(home, *arguments)
     whole = json.loads((home / FILE).read_text(encoding="utf-8"))
-    table = next(iter(whole["tables"].values()))
-    next(iter(table["rows"].values()))["cells"] = [10_000]
+    whole["tables"][0]["rows"][0]["cells"] = [["nowhere", "dual-process/EC1"]]
     for text in (
-        "", "[]", "{}", '{"format":3}', '{"format":4,"macros":{"a":1},"tables":{}}', "\ud800",
+        "", "[]", "{}", '{"format":3}', '{"format":5,"numbers":{"a":1},"tables":[]}', "\ud800",
         json.dumps(whole),
     ):  # fmt: skip
         (tmp_path / FILE).write_bytes(text.encode(errors="surrogatepass"))
@@ -549,11 +550,11 @@ def test_a_cell_of_a_table_says_how(home):
     assert share.startswith("gap (%). ")
     assert "Optimum of ascending, other arm free, -292: proven; shipped data" in share
     content = json.loads((home / FILE).read_text(encoding="utf-8"))
-    for name, table in content["tables"].items():
-        row, column = next(iter(table["rows"])), table["columns"][-1]
-        how = trace(home, name, (row, column["name"])).how
-        assert all(note in how for note in table["notes"])
-        assert how.startswith(column["head"])
+    for table in content["tables"]:
+        row, column = table["rows"][0]["key"], table["columns"][-1]
+        how = trace(home, table["id"], (row, column["name"])).how
+        assert all(markup.words(note) in how for note in table["notes"])
+        assert how.startswith(column["header"])
 
 
 def test_what_the_command_makes(home, records):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -34,11 +34,19 @@ from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
 from analysis.report.pages.claims import claim_section
 from analysis.report.pages.frontier import cost_tables, optima_known
 from analysis.report.player import player_json
-from analysis.report.summary import tasks_table, unlike_printed, verdicts, without_variants
+from analysis.report.summary import (
+    tasks_table,
+    unlike_printed,
+    verdicts,
+    version_text,
+    without_variants,
+)
+from analysis.report.tables.paper import beside_paper
 from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
 from coartic import CoarticError
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -97,14 +105,13 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
     """The sections that have something to show; without figures and films where None."""
 
     def drawn(section: FigureSection) -> list[Block]:
-        return (
-            [_figure(plot) for plot in figures.of_section(section)] if figures is not None else []
-        )
+        plots = [] if figures is None else figures.of_section(section)
+        return [_figure(plot) for plot in plots]
 
     sections = (
         _summary(study),
         _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
-        _paper(study, drawn("paper")),
+        _section("paper", "Published and ours", [*drawn("paper"), *_tables(*beside_paper(study))]),
         _claims(study, {} if figures is None else figures.like_the_paper),
         *([] if figures is None else [_movements(study, drawn("movements"))]),
         _section("learning", "Learning", drawn("learning")),
@@ -138,50 +145,33 @@ def _title(results: Results) -> str:
 
 def _lead(results: Results) -> str:
     specification, environment = results.manifest.specification, results.manifest.environment
-    commit = environment.commit
-    where = f"coartic {environment.coartic}"
-    if commit:
-        where += f", commit {commit.id[:12]}{' with changes' if commit.dirty else ''}"
-    trials = specification.trials
+    trials = f", of {specification.trials} trials where a method learns"
     return escaped(
-        f"{len(results.runs)} runs, up to {specification.runs} a cell"
-        + (f", of {trials} trials where a method learns" if trials else "")
-        + f"; seed {specification.seed}. Made with {where} on {environment.date[:10]}."
+        f"{counted(len(results.runs), 'run')}, up to {specification.runs} a cell"
+        f"{trials if specification.trials else ''}; seed {specification.seed}. Made with "
+        f"{version_text(environment)} on {environment.date[:10]}."
     )
 
 
 def _summary(study: Study) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
+    runs, labels = counted(len(results.runs), "run"), {cell.label for cell in results.cells}
     facts = (
-        f"{len(results.tasks)} tasks, {len({c.label for c in results.cells})} methods with their "
-        f"variants, {len(results.cells)} cells; "
-        + (
-            f"{failed} of {len(results.runs)} runs have no solution."
-            if failed
-            else "every run has a solution."
-        )
+        f"{counted(len(results.tasks), 'task')}, {counted(len(labels), 'method')} with their "
+        f"variants, {counted(len(results.cells), 'cell')}; "
+        + (f"{failed} of {runs} have no solution." if failed else "every run has a solution.")
     )
-    blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study))]
     unlike = unlike_printed(study)
-    counted = verdicts(study.judged, CLAIMS)
+    items = verdicts(study.judged, CLAIMS).items
     if unlike:
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
-        counted = Bullets((*counted.items, note))
-    blocks.append(counted)
+        items = (*items, note)
+    blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study)), Bullets(items)]
     overall = tables.overall_table(study)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)
-
-
-def _paper(study: Study, figures: list[Block]) -> Section:
-    found = _tables(
-        tables.published_table(study),
-        tables.sequences_table(study),
-        tables.exhaustive_table(study),
-    )
-    return _section("paper", "Published and ours", [*figures, *found])
 
 
 def _movements(study: Study, figures: list[Block]) -> Section:
@@ -196,49 +186,57 @@ def _movements(study: Study, figures: list[Block]) -> Section:
     return _section("movements", "Movements", [player, *figures])
 
 
-def _methods(study: Study, figures: list[Block]) -> Section:
-    below = []
+def _by_task(
+    study: Study, name: str, blocks_of: Callable[[str], Sequence[Block]]
+) -> Iterator[Section]:
+    """A section a task, where there is something to show of it."""
     for task, slug in tables.table_ids(study).items():
-        blocks = _tables(tables.methods_table(study, task))
-        if not _many(study):
-            blocks += _tables(
-                _folded(tables.pairwise_table(study, task)),
-                _folded(tables.cost_table(study, task)),
-            )
+        blocks = blocks_of(task)
         if blocks:
-            below.append(_section(f"on-{slug}-methods", task, blocks))
-    reading = Bullets(
-        (
-            *tables.reading_of_methods(study),
-            *(tables.reading_of_pairs(study) if study.pair_rows and not _many(study) else ()),
-        )
-    )
-    return _section("methods", "Methods side by side", [*figures, reading], below)
+            yield _section(f"on-{slug}-{name}", task, blocks)
+
+
+def _methods(study: Study, figures: list[Block]) -> Section:
+    pairs = not _many(study)
+
+    def of(task: str) -> list[Block]:
+        blocks = _tables(tables.methods_table(study, task))
+        if pairs:
+            both = tables.pairwise_table(study, task), tables.cost_table(study, task)
+            blocks += _tables(*both, folded=True)
+        return blocks
+
+    reading = tables.reading_of_methods(study)
+    if study.pair_rows and pairs:
+        reading += tables.reading_of_pairs(study)
+    below = _by_task(study, "methods", of)
+    return _section("methods", "Methods side by side", [*figures, Bullets(reading)], below)
 
 
 def _cost(study: Study, figures: list[Block]) -> Section:
+    title = "Reward and what it costs"
     if _many(study):
-        return _section("cost", "Reward and what it costs", figures)
-    below = []
-    for task, slug in tables.table_ids(study).items():
+        return _section("cost", title, figures)
+
+    def of(task: str) -> list[Block]:
         found = list(cost_tables(study, task))
-        if found:
-            folded = [replace(table, folded=True) for table in found[1:]]
-            every: list[Block] = [optima_known(study, task), found[0], *folded]
-            below.append(_section(f"on-{slug}-cost", task, every))
+        folded = [replace(table, folded=True) for table in found[1:]]
+        return [optima_known(study, task), *found[:1], *folded] if found else []
+
     reading = Bullets(tables.READING_OF_COST)
-    return _section("cost", "Reward and what it costs", [*figures, reading], below)
+    return _section("cost", title, [*figures, reading], _by_task(study, "cost", of))
 
 
 def _signatures(study: Study, figures: list[Block]) -> Section:
-    below = []
-    for task, slug in tables.table_ids(study).items():
-        found = tables.signatures_tables(study, task, short=_many(study))
-        if found:
-            below.append(_section(f"on-{slug}-signatures", task, _tables(*found)))
+    short = _many(study)
+    below = _by_task(
+        study,
+        "signatures",
+        lambda task: _tables(*tables.signatures_tables(study, task, short=short)),
+    )
     between = _tables(tables.contexts_table(study), *tables.slopes_tables(study))
-    blocks = [*figures, *between]
-    return _section("coarticulation", "Signatures of coarticulation", blocks, below)
+    title = "Signatures of coarticulation"
+    return _section("coarticulation", title, [*figures, *between], below)
 
 
 def _claims(study: Study, figures: Mapping[str, str]) -> Section:
@@ -285,17 +283,14 @@ def _few(study: Study) -> str:
 
 
 def _section(
-    name: str, title: str, blocks: Sequence[Block], below: Sequence[Section] = ()
+    name: str, title: str, blocks: Sequence[Block], below: Iterable[Section] = ()
 ) -> Section:
     return Section(name, title, tuple(blocks), tuple(below))
 
 
-def _tables(*found: DataTable | None) -> list[Block]:
-    return [with_legends(table) for table in found if table is not None]
-
-
-def _folded(table: DataTable | None) -> DataTable | None:
-    return None if table is None else replace(table, folded=True)
+def _tables(*found: DataTable | None, folded: bool = False) -> list[Block]:
+    made = (with_legends(table) for table in found if table is not None)
+    return [replace(table, folded=folded or table.folded) for table in made]
 
 
 def _figure(plot: Plot) -> FigureBlock:

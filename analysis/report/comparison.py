@@ -10,14 +10,10 @@ from analysis.markup import code, escaped, words
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
-from analysis.report.tables import (
-    exhaustive_table,
-    methods_table,
-    published_table,
-    reading_of_methods,
-    sequences_table,
-    table_ids,
-)
+from analysis.report.summary import version_text
+from analysis.report.tables import methods_table, reading_of_methods, table_ids
+from analysis.report.tables.paper import beside_paper
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -26,8 +22,7 @@ if TYPE_CHECKING:
 def comparison_document(study: Study) -> Document:
     """Published and ours, methods by task, and what the folder cannot show."""
     said: set[str] = set()
-    against_paper = published_table(study), sequences_table(study), exhaustive_table(study)
-    paper = Section("paper", "Published and ours", _noted(against_paper, said))
+    paper = Section("paper", "Published and ours", _noted(beside_paper(study), said))
     by_task = (
         Section(f"on-{slug}", task, _noted([methods_table(study, task)], said))
         for task, slug in table_ids(study).items()
@@ -65,13 +60,11 @@ def _made(study: Study) -> str:
     """Of which suite, by which code, where and when."""
     manifest = study.results.manifest
     specification, environment = manifest.specification, manifest.environment
-    version, commit = f"coartic {environment.coartic}", environment.commit
-    if commit:
-        version += f", commit {commit.id[:12]}{' with changes' if commit.dirty else ''}"
     made = (
-        f", {specification.runs} runs of {specification.trials} trials, "
-        f"seed {specification.seed}; {version}, model code {environment.model_code}; "
-        f"Python {environment.python}, {environment.platform}; {environment.date}."
+        f", {counted(specification.runs, 'run')} of {specification.trials} trials, "
+        f"seed {specification.seed}; {version_text(environment)}, model code "
+        f"{environment.model_code}; Python {environment.python}, {environment.platform}; "
+        f"{environment.date}."
     )
     return f"Suite {code(specification.suite)}{escaped(made)}"
 

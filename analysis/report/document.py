@@ -11,7 +11,6 @@ headers and values are plain text.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -120,32 +119,28 @@ class DataTable:
     """Whether a page shows its caption alone until more is asked for."""
 
     def __post_init__(self) -> None:
-        _check_id(self.id)
         names = [column.name for column in self.columns]
         if not names or len(set(names)) < len(names):
             raise ValueError(f"table {self.id}: column names {names} must differ")
         if len({row.key for row in self.rows}) < len(self.rows):
             raise ValueError(f"table {self.id}: two rows have the same key")
         for row in self.rows:
-            if len(row.values) != len(names):
-                raise ValueError(
-                    f"table {self.id}, row {row.key!r}: {len(row.values)} values for "
-                    f"{len(names)} columns"
-                )
-            unknown = set(row.cells_by_column) - set(names)
-            if unknown:
-                raise ValueError(f"table {self.id}, row {row.key!r}: no columns {unknown}")
-            for column, value in zip(self.columns, row.values, strict=True):
-                if not isinstance(value, float | int | str | Estimate | None):
-                    raise ValueError(
-                        f"table {self.id}, row {row.key!r}: {column.name} is {value!r}, a "
-                        f"{type(value).__name__}; numbers are Python's"
-                    )
-                if value is not None and isinstance(value, str) != (column.kind == "text"):
-                    raise ValueError(
-                        f"table {self.id}, row {row.key!r}: {column.name} is of kind "
-                        f"{column.kind}, its value is {value!r}"
-                    )
+            for problem in self._problems(row):
+                raise ValueError(f"table {self.id}, row {row.key!r}: {problem}")
+
+    def _problems(self, row: Row) -> Iterator[str]:
+        names = [column.name for column in self.columns]
+        if len(row.values) != len(names):
+            yield f"{len(row.values)} values for {len(names)} columns"
+        unknown = set(row.cells_by_column) - set(names)
+        if unknown:
+            yield f"no columns {unknown}"
+        for column, value in zip(self.columns, row.values, strict=True):
+            if not isinstance(value, float | int | str | Estimate | None):
+                of = type(value).__name__
+                yield f"{column.name} is {value!r}, a {of}; numbers are Python's"
+            elif value is not None and isinstance(value, str) != (column.kind == "text"):
+                yield f"{column.name} is of kind {column.kind}, its value is {value!r}"
 
 
 @dataclass(frozen=True)
@@ -162,9 +157,6 @@ class FigureBlock:
     svg: str
     """An SVG document."""
 
-    def __post_init__(self) -> None:
-        _check_id(self.id)
-
 
 @dataclass(frozen=True)
 class PlayerBlock:
@@ -176,9 +168,6 @@ class PlayerBlock:
     """In inline markup."""
     data: str
     """JSON as :func:`analysis.report.player.player_json` makes it."""
-
-    def __post_init__(self) -> None:
-        _check_id(self.id)
 
 
 Block = Prose | Bullets | DataTable | FigureBlock | PlayerBlock
@@ -195,9 +184,6 @@ class Section:
     folded: bool = False
     """Whether a page shows its title alone until more is asked for."""
 
-    def __post_init__(self) -> None:
-        _check_id(self.id)
-
     def walk(self) -> Iterator[Section]:
         """This section and all below it, in order."""
         yield self
@@ -207,7 +193,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report. Raises ValueError where ids are used twice or a cell is unknown."""
+    """A whole report.
+
+    Raises ValueError where an id is none that can name a file, or is used twice, and where a cell
+    is unknown.
+    """
 
     title: str
     sections: tuple[Section, ...]
@@ -223,6 +213,11 @@ class Document:
             for block in self.blocks()
             if isinstance(block, DataTable | FigureBlock | PlayerBlock)
         ]
+        for name in ids:
+            if not _ID.fullmatch(name):
+                raise ValueError(f"id {name!r}: small letters and digits, joined by - or .")
+            if name == "runs":
+                raise ValueError("id 'runs' is kept for the list of runs")
         twice = {name for name in ids if ids.count(name) > 1}
         if twice:
             raise ValueError(f"ids used twice: {', '.join(sorted(twice))}")
@@ -253,16 +248,3 @@ class Document:
     def figures(self) -> list[FigureBlock]:
         """All figures, in order."""
         return [block for block in self.blocks() if isinstance(block, FigureBlock)]
-
-
-def missing(value: Value) -> bool:
-    """Whether there is no value: None, NaN, or an estimate of NaN."""
-    number = value.value if isinstance(value, Estimate) else value
-    return number is None or (isinstance(number, float) and math.isnan(number))
-
-
-def _check_id(name: str) -> None:
-    if not _ID.fullmatch(name):
-        raise ValueError(f"id {name!r}: small letters and digits, joined by - or .")
-    if name == "runs":
-        raise ValueError("id 'runs' is kept for the list of runs")

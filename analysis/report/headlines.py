@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,6 +35,23 @@ if TYPE_CHECKING:
 
 _INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
 """Exploration condition under which the paper speaks of a task's initial solution."""
+Kind = tuple[str, int, str]
+"""Meaning, decimals and unit."""
+_KINDS: dict[str, Kind] = {
+    "Optimum": ("best reward known, other arm free", 0, "ticks"),
+    "OptimumStill": ("best reward known, other arm still", 0, "ticks"),
+    "PublishedInitialReward": ("published reward of the initial solution", 0, "ticks"),
+    "Gap": ("gap to the optimum", 1, "ticks"),
+    "GapPercent": ("gap to the optimum", 1, "% of the optimum"),
+    "GapStill": ("gap to the optimum, other arm still", 1, "ticks"),
+    "GapStillPercent": ("gap to the optimum, other arm still", 1, "% of the optimum"),
+    "Trials": ("median of physical trials of a run", 0, "trials"),
+    "Evaluations": ("median of forward kinematics and Jacobians of a run", 0, "evaluations"),
+    "SolveSeconds": ("median of wall time of solving", 3, "s"),
+    "InitialReward": ("reward of the initial solution", 0, "ticks"),
+    "PublishedReward": ("published mean reward", 1, "ticks"),
+}
+"""By the end of the macro's name."""
 
 
 def headline_numbers(study: Study) -> list[Number]:
@@ -73,41 +90,37 @@ class _About:
     of: str
     cells: tuple[Cell, ...] = ()
 
-    def value(self, what: str, meaning: str, value: float, digits: int, unit: str) -> Number:
-        macro = f"{PREFIX}{self.stem}{what}"
-        return Number(macro, meaning, value, digits, unit, cells=self.cells, of=self.of)
+    def value(self, what: str, value: float, kind: Kind | None = None, **known: Any) -> Number:
+        """``kind``: of :data:`_KINDS` by default; ``known``: further fields of the number."""
+        meaning, digits, unit = kind or _KINDS[what]
+        fields = {"cells": self.cells, "of": self.of, **known}
+        return Number(f"{PREFIX}{self.stem}{what}", meaning, value, digits, unit, **fields)
 
-    def inferred(
-        self, what: str, meaning: str, found: Inference, digits: int, unit: str
-    ) -> Number:
-        number = self.value(what, meaning, found.estimate, digits, unit)
-        n, how = sum(found.n), _how(found)
-        return replace(number, low=found.low, high=found.high, n=n, how=how)
+    def inferred(self, what: str, found: Inference, kind: Kind, **known: Any) -> Number:
+        interval = {"low": found.low, "high": found.high, "n": sum(found.n), "how": _how(found)}
+        return self.value(what, found.estimate, kind, **interval, **known)
 
 
 def _tasks(study: Study, names: Names) -> Iterator[Number]:
     for task in study.tasks:
         about = _About(names.tasks[task], task)
-        for arm, suffix in (("free", "Optimum"), ("still", "OptimumStill")):
+        for arm, what in (("free", "Optimum"), ("still", "OptimumStill")):
             best = study.optima.get((task, arm))
             if best is not None:
-                meaning = f"best reward known, other arm {arm}"
-                number = about.value(suffix, meaning, best.reward, 0, "ticks")
                 origin = "" if best.cells else f"the optimum of the {SHIPPED}"
-                yield replace(number, how=best.how, cells=best.cells, origin=origin)
+                yield about.value(what, best.reward, how=best.how, cells=best.cells, origin=origin)
         printed = published_initial(task)
         if printed is not None:
-            meaning = "published reward of the initial solution"
-            number = about.value("PublishedInitialReward", meaning, printed[1], 0, "ticks")
-            yield _published(number, _INITIAL[task], derived=printed[2])
+            source = _published(_INITIAL[task], derived=printed[2])
+            yield about.value("PublishedInitialReward", printed[1], **source)
 
 
-def _published(number: Number, condition: int, *, derived: bool) -> Number:
-    """The number with how the paper gives it, and its place there."""
+def _published(condition: int, *, derived: bool) -> dict[str, Any]:
+    """How the paper gives a number, and its place there."""
     how = "derived from other printed numbers" if derived else "printed"
     place = f"Results, Exploration Condition {condition}"
     origin = f"published in the paper (Shah, Barto & Fagg, 2013; {place})"
-    return replace(number, how=f"{how}; {place}", origin=origin, cells=())
+    return {"how": f"{how}; {place}", "origin": origin, "cells": ()}
 
 
 def _cells(study: Study, names: Names) -> Iterator[Number]:
@@ -129,8 +142,8 @@ def _reward(about: _About, cell: CellRuns) -> Number:
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
     found = mean(rewards, seed=SEED)
-    number = about.inferred("Reward", f"mean learned reward{solved}", found, 1, "ticks")
-    return replace(number, sd=sd(rewards))
+    kind = (f"mean learned reward{solved}", 1, "ticks")
+    return about.inferred("Reward", found, kind, sd=sd(rewards))
 
 
 def _gaps(study: Study, about: _About, reward: Number) -> Iterator[Number]:
@@ -138,41 +151,34 @@ def _gaps(study: Study, about: _About, reward: Number) -> Iterator[Number]:
     ((task, label),) = about.cells
     row = study.method_rows[task, label]
     free, still = (study.optima.get((task, arm)) for arm in ("free", "still"))
-    gaps = []
-    if free is not None and not math.isnan(row.gap):
-        gaps.append(("Gap", "gap to the optimum", free))
-    lower = still is not None and (free is None or still.reward != free.reward)
-    if still is not None and lower and not math.isnan(row.gap_still):
-        gaps.append(("GapStill", "gap to the optimum, other arm still", still))
-    for what, meaning, best in gaps:
-        units = [("", 1.0, "ticks")]
-        if best.reward:
-            units.append(("Percent", 100 / -best.reward, "% of the optimum"))
-        for suffix, scale, unit in units:
-            gap = (best.reward - reward.value) * scale
-            yield replace(
-                about.value(f"{what}{suffix}", meaning, gap, 1, unit),
-                low=(best.reward - reward.high) * scale,
-                high=(best.reward - reward.low) * scale,
-                how=f"{reward.how}; from the optimum {best.reward}: {best.how}",
-                cells=tuple(dict.fromkeys([*about.cells, *best.cells])),
+    gaps = [("Gap", free, row.gap)]
+    if still is not None and (free is None or still.reward != free.reward):
+        gaps.append(("GapStill", still, row.gap_still))
+    for what, best, known in gaps:
+        if best is None or math.isnan(known):
+            continue
+        how = f"{reward.how}; from the optimum {best.reward}: {best.how}"
+        cells = tuple(dict.fromkeys([*about.cells, *best.cells]))
+        for suffix, scale in (("", 1.0), ("Percent", 100 / -best.reward if best.reward else 0)):
+            # The higher the reward, the smaller the gap.
+            gap, low, high = (
+                (best.reward - value) * scale for value in (reward.value, reward.high, reward.low)
             )
+            if scale:
+                yield about.value(f"{what}{suffix}", gap, low=low, high=high, how=how, cells=cells)
 
 
 def _spent(about: _About, cell: CellRuns) -> Iterator[Number]:
     """Medians of what a run spends."""
-    evaluations = "forward kinematics and Jacobians of a run"
-    spent = cell.runs.forward_kinematics + cell.runs.jacobians
-    for what, meaning, values, digits, unit in (
-        ("Trials", "physical trials of a run", cell.runs.trials, 0, "trials"),
-        ("Evaluations", evaluations, spent, 0, "evaluations"),
-        ("SolveSeconds", "wall time of solving", solve_times(cell.good), 3, "s"),
+    for what, values in (
+        ("Trials", cell.runs.trials),
+        ("Evaluations", cell.runs.forward_kinematics + cell.runs.jacobians),
+        ("SolveSeconds", solve_times(cell.good)),
     ):
         known = values.dropna()
         if len(known):
-            median = float(known.median())
-            number = about.value(what, f"median of {meaning}", median, digits, unit)
-            yield replace(number, n=len(known) if len(known) != len(cell.good) else None)
+            n = len(known) if len(known) != len(cell.good) else None
+            yield about.value(what, float(known.median()), n=n)
 
 
 def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
@@ -181,27 +187,22 @@ def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
         return
     initial = cell.good.initial_reward.dropna().unique()
     if len(initial) == 1:
-        meaning = "reward of the initial solution"
-        number = about.value("InitialReward", meaning, float(initial[0]), 0, "ticks")
-        yield replace(number, how="deterministic")
+        yield about.value("InitialReward", float(initial[0]), how="deterministic")
     condition = cell.method.removeprefix(LEARNER)
     printed = published_cell(cell.task, condition)
     if printed is not None and printed.summary is not None:
         summary = printed.summary
-        number = about.value("PublishedReward", "published mean reward", summary.mean, 1, "ticks")
-        spread = math.nan if summary.sd is None else summary.sd
-        number = replace(number, sd=spread, n=summary.runs)
-        yield _published(number, int(condition.removeprefix("EC")), derived=summary.derived)
+        source = _published(int(condition.removeprefix("EC")), derived=summary.derived)
+        source |= {"sd": math.nan if summary.sd is None else summary.sd, "n": summary.runs}
+        yield about.value("PublishedReward", summary.mean, **source)
 
 
 def _conditions(study: Study, names: Names) -> Iterator[Number]:
     """Each condition of the learner against the others of its task that explore less."""
-    by_task: dict[str, list[str]] = {}
-    for task, label in study.cells:
-        if label.startswith(LEARNER) and label.removeprefix(LEARNER) in ("EC2", "EC3", "EC4"):
-            by_task.setdefault(task, []).append(label)
-    for task, labels in by_task.items():
-        for lower, higher in itertools.combinations(sorted(labels), 2):
+    for task in study.tasks:
+        conditions = (f"{LEARNER}EC{number}" for number in (2, 3, 4))
+        labels = [label for label in conditions if (task, label) in study.cells]
+        for lower, higher in itertools.combinations(labels, 2):
             cells = ((task, higher), (task, lower))
             a, b = (study.cells[key].good.reward.to_numpy(dtype=np.float64) for key in cells)
             if not len(a) or not len(b):
@@ -209,9 +210,9 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
             stem = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"
             about = _About(stem, f"{higher} less {lower} on {task}", cells)
             apart = difference_of_means(a, b, seed=SEED)
-            yield about.inferred("Reward", "difference of mean rewards", apart, 1, "ticks")
+            yield about.inferred("Reward", apart, ("difference of mean rewards", 1, "ticks"))
             better = probability_of_improvement(a, b, seed=SEED)
-            yield about.inferred("Improvement", "probability of improvement", better, 2, "")
+            yield about.inferred("Improvement", better, ("probability of improvement", 2, ""))
 
 
 def _hands(study: Study, names: Names) -> Iterator[Number]:
@@ -222,9 +223,9 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
         stem = f"{names.tasks[task]}{names.labels[label]}Hands"
         about = _About(stem, f"{label} on {task}", ((task, label),))
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
-            found = words(str(hands)), f"runs that learned {hands}"
-            number = about.value(*found, float(count), 0, "runs")
-            yield replace(number, how=f"of {len(cell.good)} with a solution")
+            kind = f"runs that learned {hands}", 0, "runs"
+            how = f"of {len(cell.good)} with a solution"
+            yield about.value(words(str(hands)), float(count), kind, how=how)
 
 
 def _signatures(study: Study, names: Names) -> Iterator[Number]:
@@ -241,7 +242,7 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
         place = f" ({row.place})" if str(row.place) else ""
         cells = ((task, label), *([other] if other in study.cells else []))
         about = _About(names.tasks[task] + names.labels[label], f"{label} on {task}", cells)
-        unit = signature.unit.removesuffix(PER_DIMENSION)
-        number = about.value(signature.macro, f"{name}{place}", row.value, 2, unit)
+        kind = f"{name}{place}", 2, signature.unit.removesuffix(PER_DIMENSION)
         n = row.n if row.n != len(study.cells[task, label].good) else None
-        yield replace(number, low=row.low, high=row.high, n=n, how="docs/signatures.md")
+        known = {"low": row.low, "high": row.high, "n": n, "how": "docs/signatures.md"}
+        yield about.value(signature.macro, row.value, kind, **known)

@@ -10,11 +10,13 @@ import numpy as np
 from analysis.markup import code, escaped
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
+from analysis.report.document import CellKey
 from analysis.report.summary import unlike_printed
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.power import POWER, smallest_difference
 from analysis.statistics.spread import sd
 from analysis.words import typographic
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -47,10 +49,11 @@ def _learned(study: Study) -> Iterator[str]:
     for (task, label), cell in study.cells.items():
         replays = cell.good.replay_reward.dropna()
         if label.startswith(LEARNER) and not cell.variant and len(replays) == len(cell.good) > 0:
-            parts.append(
-                f"{escaped(f'{task} {label.removeprefix(LEARNER)}')} "
-                f"{_number(float(cell.good.reward.mean()))} ({_number(float(replays.mean()))})"
+            learned, replayed = (
+                typographic(f"{rewards.mean():.1f}") for rewards in (cell.good.reward, replays)
             )
+            name = escaped(f"{task} {label.removeprefix(LEARNER)}")
+            parts.append(f"{name} {learned} ({replayed})")
     if parts:
         yield (
             "*Learned reward.* The best of a run's trials, exploration noise and chance of hands "
@@ -62,19 +65,19 @@ def _learned(study: Study) -> Iterator[str]:
 
 def _reconstructed(study: Study) -> Iterator[str]:
     for name, task in study.results.tasks.items():
-        inferred = {
-            key: entry for key, entry in task.provenance.items() if entry.status == "inferred"
-        }
+        entries = task.provenance.items()
+        inferred = [
+            f"{key} ({entry.source.rstrip('.')})"
+            for key, entry in entries
+            if entry.status == "inferred"
+        ]
         if inferred:
-            what = "; ".join(
-                f"{key} ({entry.source.rstrip('.')})" for key, entry in inferred.items()
-            )
             yield (
                 f"*Reconstructed.* {escaped(name)}: not printed in the paper but inferred from "
-                f"what is: {escaped(what)}. Rewards on it, and claims that rest on it (marked †), "
-                "depend on that."
+                f"what is: {escaped('; '.join(inferred))}. Rewards on it, and claims that rest "
+                "on it (marked †), depend on that."
             )
-        chosen = sorted(key for key, entry in task.provenance.items() if entry.status == "chosen")
+        chosen = sorted(key for key, entry in entries if entry.status == "chosen")
         if chosen:
             facts = escaped(f"{name}: {', '.join(chosen)}")
             yield f"*Not the paper's.* {facts} chosen by the task's author."
@@ -115,25 +118,23 @@ def _failures(study: Study) -> Iterator[str]:
 def _versions(study: Study) -> Iterator[str]:
     runs = study.results.runs
     known = runs.commit.dropna().astype(str)
-    commits = sorted(set(known.str.rstrip("+")))
-    changed = sorted({commit.rstrip("+") for commit in known if commit.endswith("+")})
+    ids = known.str.removesuffix("+").str[:12]
+    commits, changed = sorted(set(ids)), sorted(set(ids[known.str.endswith("+")]))
     if len(commits) > 1:
         # Loading refuses folders of which that does not hold.
         yield (
             f"*Mixed versions.* Runs were made at {len(commits)} commits "
-            f"({', '.join(code(commit[:12]) for commit in commits)}); the code behind each "
-            "method's results is the same in all of them."
+            f"({', '.join(map(code, commits))}); the code behind each method's results is the "
+            "same in all of them."
         )
+    hashed = "each run names the hash of the code behind it."
     if len(known) < len(runs):
-        yield (
-            f"*Unknown commit.* {_runs(len(runs) - len(known), 'was', 'were')} made outside a "
-            "checkout; each run names the hash of the code behind it."
-        )
+        made = _runs(len(runs) - len(known), "was", "were")
+        yield f"*Unknown commit.* {made} made outside a checkout; {hashed}"
     if changed:
         yield (
             "*Uncommitted changes.* The checkout was changed when runs were made at "
-            + ", ".join(code(commit[:12]) for commit in changed)
-            + "; each run names the hash of the code behind it."
+            f"{', '.join(map(code, changed))}; {hashed}"
         )
     packages = runs.packages.nunique()
     if packages > 1:
@@ -148,20 +149,7 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
             f"*Trials.* The paper's runs have {TRIALS} trials; runs with another number are "
             "not comparable with them, and no claim is judged on them."
         )
-    found = []
-    for (task, label), cell in learner.items():
-        best = study.optima.get((task, "free"))
-        rewards = cell.good.reward.to_numpy(dtype=np.float64)
-        if len(rewards) < 2 or best is None or not best.reward or cell.variant:
-            continue
-        spread = sd(rewards)
-        if spread == 0 or label.removeprefix(LEARNER) not in ("EC1", "EC2", "EC3", "EC4"):
-            continue
-        ticks = smallest_difference(spread, spread, len(rewards))
-        found.append(
-            f"{escaped(task)} {label.removeprefix(LEARNER)} {ticks:.1f} ticks "
-            f"({_percent(ticks / -best.reward, 1)}, n = {len(rewards)})"
-        )
+    found = [text for key in learner for text in _detectable(study, key)]
     if found:
         yield (
             f"*Number of runs.* Between two samples like these a one-tailed t-test at 5 % finds, "
@@ -174,23 +162,31 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
             f"*Number of runs.* The paper has {RUNS} runs a cell; here are {few[0]}"
             f"{'' if len(few) == 1 else f' to {few[-1]}'}."
         )
-    sizes = [len(cell.good) for cell in study.cells.values()]
-    once = specification.runs > 1 and 1 in [len(cell.runs) for cell in study.cells.values()]
+    sizes = [len(cell.runs) for cell in study.cells.values()]
+    once = "; methods that draw nothing at random were run once and have no spread"
+    covered = (
+        "95 % BCa intervals of means of 20 runs cover 91 to 95 % (simulated; "
+        "docs/statistics.md), of fewer runs less."
+        if any(len(cell.good) >= FEWEST for cell in study.cells.values())
+        else "No cell has the three runs that an interval takes."
+    )
     yield (
         f"*One seed.* All runs derive from seed {specification.seed}"
-        + (
-            "; methods that draw nothing at random were run once and have no spread"
-            if once
-            else ""
-        )
-        + "."
-        + (
-            " 95 % BCa intervals of means of 20 runs cover 91 to 95 % (simulated; "
-            "docs/statistics.md), of fewer runs less."
-            if any(size >= FEWEST for size in sizes)
-            else " No cell has the three runs that an interval takes."
-        )
+        f"{once if specification.runs > 1 and 1 in sizes else ''}. {covered}"
     )
+
+
+def _detectable(study: Study, key: CellKey) -> Iterator[str]:
+    """The difference that as many runs of one of the paper's conditions would show."""
+    task, condition = key[0], key[1].removeprefix(LEARNER)
+    best = study.optima.get((task, "free"))
+    rewards = study.cells[key].good.reward.to_numpy(dtype=np.float64)
+    if len(rewards) < 2 or best is None or not best.reward or sd(rewards) == 0:
+        return
+    if condition in ("EC1", "EC2", "EC3", "EC4"):
+        ticks = smallest_difference(sd(rewards), sd(rewards), len(rewards))
+        share = _percent(ticks / -best.reward, 1)
+        yield f"{escaped(task)} {condition} {ticks:.1f} ticks ({share}, n = {len(rewards)})"
 
 
 def _optima(study: Study) -> Iterator[str]:
@@ -201,8 +197,8 @@ def _optima(study: Study) -> Iterator[str]:
             "scores there."
         )
     for task in study.results.tasks:
-        known = {arm: study.optima.get((task, arm)) for arm in ("free", "still")}
-        for arm, best in known.items():
+        for arm in ("free", "still"):
+            best = study.optima.get((task, arm))
             if best is not None and not best.proven:
                 bound = "" if best.bound is None else f"; none above {best.bound} is proven"
                 yield (
@@ -238,11 +234,7 @@ def _model(study: Study) -> Iterator[str]:
 
 
 def _runs(count: int, one: str, several: str) -> str:
-    return f"1 run {one}" if count == 1 else f"{count} runs {several}"
-
-
-def _number(value: float) -> str:
-    return typographic(f"{value:.1f}")
+    return f"{counted(count, 'run')} {one if count == 1 else several}"
 
 
 def _percent(share: float, digits: int = 0) -> str:

@@ -16,8 +16,9 @@ from analysis.comparisons.paper import paper_rows
 from analysis.methods import LEARNER
 from analysis.published import published_cell
 from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.statistics.estimates import SEED, mean
+from analysis.report.tables.common import marked, mean_of, table
 from analysis.words import typographic
+from coartic.record import Environment
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -39,38 +40,29 @@ def best_condition(study: Study, task: str) -> str | None:
 def tasks_table(study: Study) -> DataTable | None:
     """One row a task: initial, learned, published and best possible reward."""
     rows = []
-    for name, task in study.results.tasks.items():
+    for name in study.results.tasks:
         label = best_condition(study, name)
         if label is None:
             continue
-        good = study.cells[name, label].good
-        found = mean(good.reward.to_numpy(dtype=np.float64), seed=SEED)
-        interval = () if math.isnan(found.low) else (found.low, found.high)
+        good, condition = study.cells[name, label].good, label.removeprefix(LEARNER)
+        learned = mean_of(good.reward.to_numpy(dtype=np.float64))
+        assert learned is not None  # of the best of all means
         initial = good.initial_reward.dropna()
-        paper = published_cell(name, label.removeprefix(LEARNER))
+        paper, best = published_cell(name, condition), study.optima.get((name, "free"))
         printed = paper.summary if paper else None
-        best = study.optima.get((name, "free"))
-        share = (best.reward - found.estimate) / -best.reward if best and best.reward else None
-        rows.append(
-            Row(
-                name,
-                (
-                    f"{name} †" if task.reconstructed else name,
-                    float(initial.iloc[0]) if len(initial) else None,
-                    label.removeprefix(LEARNER),
-                    Estimate(found.estimate, None, *interval),
-                    Estimate(printed.mean, printed.sd) if printed else None,
-                    best.reward if best else None,
-                    ("proven" if best.proven else "best known") if best else None,
-                    share,
-                ),
-                ((name, label),),
-                dict.fromkeys(("optimum", "proof"), best.cells) if best else {},
-            )
+        values = (
+            marked(study, name),
+            float(initial.iloc[0]) if len(initial) else None,
+            condition,
+            replace(learned, sd=None),
+            Estimate(printed.mean, printed.sd) if printed else None,
+            best.reward if best else None,
+            ("proven" if best.proven else "best known") if best else None,
+            (best.reward - learned.value) / -best.reward if best and best.reward else None,
         )
-    if not rows:
-        return None
-    return DataTable(
+        searches = dict.fromkeys(("optimum", "proof"), best.cells) if best else {}
+        rows.append(Row(name, values, ((name, label),), searches))
+    return table(
         "tasks-in-short",
         "The learner's best condition on every task.",
         (
@@ -83,7 +75,7 @@ def tasks_table(study: Study) -> DataTable | None:
             Column("proof", "known as", rests_on=("optimum",)),
             Column("gap", "gap", "share", digits=1, rests_on=("runs", "optimum")),
         ),
-        tuple(rows),
+        rows,
         (
             "Rewards are means over runs, −1 for every control tick: the nearer 0, the better. "
             "Learned: the best of a run's trials, exploration noise included (a noiseless "
@@ -98,16 +90,13 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
     """The paper's claims counted by verdict; ``claims`` is the id of the section with them."""
     paper = [entry for entry in judged if entry.claim.place]
     items = []
-    for name, entries in (
-        ("independent tests", [e for e in paper if not e.claim.fitted]),
-        (
-            "no independent tests, as they rest on reconstructed tasks †",
-            [e for e in paper if e.claim.fitted],
-        ),
+    for fitted, name in (
+        (False, "independent tests"),
+        (True, "no independent tests, as they rest on reconstructed tasks †"),
     ):
-        found = Counter(entry.verdict for entry in entries)
+        found = Counter(entry.verdict for entry in paper if entry.claim.fitted == fitted)
         counts = ", ".join(f"{found[verdict]} {verdict}" for verdict in _VERDICTS)
-        items.append(f"[{len(entries)} claims of the paper](#{claims}), {name}: {counts}.")
+        items.append(f"[{found.total()} claims of the paper](#{claims}), {name}: {counts}.")
     refuted = [entry for entry in paper if entry.verdict == "not supported"]
     if refuted:
         names = ", ".join(f"[{e.claim.id}](#claim-{e.claim.id})" for e in refuted)
@@ -123,28 +112,33 @@ def unlike_printed(study: Study) -> list[str]:
     found = []
     for row in paper_rows(study):
         if row.verdict == "different" and row.paper.summary is not None:
-            found.append(
-                f"{row.cell.task} {row.cell.label.removeprefix(LEARNER)}: learned reward "
-                f"{typographic(f'{row.rewards.mean():.1f}')}, published "
-                f"{typographic(f'{row.paper.summary.mean:.1f}')}"
+            ours, printed = (
+                typographic(f"{mean:.1f}") for mean in (row.rewards.mean(), row.paper.summary.mean)
             )
+            name = f"{row.cell.task} {row.cell.label.removeprefix(LEARNER)}"
+            found.append(f"{name}: learned reward {ours}, published {printed}")
     return found
 
 
-def without_variants(table: DataTable) -> tuple[DataTable, DataTable | None]:
+def version_text(environment: Environment) -> str:
+    """The version of this software with its commit."""
+    commit = environment.commit
+    at = f", commit {commit.id[:12]}{' with changes' * commit.dirty}" if commit else ""
+    return f"coartic {environment.coartic}{at}"
+
+
+def without_variants(of: DataTable) -> tuple[DataTable, DataTable | None]:
     """A table of methods as one of the methods themselves and a folded one of their variants.
 
     Variants are what was run with other parameters, and ablations of the learner.
     """
-    variants = [row for row in table.rows if _is_variant(row.key)]
-    if not variants or len(variants) == len(table.rows):
-        return table, None
-    kept = tuple(row for row in table.rows if not _is_variant(row.key))
-    caption = f"{table.caption.removesuffix('.')}: variants of parameters, ablations."
-    folded = replace(
-        table, id=f"{table.id}-variants", caption=caption, rows=tuple(variants), folded=True
-    )
-    return replace(table, rows=kept), folded
+    variants = tuple(row for row in of.rows if _is_variant(row.key))
+    kept = tuple(row for row in of.rows if not _is_variant(row.key))
+    if not variants or not kept:
+        return of, None
+    caption = f"{of.caption.removesuffix('.')}: variants of parameters, ablations."
+    folded = replace(of, id=f"{of.id}-variants", caption=caption, rows=variants, folded=True)
+    return replace(of, rows=kept), folded
 
 
 def _is_variant(method: str) -> bool:

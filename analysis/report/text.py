@@ -34,25 +34,26 @@ class Part:
         unit = "%" if self.column.kind == "share" else self.column.unit
         return f"{self.column.header} ({unit})" if unit else self.column.header
 
+    def raw(self, value: Value) -> tuple[Value, ...]:
+        """What it holds of a value: one, or both ends of the interval."""
+        estimate = value if isinstance(value, Estimate) else Estimate(math.nan)
+        if self.kind == "sd":
+            return (estimate.sd,)
+        if self.kind == "interval":
+            return estimate.low, estimate.high
+        return (value.value if isinstance(value, Estimate) else value,)
+
     def numbers(self, value: Value) -> tuple[str, ...]:
         """The numbers to show in ASCII, such as ``-12.3``; none where there is no value."""
-        estimate = value if isinstance(value, Estimate) else Estimate(_number(value))
-        raw = {
-            "value": (estimate.value,),
-            "sd": (estimate.sd,),
-            "interval": (estimate.low, estimate.high),
-        }[self.kind]
-        known = [number for number in raw if number is not None and not math.isnan(number)]
-        if len(known) < len(raw):
-            return ()
-        return tuple(number_text(number, self.column) for number in known)
+        raw = self.raw(value)
+        known = [x for x in raw if isinstance(x, int | float) and not math.isnan(x)]
+        whole = len(known) == len(raw)
+        return tuple(number_text(number, self.column) for number in known) if whole else ()
 
     def point(self, value: Value) -> bool:
         """Whether it shows an interval that is a point: no spread, which is not certainty."""
-        return (
-            self.kind == "interval" and isinstance(value, Estimate)
-            and value.low is not None and value.low == value.high
-        )  # fmt: skip
+        raw = self.raw(value)
+        return self.kind == "interval" and raw[0] is not None and raw[0] == raw[-1]
 
     def text(self, value: Value) -> str:
         """A value in words and typographic numbers."""
@@ -66,37 +67,40 @@ class Part:
         return f"[{', '.join(numbers)}]" if self.kind == "interval" else numbers[0]
 
 
-def parts(table: DataTable) -> list[Part]:
-    """The columns to show: SDs and intervals beside the values that have them."""
+def by_column(table: DataTable) -> list[list[Part]]:
+    """What to show of each column: values, then the SDs and intervals where some have them."""
     found = []
     for index, column in enumerate(table.columns):
-        estimates = [
-            row.values[index] for row in table.rows if isinstance(row.values[index], Estimate)
-        ]
-        found.append(Part(index, column, "value"))
-        if any(isinstance(e, Estimate) and e.sd is not None for e in estimates):
-            found.append(Part(index, column, "sd"))
-        if any(isinstance(e, Estimate) and e.low is not None for e in estimates):
-            found.append(Part(index, column, "interval"))
+        values = [row.values[index] for row in table.rows]
+        estimates = [value for value in values if isinstance(value, Estimate)]
+        own = [Part(index, column, "value")]
+        if any(estimate.sd is not None for estimate in estimates):
+            own.append(Part(index, column, "sd"))
+        if any(estimate.low is not None for estimate in estimates):
+            own.append(Part(index, column, "interval"))
+        found.append(own)
     return found
+
+
+def parts(table: DataTable) -> list[Part]:
+    """The same, each in a column of its own."""
+    return [part for own in by_column(table) for part in own]
 
 
 def heads(table: DataTable) -> list[str]:
     """What each column shows, with its unit: value, SD and interval together."""
-    shown: list[list[str]] = [[] for _ in table.columns]
-    for part in parts(table):
-        shown[part.index].append(part.header)
-    return [", ".join(headers) for headers in shown]
+    return [", ".join(part.header for part in own) for own in by_column(table)]
 
 
 def texts(table: DataTable, row: Row) -> list[str]:
     """What each column shows in a row: value, SD and interval together."""
-    shown: list[list[str]] = [[] for _ in table.columns]
-    for part in parts(table):
-        text = part.text(row.values[part.index])
-        if part.kind == "value" or text != NONE:
-            shown[part.index].append(f"± {text}" if part.kind == "sd" else text)
-    return [" ".join(words) for words in shown]
+    return [_together(own, row.values[own[0].index]) for own in by_column(table)]
+
+
+def _together(own: list[Part], value: Value) -> str:
+    first, *others = ((part, part.text(value)) for part in own)
+    small = (f"± {t}" if part.kind == "sd" else t for part, t in others if t != NONE)
+    return " ".join([first[1], *small])
 
 
 def number_text(value: float, column: Column) -> str:
@@ -121,7 +125,3 @@ def number_text(value: float, column: Column) -> str:
             return f"<{10.0**-digits:.{digits}f}"
         return shown.removeprefix("-")
     return shown
-
-
-def _number(value: float | str | None) -> float:
-    return value if isinstance(value, int | float) else math.nan

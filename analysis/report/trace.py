@@ -1,28 +1,22 @@
-"""Where a printed number comes from: what ``coartic trace`` reads and answers."""
+"""Where a printed number comes from: what ``coartic trace`` answers."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.report.document import RestsOn
-from analysis.report.trace_file import (
-    FILE,
-    Environment,
-    TracedCell,
-    TracedColumn,
-    TracedMacro,
-    TracedOptimum,
-    TracedRow,
-    TraceFile,
-    read_trace,
-)
+from analysis.markup import words
+from analysis.report.document import CellKey, DataTable, RestsOn
+from analysis.report.tables.methods import READING_OF_METHODS
+from analysis.report.text import heads, texts
+from analysis.report.trace_file import FILE, Source, TraceFile, read_trace
 from analysis.results.optima import SHIPPED
-from coartic import CoarticError, builtin_tasks
+from coartic import CoarticError
+from coartic.record import Environment
 from coartic.stored import content_hash
-from coartic.text import did_you_mean, one_line, shell_line
+from coartic.text import counted, did_you_mean, one_line, shell_line
 
 _COMPANIONS = {
     "SD": "SD over runs of: ",
@@ -41,20 +35,6 @@ _ORIGINS: dict[RestsOn, str] = {
 
 
 @dataclass(frozen=True)
-class Source:
-    """The runs of one cell that a number was computed from."""
-
-    task: str
-    label: str
-    run_ids: tuple[str, ...]
-    commits: tuple[str, ...]
-    command: str
-    """Makes the cell's runs anew; empty where it takes files of the user's own."""
-    makes: int
-    """Runs that the command makes: those of the method's other variants, too."""
-
-
-@dataclass(frozen=True)
 class Trace:
     """One printed number with everything it rests on."""
 
@@ -62,14 +42,34 @@ class Trace:
     text: str
     meaning: str
     how: str
-    sources: tuple[Source, ...]
-    specification: str
-    """SHA-256 of the suite's specification."""
-    environment: Environment
     origin: str
     """What the value is where there are no runs behind it."""
-    folder: Path | None
-    """The results folder, where the report lies in it."""
+    cells: tuple[CellKey, ...]
+    home: Path
+    """The report's folder."""
+    file: TraceFile
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The runs of its cells."""
+        by_cell = {(source.task, source.label): source for source in self.file.sources}
+        return tuple(by_cell[cell] for cell in self.cells)
+
+    @property
+    def environment(self) -> Environment:
+        """Where, when and with what results were made."""
+        return self.file.environment
+
+    @property
+    def folder(self) -> Path | None:
+        """The results folder, where the report lies in it."""
+        folder = self.home.parent
+        try:
+            manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+            same = content_hash(manifest["specification"]) == self.file.specification
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return folder if same else None
 
 
 def find_report(folder: Path) -> Path:
@@ -98,57 +98,46 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
     """
     content, name = read_trace(home), name.removeprefix("\\")
     macros = {
-        macro + suffix: (entry, suffix)
-        for macro, entry in content.macros.items()
-        for suffix in entry.texts
+        number.macro + suffix: (number, suffix, text)
+        for number in content.numbers
+        for suffix, text in number.companions()
     }
+    tables = {table.id: table for table in content.tables}
     if name in macros:
         if where:
             raise CoarticError(f"{name} is a macro: it has no rows and columns")
-        found = _of_macro(name, *macros[name])
-    elif name in content.tables:
-        found = _of_table(content, name, where)
-    else:
-        known = [*macros, *content.tables]
-        raise CoarticError(f"no macro or table {name!r} in {home}{did_you_mean(name, known)}")
-    return Trace(
-        name=found.name,
-        text=found.text,
-        meaning=found.meaning,
-        how=found.how,
-        sources=tuple(_source(content, content.cells[place]) for place in found.cells),
-        specification=content.specification,
-        environment=content.environment,
-        origin=found.origin,
-        folder=_results_folder(home.parent, content.specification),
-    )
+        number, suffix, text = macros[name]
+        of = f", {number.of}" if number.of else ""
+        meaning = f"{_COMPANIONS.get(suffix, '')}{number.meaning}{of}"
+        return Trace(name, text, meaning, number.how, number.origin, number.cells, home, content)
+    if name in tables:
+        return _of_table(home, content, tables[name], where)
+    known = [*macros, *tables]
+    raise CoarticError(f"no macro or table {name!r} in {home}{did_you_mean(name, known)}")
 
 
 def trace_text(found: Trace) -> str:
     """A trace for a terminal: one fact a line, then the runs."""
-    made = found.environment
+    made, folder = found.environment, found.folder
     commit = made.commit.id + " with changes" * made.commit.dirty if made.commit else "unknown"
     packages = ", ".join(f"{name} {version}" for name, version in made.packages.items())
     lines = [
         f"{found.name} = {found.text}",
         found.meaning,
         *([f"how: {found.how}"] if found.how else []),
-        f"results: {found.folder or 'not beside this report; its FOLDER has the specification'}",
-        f"specification: {found.specification}",
+        f"results: {folder or 'not beside this report; its FOLDER has the specification'}",
+        f"specification: {found.file.specification}",
         f"asked for by: {shell_line(*made.command)}",
         f"code: coartic {made.coartic}, commit {commit}, model code {made.model_code}",
         f"environment: Python {made.python}, {made.platform}, {packages}",
     ]
     if not found.sources:
         lines.append(f"runs: none; this value is {found.origin}")
-    one = "one: " + shell_line("coartic", "reproduce", "RUN", "--in", found.folder or "FOLDER")
+    one = "one: " + shell_line("coartic", "reproduce", "RUN", "--in", folder or "FOLDER")
     for source in found.sources:
-        count = len(source.run_ids)
-        commits = ", ".join(source.commits)
-        lines += [
-            "",
-            f"{source.task} x {source.label}: {count} runs, made at commit {commits}",
-        ]
+        count, commits = len(source.run_ids), ", ".join(source.commits)
+        runs = counted(count, "run")
+        lines += ["", f"{source.task} x {source.label}: {runs}, made at commit {commits}"]
         if source.command:
             lines.append(f"anew: {source.command}")
             if source.makes > count:
@@ -157,107 +146,41 @@ def trace_text(found: Trace) -> str:
     return "\n".join(map(one_line, lines))
 
 
-@dataclass(frozen=True)
-class _Found:
-    """What was asked for: a trace whose cells are still places."""
-
-    name: str
-    text: str
-    meaning: str
-    how: str
-    cells: tuple[int, ...]
-    origin: str
-
-
-def _of_macro(name: str, entry: TracedMacro, suffix: str) -> _Found:
-    of = f", {entry.of}" if entry.of else ""
-    meaning = f"{_COMPANIONS.get(suffix, '')}{entry.meaning}{of}"
-    return _Found(name, entry.texts[suffix], meaning, entry.how, entry.cells, entry.origin)
-
-
-def _of_table(content: TraceFile, name: str, where: Sequence[str]) -> _Found:
-    table = content.tables[name]
-    columns = [column.name for column in table.columns]
+def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[str]) -> Trace:
+    rows = {row.key: row for row in table.rows}
+    columns = {column.name: place for place, column in enumerate(table.columns)}
     if len(where) != 2:
         raise CoarticError(
-            f"{name} is a table: name a row and a column of it, one of\n  rows: "
-            f"{', '.join(map(repr, table.rows))}\n  columns: {', '.join(columns)}"
+            f"{table.id} is a table: name a row and a column of it, one of\n  rows: "
+            f"{', '.join(map(repr, rows))}\n  columns: {', '.join(columns)}"
         )
-    row, asked = where
-    if row not in table.rows:
-        raise CoarticError(f"table {name} has no row {row!r}{did_you_mean(row, table.rows)}")
-    if asked not in columns:
-        raise CoarticError(f"table {name} has no column {asked!r}{did_you_mean(asked, columns)}")
-    entry, place = table.rows[row], columns.index(asked)
-    column = table.columns[place]
-    known = _optima(content, column, entry)
-    how = [f"{column.head}.", *table.notes]
-    how += [
-        f"Optimum of {best.task}, other arm {best.other_arm}, {best.reward}: {best.how}."
-        for best in known
+    known: dict[str, Collection[str]] = {"row": rows, "column": columns}
+    for (what, names), name in zip(known.items(), where, strict=True):
+        if name not in names:
+            near = did_you_mean(name, names)
+            raise CoarticError(f"table {table.id} has no {what} {name!r}{near}")
+    row, place = rows[where[0]], columns[where[1]]
+    column, tasks = table.columns[place], {task for task, _ in row.cells}
+    known_best = [
+        (f"Optimum of {task}, other arm {arm}, {best.reward}: {best.how}.", best.cells)
+        for task, arm, best in content.optima
+        if "optimum" in column.rests_on and task in tasks and arm == column.other_arm
     ]
-    own = entry.cells if "runs" in column.rests_on or not column.rests_on else ()
-    cells = [*entry.cells_by_column.get(asked, own), *(c for best in known for c in best.cells)]
-    return _Found(
-        f"{name} [{row}, {asked}]",
-        entry.texts[place],
+    # The tables of methods share what stands above them all.
+    above = READING_OF_METHODS if table.id.startswith("methods-") else ()
+    notes = dict.fromkeys(map(words, (*above, *table.notes)))
+    own = row.cells if "runs" in column.rests_on or not column.rests_on else ()
+    cells = [
+        *row.cells_by_column.get(column.name, own),
+        *(cell for _, searches in known_best for cell in searches),
+    ]
+    return Trace(
+        f"{table.id} [{row.key}, {column.name}]",
+        texts(table, row)[place],
         table.caption,
-        " ".join(how),
-        tuple(dict.fromkeys(cells)),
+        " ".join([f"{heads(table)[place]}.", *notes, *(how for how, _ in known_best)]),
         _ORIGINS[next((o for o in _ORIGINS if o in column.rests_on), "text")],
+        tuple(dict.fromkeys(cells)),
+        home,
+        content,
     )
-
-
-def _optima(content: TraceFile, column: TracedColumn, row: TracedRow) -> list[TracedOptimum]:
-    """The optima that a column's value is computed from, of the tasks of its row's cells."""
-    if "optimum" not in column.rests_on:
-        return []
-    tasks = {content.cells[place].task for place in row.cells}
-    return [
-        best
-        for best in content.optima
-        if best.task in tasks and best.other_arm == column.other_arm
-    ]
-
-
-def _source(content: TraceFile, cell: TracedCell) -> Source:
-    makes = (
-        len(other.runs)
-        for other in content.cells
-        if (other.task, other.method) == (cell.task, cell.method)
-    )
-    return Source(
-        cell.task, cell.label, cell.runs, cell.commits, _command(content, cell), sum(makes)
-    )
-
-
-def _command(content: TraceFile, cell: TracedCell) -> str:
-    """Makes a cell's runs anew; empty where it takes files of the user's own."""
-    own = any(word.endswith((".toml", ".py")) for word in content.environment.command)
-    if own or cell.task not in builtin_tasks():
-        return ""
-    suite = content.suite
-    options = {
-        "--tasks": cell.task,
-        "--methods": cell.method,
-        "--runs": suite.runs,
-        "--trials": suite.trials,
-        "--seed": suite.seed,
-    }
-    asked = [
-        word for name, value in options.items() if value is not None for word in (name, str(value))
-    ]
-    line = [*asked, "--out", "NEW"]
-    # After --, a name is not taken for an option.
-    line = [*line, "--", suite.name] if suite.name.startswith("-") else [suite.name, *line]
-    return shell_line("coartic", "run", *line)
-
-
-def _results_folder(folder: Path, specification: str) -> Path | None:
-    """The folder if it holds the results that a report with this specification is of."""
-    try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        same = content_hash(manifest["specification"]) == specification
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return folder if same else None

@@ -58,9 +58,9 @@ class Results:
                 cell.method,
                 cell.variant,
                 self.runs[
-                    (self.runs["task"] == cell.task)
-                    & (self.runs["method"] == cell.method)
-                    & (self.runs["variant"] == cell.variant)
+                    (self.runs.task == cell.task)
+                    & (self.runs.method == cell.method)
+                    & (self.runs.variant == cell.variant)
                 ],
             )
             for cell in self.manifest.specification.cells
@@ -94,12 +94,7 @@ def load_results(folder: Path) -> Results:
         raise CoarticError(f"{folder} is a file, not a results folder")
     manifest = read_manifest(folder)
     check_tables(folder, manifest, read_records(folder, manifest))
-    return Results(
-        folder,
-        manifest,
-        read_table(folder, "runs"),
-        read_table(folder, "sequences"),
-    )
+    return Results(folder, manifest, read_table(folder, "runs"), read_table(folder, "sequences"))
 
 
 def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFrame:

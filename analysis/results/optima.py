@@ -156,27 +156,28 @@ def collect(results: Results) -> list[Entry]:
     for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
         name, base, arm = map(str, key)
         good = group[group.status == "ok"]
-        content: dict[str, Any] = {
-            "task": name,
-            "essence": essence(results.tasks[name]),
-            "base": base,
-            "other_arm": arm,
-            "run_ids": sorted(group.run_id),
-            "made_by": made_by,
-        }
+        facts: dict[str, Any] = {"infeasible": group.reason.iloc[0]}
         if len(good):
             best = _from_runs(good)
             first = good.iloc[int(good.reward.astype(int).argmax())].run_id
-            content |= {
+            rows = movements[movements.run_id == first].drop(columns="run_id")
+            facts = {
                 "reward": best.reward,
                 "hands": best.hands,
                 "bound": best.bound,
                 "searches": dict(best.searches),
-                "solution": _movements(movements[movements.run_id == first]),
+                "solution": rows.to_dict("records"),
             }
-        else:
-            content["infeasible"] = group.reason.iloc[0]
-        found.append(Entry.model_validate(content))
+        entry = Entry(
+            task=name,
+            essence=essence(results.tasks[name]),
+            base=base,
+            other_arm=arm,
+            run_ids=tuple(sorted(group.run_id)),
+            made_by=made_by,
+            **facts,
+        )
+        found.append(entry)
     return found
 
 
@@ -190,13 +191,6 @@ def renew(new: Iterable[Entry]) -> int:
     text = json.dumps({"optima": content}, indent=1, ensure_ascii=False)
     write_atomically(DATA, f"{text}\n".encode())
     return len(kept.keys() - renewed.keys())
-
-
-def _movements(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    return [
-        {str(key): value for key, value in row.items()}
-        for row in rows.drop(columns="run_id").to_dict("records")
-    ]
 
 
 def _searches(runs: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], pd.DataFrame]]:
@@ -230,23 +224,20 @@ def _best(
 ) -> Optimum:
     """The best reward with the lowest bound of all, and where the two are from."""
     best = max(candidates, key=lambda optimum: optimum.reward)
-    bound = min(
-        (optimum.bound for optimum in candidates if optimum.bound is not None), default=None
-    )
-    rewarding = [key for key, runs in searches.items() if (runs.reward == best.reward).any()]
-    bounding = [
-        key
-        for key, runs in searches.items()
-        if bound is not None and (runs.proven_bound == bound).any()
+    bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
+    bound = min(bounds, default=None)
+    cells = [
+        [key for key, runs in searches.items() if value is not None and (runs[column] == value).any()]
+        for column, value in (("reward", best.reward), ("proven_bound", bound))
     ]
-    reward, proof = ("searches of this folder" if k else stored for k in (rewarding, bounding))
+    reward, proof = ("searches of this folder" if own else stored for own in cells)
     return Optimum(
         best.reward,
         best.hands,
         bound,
         best.searches,
         reward if bound is None or reward == proof else f"reward: {reward}; bound: {proof}",
-        tuple(dict.fromkeys([*rewarding, *bounding])),
+        tuple(dict.fromkeys(cells[0] + cells[1])),
     )
 
 

@@ -16,7 +16,7 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
 
 LATEX = r"""\documentclass{article}
 \usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage[margin=2.5cm]{geometry}
-\usepackage{booktabs,siunitx,graphicx,tabularx,xltabular}
+\usepackage{booktabs,siunitx,graphicx,tabularx,longtable}
 \hfuzz=1pt
 \input{numbers.tex}
 \begin{document}

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterable
 
-from analysis.report.document import CellKey, DataTable, Document, Estimate, Value, missing
+from analysis.report.document import CellKey, DataTable, Document, Value
 from analysis.report.text import parts
+
+_ENDINGS = {"value": ("",), "sd": ("_sd",), "interval": ("_low", "_high")}
 
 
 def table_csv(table: DataTable) -> str:
@@ -23,22 +26,12 @@ def table_csv(table: DataTable) -> str:
         for column in table.columns
         if any(column.name in row.cells_by_column for row in table.rows)
     ]
-    head = ["key"]
-    for part in shown:
-        name = part.column.name
-        head += {
-            "value": [name],
-            "sd": [f"{name}_sd"],
-            "interval": [f"{name}_low", f"{name}_high"],
-        }[part.kind]
-    lines: list[list[str]] = [[*head, "cells", *(f"{name}_cells" for name in traced)]]
+    names = [f"{part.column.name}{end}" for part in shown for end in _ENDINGS[part.kind]]
+    lines = [["key", *names, "cells", *(f"{name}_cells" for name in traced)]]
     for row in table.rows:
-        line = [row.key]
-        for part in shown:
-            line += _raw(row.values[part.index], part.kind)
-        line.append(_cells(row.cells))
-        line += [_cells(row.cells_by_column.get(name, ())) for name in traced]
-        lines.append(line)
+        values = (raw for part in shown for raw in part.raw(row.values[part.index]))
+        cells = (row.cells, *(row.cells_by_column.get(name, ()) for name in traced))
+        lines.append([row.key, *map(_text, values), *map(_cells, cells)])
     return _csv(lines)
 
 
@@ -52,20 +45,10 @@ def runs_csv(document: Document) -> str:
     )
 
 
-def _raw(value: Value, kind: str) -> list[str]:
-    estimate = value if isinstance(value, Estimate) else None
-    if kind == "sd":
-        return [_text(estimate.sd if estimate else None)]
-    if kind == "interval":
-        return [_text(estimate.low), _text(estimate.high)] if estimate else ["", ""]
-    return [_text(estimate.value if estimate else value)]
-
-
 def _text(value: Value) -> str:
-    # repr of a float (of NumPy's, too) that reads back as the same number.
-    if missing(value):
-        return ""
-    return repr(float(value)) if isinstance(value, float) else str(value)
+    if isinstance(value, float):  # by the text that reads back as the same number
+        return "" if math.isnan(value) else repr(float(value))
+    return "" if value is None else str(value)
 
 
 def _cells(cells: Iterable[CellKey]) -> str:

@@ -7,12 +7,10 @@ marked here as markup: styles, scripts, drawings, and places where a name may be
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
-from itertools import groupby
-from typing import get_args
+from typing import NamedTuple, get_args
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
@@ -21,13 +19,12 @@ from analysis.markup import inline
 from analysis.report.document import (
     Block,
     CellKey,
-    DataTable,
     Document,
     FigureBlock,
     PlayerBlock,
     Row,
 )
-from analysis.report.text import Part, parts
+from analysis.report.text import Part, by_column
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
 
@@ -78,8 +75,12 @@ def _template() -> Template:
     page.filters |= {
         "inline": inline,
         "true_minus": true_minus,
-        "table_view": table_view,
-        "figure_view": figure_view,
+        "by_column": by_column,
+        "small_print": small_print,
+        "cell_view": cell_view,
+        "stretches": stretches,
+        "is_wide": is_wide,
+        "inlined_svg": inlined_svg,
         "data": _script_data,
     }
     page.tests |= {kind.__name__.lower(): kind.__instancecheck__ for kind in get_args(Block)}
@@ -94,18 +95,13 @@ def _resource(name: str) -> str:
     return (files("analysis.report") / name).read_text(encoding="utf-8")
 
 
-@dataclass(frozen=True)
-class HeadView:
-    """A column's header with what the small print below its values is."""
-
-    text: str
-    small: str
-    kind: str
-    """CSS classes, here as below."""
+def small_print(own: list[Part]) -> str:
+    """What the small print below a column's values is."""
+    small = {"value": "", "sd": "± SD", "interval": f"[{own[0].column.interval}]"}
+    return " ".join(filter(None, (small[part.kind] for part in own)))
 
 
-@dataclass(frozen=True)
-class CellView:
+class CellView(NamedTuple):
     """What a table shows in one place."""
 
     text: str
@@ -113,66 +109,22 @@ class CellView:
     """None where the column has none, empty where this value has none."""
     interval: str
     kind: str
-    runs: int = 0
-    """Number of the list of runs that it rests on, where these are not its row's."""
-    title: str = ""
-    """Those runs in words."""
+    """CSS classes."""
+    cells: tuple[CellKey, ...]
+    """What it was computed from, where that is not its row's."""
 
 
-@dataclass(frozen=True)
-class RowView:
-    """A row: its name, its other cells, and the lists of runs behind it."""
-
-    name: CellView
-    cells: tuple[CellView, ...]
-    link: str
-    stretches: tuple[tuple[int, int], ...]
-    """First and last of lists that are neighbours."""
-
-
-@dataclass(frozen=True)
-class TableView:
-    """A table as a page shows it: values, their SDs and intervals in one column."""
-
-    heads: tuple[HeadView, ...]
-    rows: tuple[RowView, ...]
-    sourced: bool
-    """Whether there is a column of runs."""
-
-
-def table_view(table: DataTable, numbers: Mapping[CellKey, int]) -> TableView:
-    """The table in words; ``numbers`` are those of the lists of runs, by cell."""
-    columns = [list(own) for _, own in groupby(parts(table), key=lambda part: part.index)]
-    rows = []
-    for row in table.rows:
-        name, *cells = (_cell(row, own, numbers) for own in columns)
-        stretches = _stretches({numbers[cell] for cell in row.cells})
-        rows.append(RowView(name, tuple(cells), row.link, stretches))
-    heads = tuple(map(_head, columns))
-    return TableView(heads, tuple(rows), any(row.cells for row in table.rows))
-
-
-def _head(own: list[Part]) -> HeadView:
-    small = {"value": "", "sd": "± SD", "interval": f"[{own[0].column.interval}]"}
-    below = " ".join(filter(None, (small[part.kind] for part in own)))
-    return HeadView(own[0].header, below, "text" if own[0].column.kind == "text" else "")
-
-
-def _cell(row: Row, own: list[Part], numbers: Mapping[CellKey, int]) -> CellView:
-    value = row.values[own[0].index]
+def cell_view(row: Row, own: list[Part]) -> CellView:
+    """A row's value in one column."""
+    column, value = own[0].column, row.values[own[0].index]
     shown = {part.kind: part.text(value) for part in own}
     small = {kind: "" if text == NONE else text for kind, text in shown.items()}
     length, kind = len(str(value or "")), ""
-    if own[0].column.kind == "text":
+    if column.kind == "text":
         kind = "word" if length <= _WORD else "text" if length <= _SENTENCE else "text sentence"
-    cells = row.cells_by_column.get(own[0].column.name)
+    cells = row.cells_by_column.get(column.name, ())
     return CellView(
-        breakable(shown["value"]),
-        small.get("sd"),
-        small.get("interval", ""),
-        kind,
-        numbers[cells[0]] if cells else 0,
-        f"Runs: {'; '.join(map(', '.join, cells))}" if cells else "",
+        breakable(shown["value"]), small.get("sd"), small.get("interval", ""), kind, cells
     )
 
 
@@ -184,33 +136,20 @@ def breakable(text: str) -> str:
     return Markup("/<wbr>").join(re.split(r"(?<=\w)/(?=\w)", text))
 
 
-def _stretches(numbers: set[int]) -> tuple[tuple[int, int], ...]:
-    """Neighbouring numbers drawn together: first and last."""
-    stretches: list[tuple[int, int]] = []
-    for number in sorted(numbers):
-        if stretches and stretches[-1][1] == number - 1:
-            stretches[-1] = stretches[-1][0], number
+def stretches(cells: Iterable[CellKey], numbers: Mapping[CellKey, int]) -> list[list[int]]:
+    """Numbers of cells, neighbours drawn together: first and last."""
+    found: list[list[int]] = []
+    for number in sorted({numbers[cell] for cell in cells}):
+        if found and found[-1][1] == number - 1:
+            found[-1][1] = number
         else:
-            stretches.append((number, number))
-    return tuple(stretches)
+            found.append([number, number])
+    return found
 
 
-@dataclass(frozen=True)
-class FigureView:
-    """A drawing as a page has it."""
-
-    svg: Markup
-    kind: str
-    wide: bool
-    """Whether a narrow page scrolls it."""
-
-
-def figure_view(figure: FigureBlock) -> FigureView:
-    """The drawing with its ground. Raises ValueError as :func:`inlined_svg` does."""
-    wide = _width(figure) > _WIDE
-    # What is not drawn in the page's ink needs a white ground in the dark as well.
-    kinds = ["paper"] * ("currentColor" not in figure.svg) + ["wide"] * wide
-    return FigureView(inlined_svg(figure), " ".join(kinds), wide)
+def is_wide(figure: FigureBlock) -> bool:
+    """Whether a narrow page scrolls it. Raises ValueError as :func:`inlined_svg` does."""
+    return _width(figure) > _WIDE
 
 
 def _width(figure: FigureBlock) -> float:

@@ -2,8 +2,8 @@
 
 Columns that are not for print are left out, methods have the names that figures show. Columns of
 many words share what the others leave of the line (tabularx); a table of few words that is wider
-than the line is scaled down to it. Tables longer than a page are of xltabular, which needs one
-column of text.
+than the line is scaled down to it. Tables longer than a page are longtables, which need one
+column of text; their columns of many words share two fifths of the line.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 import textwrap
 import unicodedata
 from collections.abc import Sequence
+from string import Template
 
 from analysis.markup import inline
 from analysis.methods import short_name
@@ -20,74 +21,42 @@ from analysis.report.text import Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
 
+_MATHS = dict(
+    re.findall(
+        r"(\S) (\S+)",
+        r"""
+        − - ± \pm × \times · \cdot ÷ \div ≤ \leq ≥ \geq ≠ \neq ≈ \approx ∞ \infty
+        → \rightarrow ← \leftarrow ∈ \in √ \surd ↳ \hookrightarrow ● \bullet ◐ \odot ○ \circ
+        ◌ \oslash ∫ \int ‖ \| ¼ 1/4 ½ 1/2 ¾ 3/4 ° ^{\circ} ′ ' µ \mu
+        """,
+    )
+)
+_NAMED = {
+    **{"\\": "backslash", "^": "asciicircum", "~": "asciitilde", "`": "asciigrave"},
+    **{"–": "endash", "—": "emdash", "†": "dagger", "‡": "daggerdbl", "•": "bullet"},
+}
 _ESCAPES = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "$": r"\$",
-    "&": r"\&",
-    "%": r"\%",
-    "#": r"\#",
-    "_": r"\_",
-    "^": r"\textasciicircum{}",
-    "~": r"\textasciitilde{}",
-    "`": r"\textasciigrave{}",
-    "[": "{[}",  # \\ would read these as its own
-    "*": "{*}",
-    "–": r"\textendash{}",
-    "—": r"\textemdash{}",
-    "−": "$-$",
-    "±": r"$\pm$",
-    "×": r"$\times$",
-    "·": r"$\cdot$",
-    "÷": r"$\div$",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "≠": r"$\neq$",
-    "≈": r"$\approx$",
-    "∞": r"$\infty$",
-    "→": r"$\rightarrow$",
-    "←": r"$\leftarrow$",
-    "∈": r"$\in$",
-    "√": r"$\surd$",
-    "↳": r"$\hookrightarrow$",
-    "●": r"$\bullet$",
-    "◐": r"$\odot$",
-    "○": r"$\circ$",
-    "◌": r"$\oslash$",
-    "∫": r"$\int$",
-    "‖": r"$\|$",
-    "¼": "$1/4$",
-    "½": "$1/2$",
-    "¾": "$3/4$",
-    "°": r"$^{\circ}$",
-    "′": r"$'$",
-    "†": r"\textdagger{}",
-    "‡": r"\textdaggerdbl{}",
-    "…": r"\ldots{}",
-    "•": r"\textbullet{}",
-    "‘": "`",
-    "’": "'",
-    "“": "``",
-    "”": "''",
-    "µ": r"$\mu$",
-    "\N{NO-BREAK SPACE}": "~",
-    "\N{NARROW NO-BREAK SPACE}": r"\,",
-    "\N{THIN SPACE}": r"\,",
+    **{mark: f"\\{mark}" for mark in "{}$&%#_"},
+    **{mark: f"{{{mark}}}" for mark in "[*"},  # \\ would read these as its own
+    **{mark: f"${command}$" for mark, command in _MATHS.items()},
+    **{mark: f"\\text{name}{{}}" for mark, name in _NAMED.items()},
+    **{"…": r"\ldots{}", "‘": "`", "’": "'", "“": "``", "”": "''"},
+    **{"\N{NO-BREAK SPACE}": "~", "\N{NARROW NO-BREAK SPACE}": r"\,", "\N{THIN SPACE}": r"\,"},
+    **{
+        raised: f"$^{{{sign}}}$" for raised, sign in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True)
+    },
+    **{
+        lowered: f"$_{{{sign}}}$" for lowered, sign in zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True)
+    },
 }
-_GREEK = {
-    letter: unicodedata.name(letter).split()[-1].replace("LAMDA", "LAMBDA")
-    for letter in "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ"
-}
-_RAISED = {"⁻": "-", **dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True))}
-_LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True))
+_GREEK = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ"
 MOST_ROWS = 35
 """Of a float; a table with more is continued on the next page."""
-PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "xltabular")
+PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _LABELS = {"method", "first", "second"}  # columns of methods with their variants
-_NUMBER = re.compile(r"-?\d+(\.\d+)?")
+_NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
 
 def latex_tables(document: Document) -> dict[str, str]:
@@ -100,7 +69,7 @@ def latex_inputs(document: Document) -> str:
     inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
     return (
         f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
-        f"% tables of more than {MOST_ROWS} rows are xltabulars, for one column of text.\n"
+        f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
         + inputs
     )
 
@@ -108,10 +77,10 @@ def latex_inputs(document: Document) -> str:
 def latex_table(table: DataTable) -> str:
     """One table: numbers in S columns as wide as they need, text and intervals beside them."""
     shown = [part for part in parts(table) if part.column.printed]
-    long = len(table.rows) > MOST_ROWS
-    broken = _broken(shown, table) or (shown[:1] if long else [])
+    broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
+    width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
     kinds = "".join(
-        r">{\raggedright\arraybackslash}X" if part in broken else _kind(part, table)
+        rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
         for part in shown
     )
     head = " & ".join(_head(part, table) for part in shown)
@@ -119,58 +88,58 @@ def latex_table(table: DataTable) -> str:
         " & ".join(_cell(part, row.values[part.index]) for part in shown) + r" \\"
         for row in table.rows
     )
-    caption = f"\\caption{{{_spans(table.caption)}}}\n\\label{{tab:{table.id}}}"
-    if long:
-        return _long(table, caption, f"@{{}}{kinds}@{{}}", head, rows)
-    notes = "".join(
-        f"\\par\\smallskip\\parbox{{\\linewidth}}{{{_spans(note)}}}\n" for note in table.notes
+    layout = _LONG if long else _FLOAT
+    begin, end = (
+        (r"\begin{tabularx}{\linewidth}", r"\end{tabularx}")
+        if broken
+        else (f"{_SCALED}\n\\begin{{tabular}}", r"\end{tabular}}")
     )
-    begin = f"\\begin{{tabularx}}{{\\linewidth}}{{@{{}}{kinds}@{{}}}}"
-    end = r"\end{tabularx}"
-    if not broken:
-        begin = (
-            "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%\n"
-            f"\\begin{{tabular}}{{@{{}}{kinds}@{{}}}}"
-        )
-        end = r"\end{tabular}}"
-    return f"""\\begin{{table}}[htbp]
-\\centering
-\\footnotesize
-\\setlength{{\\tabcolsep}}{{3pt}}
-{caption}
-{begin}
-\\toprule
-{head} \\\\
-\\midrule
-{rows}
-\\bottomrule
-{end}
-{notes}\\end{{table}}
-"""
+    return layout.substitute(
+        caption=f"\\caption{{{_spans(table.caption)}}}\n\\label{{tab:{table.id}}}",
+        begin=begin,
+        end=end,
+        kinds=f"{{@{{}}{kinds}@{{}}}}",
+        head=f"{head} \\\\\n\\midrule",
+        rows=rows,
+        notes="".join(
+            f"\\par\\smallskip\\noindent\\parbox{{\\linewidth}}{{{_spans(note)}}}\n"
+            for note in table.notes
+        ),
+    )
 
 
-def _long(table: DataTable, caption: str, kinds: str, head: str, rows: str) -> str:
-    notes = "".join(f"\\noindent {_spans(note)}\\par\n" for note in table.notes)
-    return f"""\\begingroup
-\\scriptsize
-\\setlength{{\\tabcolsep}}{{3pt}}
-\\setlength{{\\LTcapwidth}}{{\\linewidth}}
-\\begin{{xltabular}}{{\\linewidth}}{{{kinds}}}
-{caption} \\\\
-\\toprule
-{head} \\\\
-\\midrule
-\\endfirsthead
-\\toprule
-{head} \\\\
-\\midrule
-\\endhead
-\\bottomrule
-\\endfoot
-{rows}
-\\end{{xltabular}}
-{notes}\\endgroup
-"""
+_SCALED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
+_FLOAT = Template(r"""\begin{table}[htbp]
+\centering
+\footnotesize
+\setlength{\tabcolsep}{3pt}
+$caption
+$begin$kinds
+\toprule
+$head
+$rows
+\bottomrule
+$end
+$notes\end{table}
+""")
+_LONG = Template(r"""\begingroup
+\scriptsize
+\setlength{\tabcolsep}{3pt}
+\setlength{\LTcapwidth}{\linewidth}
+\begin{longtable}$kinds
+$caption \\
+\toprule
+$head
+\endfirsthead
+\toprule
+$head
+\endhead
+\bottomrule
+\endfoot
+$rows
+\end{longtable}
+$notes\endgroup
+""")
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
@@ -215,12 +184,8 @@ def _character(character: str) -> str:
     if character in _ESCAPES:
         return _ESCAPES[character]
     if character in _GREEK:
-        name = _GREEK[character]
-        return f"$\\{name.lower() if character.islower() else name.capitalize()}$"
-    if character in _RAISED:
-        return f"$^{{{_RAISED[character]}}}$"
-    if character in _LOWERED:
-        return f"$_{{{_LOWERED[character]}}}$"
+        letter = unicodedata.name(character).split()[-1].replace("LAMDA", "LAMBDA")
+        return f"$\\{letter.lower() if character.islower() else letter.capitalize()}$"
     # Letters of Latin-1 and Latin Extended-A are in T1, but for a few.
     if character.isascii() or ("À" <= character <= "ž" and character not in "ĦħĸĿŀŊŋŦŧ"):
         return character
@@ -244,27 +209,16 @@ def _spans(text: str) -> str:
 
 
 def _kind(part: Part, table: DataTable) -> str:
+    """S with the sign and digits of the column's numbers; right or left of what has none."""
     if not part.numeric:
         return "l" if part.column.kind == "text" else "r"
-    sign, wholes, decimals = _format(part, table)
-    return f"S[table-format={sign}{wholes}.{decimals}]" if wholes else "r"
-
-
-def _format(part: Part, table: DataTable) -> tuple[str, int, int]:
-    """Sign, digits before and digits after the point of a column's numbers."""
-    numbers = [
-        number
-        for row in table.rows
-        for number in part.numbers(row.values[part.index])
-        if _NUMBER.fullmatch(number)
-    ]
+    texts = [text for row in table.rows for text in part.numbers(row.values[part.index])]
+    numbers = list(filter(None, map(_NUMBER.fullmatch, texts)))
     if not numbers:
-        return "", 0, 0
-    sign = "-" if any(number.startswith("-") for number in numbers) else ""
-    wholes, decimals = zip(
-        *(number.removeprefix("-").partition(".")[::2] for number in numbers), strict=True
-    )
-    return sign, max(map(len, wholes)), max(map(len, decimals))
+        return "r"
+    sign = "-" if any(number["sign"] for number in numbers) else ""
+    wholes, decimals = (max(len(n[of] or "") for n in numbers) for of in ("whole", "decimals"))
+    return f"S[table-format={sign}{wholes}.{decimals}]"
 
 
 def _cell(part: Part, value: Value) -> str:

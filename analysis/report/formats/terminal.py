@@ -9,7 +9,7 @@ from rich.text import Text
 from analysis.markup import words
 from analysis.report.document import DataTable
 from analysis.report.text import heads, texts
-from coartic.text import one_line
+from coartic.text import counted, one_line
 
 _PADDING = 4  # characters about a column
 _SENTENCE = 30  # of a column of text, beyond which it may be broken into lines
@@ -38,10 +38,11 @@ def terminal_table(table: DataTable, width: int) -> Table:
             break
         shown.remove(place)
     hidden = len(columns) - len(shown)
+    more = f"({counted(hidden, 'more column')}, for which there is no room here)"
     found = Table(
         title=Text(one_line(words(table.caption))),
         title_justify="left",
-        caption=Text(_hidden(hidden)) if hidden else None,
+        caption=Text(more) if hidden else None,
         caption_justify="left",
         box=box.SIMPLE_HEAD,
         highlight=False,
@@ -59,7 +60,3 @@ def terminal_table(table: DataTable, width: int) -> Table:
     for row in zip(*(columns[place][1:] for place in shown), strict=True):
         found.add_row(*map(Text, row))
     return found
-
-
-def _hidden(count: int) -> str:
-    return f"({count} more column{'' if count == 1 else 's'}, for which there is no room here)"

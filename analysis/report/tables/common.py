@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
 from analysis.words import slugs
@@ -32,22 +32,27 @@ def table(
     return DataTable(name, caption, columns, tuple(rows), notes) if rows else None
 
 
+def row_of(
+    columns: tuple[Column, ...], key: str, of: Any, cells: tuple[CellKey, ...], **own: Value
+) -> Row:
+    """A row whose values are fields of ``of`` by the columns' names, but for its ``own``."""
+    values = (own[c.name] if c.name in own else getattr(of, c.name) for c in columns)
+    return Row(key, tuple(values), cells)
+
+
 def mean_of(rewards: Any) -> Estimate | None:
     """Mean with SD and BCa interval, as far as there are any."""
     if not len(rewards):
         return None
     found = mean(rewards, seed=SEED)
-    spread = finite(sd(rewards))
-    if math.isnan(found.low):
-        return Estimate(found.estimate, spread)
-    return Estimate(found.estimate, spread, found.low, found.high)
+    ends = () if math.isnan(found.low) else (found.low, found.high)
+    return Estimate(found.estimate, finite(sd(rewards)), *ends)
 
 
 def with_interval(value: float, low: float, high: float) -> Value:
     """A value with its interval where it has one; None for NaN."""
-    if math.isnan(value):
-        return None
-    return Estimate(value) if math.isnan(low) else Estimate(value, None, low, high)
+    ends = () if math.isnan(low) else (low, high)
+    return None if math.isnan(value) else Estimate(value, None, *ends)
 
 
 def finite(value: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,14 @@ from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.comparisons.overall import WITHIN
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, RestsOn, Row
-from analysis.report.tables.common import marked, mean_of, table, table_ids, with_interval
+from analysis.report.tables.common import (
+    marked,
+    mean_of,
+    row_of,
+    table,
+    table_ids,
+    with_interval,
+)
 from analysis.words import true_minus
 from coartic.method import Information
 from coartic.record import SEARCH
@@ -64,82 +72,55 @@ def methods_table(study: Study, task: str) -> DataTable | None:
     )
 
 
-def _number_of(name: str, header: str, *, printed: bool = False) -> Column:
-    return Column(name, header, "number", rests_on=("runs",), printed=printed)
+_ON_OPTIMUM: tuple[RestsOn, ...] = ("runs", "optimum")
 
 
+_on_optimum = partial(Column, rests_on=_ON_OPTIMUM)
+_of_runs = partial(Column, rests_on=("runs",), printed=False)
+_SPENT = (
+    Column("trials", "trials", "number", rests_on=("runs",)),
+    _of_runs("movement_ticks", "ticks", "number"),
+    _of_runs("forward_kinematics", "kinematics", "number"),
+    _of_runs("jacobians", "Jacobians", "number"),
+    _of_runs("solver_iterations", "iterations", "number"),
+)
 _METHODS = (
     Column("method", "method"),
     Column("reward", "reward", "number", "ticks", 1, rests_on=("runs",)),
-    _number_of("solved", "solved"),
-    _number_of("runs", "runs"),
-    Column("gap", "gap", "number", "ticks", 1, rests_on=("runs", "optimum"), printed=False),
-    Column("gap_share", "gap", "share", digits=1, rests_on=("runs", "optimum")),
-    Column(
-        "gap_still",
-        "gap, arm still",
-        "number",
-        "ticks",
-        1,
-        rests_on=("runs", "optimum"),
-        other_arm="still",
-        printed=False,
+    _of_runs("solved", "solved", "number"),
+    _of_runs("runs", "runs", "number"),
+    _on_optimum("gap", "gap", "number", "ticks", 1, printed=False),
+    _on_optimum("gap_share", "gap", "share", digits=1),
+    _on_optimum(
+        "gap_still", "gap, arm still", "number", "ticks", 1, other_arm="still", printed=False
     ),
     Column("told", "told"),
-    Column("hands", "hands: runs", rests_on=("runs",), printed=False),
-    Column("other_arm", "other arm", rests_on=("runs",), printed=False),
-    _number_of("trials", "trials", printed=True),
-    _number_of("movement_ticks", "ticks"),
-    _number_of("forward_kinematics", "kinematics"),
-    _number_of("jacobians", "Jacobians"),
-    _number_of("solver_iterations", "iterations"),
+    _of_runs("hands", "hands: runs"),
+    _of_runs("other_arm", "other arm"),
+    *_SPENT,
     Column("solve_s", "solve", "number", "s", rests_on=("runs",)),
 )
-
-
-_ENDS = ("", "_low", "_high")
-_ON_OPTIMUM: tuple[RestsOn, ...] = ("runs", "optimum")
 _OVERALL = (
     Column("method", "method"),
-    _number_of("runs", "runs"),
-    _number_of("failed", "of them failed"),
-    Column("score", "score", "number", digits=2, rests_on=_ON_OPTIMUM),
-    Column("gap", "gap", "share", digits=1, rests_on=_ON_OPTIMUM),
+    _of_runs("runs", "runs", "number"),
+    _of_runs("failed", "of them failed", "number"),
+    _on_optimum("score", "score", "number", digits=2),
+    _on_optimum("gap", "gap", "share", digits=1),
     *(
-        Column(
-            near,
-            f"within {100 * share:.0f} %",
-            "share",
-            digits=0,
-            rests_on=_ON_OPTIMUM,
-            printed=share == 0.05,
-        )
+        _on_optimum(near, f"within {100 * share:.0f} %", "share", digits=0, printed=share == 0.05)
         for near, share in WITHIN.items()
     ),
 )
+_ENDS = ("", "_low", "_high")
 
 
 def _method_row(study: Study, row: MethodRow) -> Row:
     key = row.task, row.label
-    values = (
-        row.label,
-        mean_of(study.cells[key].good.reward.to_numpy(dtype=np.float64)),
-        row.solved,
-        row.runs,
-        row.gap,
-        row.gap_share,
-        row.gap_still,
-        row.told or None,
-        row.hands or None,
-        row.other_arm or None,
-        _whole(row.trials),
-        _whole(row.movement_ticks),
-        _whole(row.forward_kinematics),
-        _whole(row.jacobians),
-        _whole(row.solver_iterations),
-        row.solve_s,
+    own = {column.name: _whole(getattr(row, column.name)) for column in _SPENT}
+    rewards = study.cells[key].good.reward.to_numpy(dtype=np.float64)
+    return row_of(
+        _METHODS, row.label, row, (key,), method=row.label, reward=mean_of(rewards), **own
     )
-    return Row(row.label, values, (key,))
 
 
 def _optimum(study: Study, task: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
@@ -14,17 +16,45 @@ from analysis.published import (
     published_initial,
 )
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.report.tables.common import counts, marked, mean_of, table, with_interval
-from analysis.statistics.equivalence import MARGIN, Equivalence
+from analysis.report.tables.common import counts, marked, mean_of, row_of, table, with_interval
+from analysis.statistics.equivalence import MARGIN
 from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-_PUBLISHED_AS = Column("published_as", "published as", rests_on=("paper",), printed=False)
+
+_of_paper = partial(Column, rests_on=("paper",), printed=False)
+_of_runs = partial(Column, rests_on=("runs",), printed=False)
+_PUBLISHED = Column("published", "paper", "number", "ticks", 1, rests_on=("paper",))
+_PUBLISHED_RUNS = _of_paper("published_runs", "published runs", "number")
+_PUBLISHED_AS = _of_paper("published_as", "published as")
 _OURS = Column("ours", "ours", "number", "ticks", 1, rests_on=("runs",))
-_RUNS = Column("runs", "runs", "number", rests_on=("runs",), printed=False)
+_RUNS = _of_runs("runs", "runs", "number")
 _DIFFERENCE = Column("difference", "difference", "number", "ticks", 1, rests_on=("runs", "paper"))
+_CELLS = (
+    Column("task", "task"),
+    Column("method", "method"),
+    *(_PUBLISHED, _PUBLISHED_RUNS, _PUBLISHED_AS, _OURS, _RUNS, _DIFFERENCE),
+    Column("verdict", "verdict", rests_on=("runs", "paper")),
+    _of_paper("margin", "margin", "number", "ticks", 1),
+    _of_paper("margin_of_gain", "of the gain", "share", "", 0),
+    _of_runs("initial", "initial", "number", "ticks", 0),
+    _of_paper("published_initial", "initial, published", "number", "ticks", 0),
+    _of_runs("hands", "hands: runs"),
+    _of_paper("published_hands", "hands, published"),
+)
+_SEQUENCES = (
+    Column("task", "task"),
+    Column("method", "method"),
+    Column("hands", "hands", rests_on=("runs", "paper")),
+    _PUBLISHED,
+    replace(_PUBLISHED_RUNS, printed=True),
+    _PUBLISHED_AS,
+    _OURS,
+    replace(_RUNS, printed=True),
+    _DIFFERENCE,
+)
 _PAPER = (
     "Published: Shah, Barto & Fagg (2013), mean ± SD, rounded as there. *derived*: pooled from "
     "what is printed by hand sequence; *runs assumed*: no number of runs stands beside it, "
@@ -37,38 +67,9 @@ _PAPER = (
 )
 
 
-_PUBLISHED = (
-    Column("task", "task"),
-    Column("method", "method"),
-    Column("published", "paper", "number", "ticks", 1, rests_on=("paper",)),
-    Column("published_runs", "published runs", "number", rests_on=("paper",), printed=False),
-    _PUBLISHED_AS,
-    _OURS,
-    _RUNS,
-    _DIFFERENCE,
-    Column("verdict", "verdict", rests_on=("runs", "paper")),
-    Column("margin", "margin", "number", "ticks", 1, rests_on=("paper",), printed=False),
-    Column(
-        "margin_of_gain",
-        "of the gain",
-        "share",
-        digits=0,
-        rests_on=("paper",),
-        printed=False,
-    ),
-    Column("initial", "initial", "number", "ticks", 0, rests_on=("runs",), printed=False),
-    Column(
-        "published_initial",
-        "initial, published",
-        "number",
-        "ticks",
-        0,
-        rests_on=("paper",),
-        printed=False,
-    ),
-    Column("hands", "hands: runs", rests_on=("runs",), printed=False),
-    Column("published_hands", "hands, published", rests_on=("paper",), printed=False),
-)
+def beside_paper(study: Study) -> tuple[DataTable | None, ...]:
+    """The three tables of this module, as far as there are any."""
+    return published_table(study), sequences_table(study), exhaustive_table(study)
 
 
 def published_table(study: Study) -> DataTable | None:
@@ -94,7 +95,7 @@ def published_table(study: Study) -> DataTable | None:
     return table(
         "published-and-ours",
         "Learned reward in the paper's cells, published and ours.",
-        _PUBLISHED,
+        _CELLS,
         [_published_row(study, row) for row in rows],
         tuple(notes),
     )
@@ -105,17 +106,7 @@ def sequences_table(study: Study) -> DataTable | None:
     return table(
         "by-hand-sequence",
         "Learned reward by hand sequence, where the paper or our runs tell several apart.",
-        (
-            Column("task", "task"),
-            Column("method", "method"),
-            Column("hands", "hands", rests_on=("runs", "paper")),
-            Column("published", "paper", "number", "ticks", 1, rests_on=("paper",)),
-            Column("published_runs", "published runs", "number", rests_on=("paper",)),
-            _PUBLISHED_AS,
-            _OURS,
-            Column("runs", "runs", "number", rests_on=("runs",)),
-            _DIFFERENCE,
-        ),
+        _SEQUENCES,
         [_sequence_row(study, row) for row in sequence_rows(study)],
         (_PAPER,),
     )
@@ -159,53 +150,48 @@ def _published_row(study: Study, row: PaperRow) -> Row:
     cell, summary = row.cell, row.paper.summary
     initial = cell.good.initial_reward.dropna()
     published_hands = [f"{s.hands} {s.runs or ''}".strip() for s in row.paper.sequences]
-    values = (
-        marked(study, cell.task),
-        cell.label,
-        _estimate(summary),
-        summary.runs if summary else None,
-        _published_as(summary, row.paper),
-        mean_of(row.rewards),
-        len(row.rewards),
-        _difference(row.difference),
-        row.verdict,
-        row.margin,
-        row.margin_of_gain,
-        float(initial.iloc[0]) if len(initial) else None,
-        (published_initial(cell.task) or (None, None))[1],
-        counts(cell.good.hands),
-        ", ".join(published_hands) or None,
+    return row_of(
+        _CELLS,
+        f"{cell.task} {cell.label}",
+        row,
+        ((cell.task, cell.label),),
+        published_runs=summary.runs if summary else None,
+        initial=float(initial.iloc[0]) if len(initial) else None,
+        published_initial=(published_initial(cell.task) or (None, None))[1],
+        hands=counts(cell.good.hands),
+        published_hands=", ".join(published_hands) or None,
+        **_beside(study, row, summary, row.paper),
     )
-    return Row(f"{cell.task} {cell.label}", values, ((cell.task, cell.label),))
 
 
 def _sequence_row(study: Study, row: SequenceRow) -> Row:
-    task, label = row.cell.task, row.cell.label
-    values = (
-        marked(study, task),
-        label,
-        row.hands,
-        _estimate(row.published),
-        row.published_runs,
-        _published_as(row.published),
-        mean_of(row.rewards),
-        len(row.rewards),
-        _difference(row.difference),
-    )
-    return Row(f"{task} {label} {row.hands}", values, ((task, label),))
+    key = row.cell.task, row.cell.label
+    own = _beside(study, row, row.published)
+    return row_of(_SEQUENCES, " ".join((*key, row.hands)), row, (key,), **own)
 
 
-def _published_as(summary: Summary | None, cell: PublishedCell | None = None) -> str | None:
+def _beside(
+    study: Study,
+    row: PaperRow | SequenceRow,
+    published: Summary | None,
+    cell: PublishedCell | None = None,
+) -> dict[str, Value]:
+    """What both tables have: published, ours, and the difference."""
+    apart = row.difference
+    return {
+        "task": marked(study, row.cell.task),
+        "method": row.cell.label,
+        "published": Estimate(published.mean, published.sd) if published else None,
+        "published_as": _published_as(published, cell),
+        "ours": mean_of(row.rewards),
+        "runs": len(row.rewards),
+        "difference": with_interval(apart.estimate, apart.low, apart.high) if apart else None,
+    }
+
+
+def _published_as(summary: Summary | None, cell: PublishedCell | None) -> str | None:
     if summary is None:
         return ", ".join(filter(None, ("not printed", cell.remark))) if cell else None
     if summary.derived:
         return "derived"
     return "printed" if summary.runs_printed else "printed, runs assumed"
-
-
-def _estimate(summary: Summary | None) -> Estimate | None:
-    return None if summary is None else Estimate(summary.mean, summary.sd)
-
-
-def _difference(found: Equivalence | None) -> Value:
-    return None if found is None else with_interval(found.estimate, found.low, found.high)
