@@ -261,7 +261,7 @@ def test_resamples_without_spread_have_no_end():
     for n in range(10, 30):
         pairs = np.zeros(n)
         pairs[-1] = 1.0
-        found = bootstrap_equivalence(pairs, 0.0, 0.5, seed=0, confidence=0.9, resamples=199)
+        found = bootstrap_equivalence(pairs, 0.0, 0.5, seed=0, resamples=199)
         ends += [found.low, found.high]
     assert all(abs(end) < 10 or np.isinf(end) for end in ends)
     assert np.isinf(ends).any()

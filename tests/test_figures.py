@@ -22,7 +22,7 @@ from analysis.figures.configurations import (
 from analysis.figures.context import context
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
-from analysis.figures.plot import FORMATS, _settle, save, svg_text, write
+from analysis.figures.plot import FORMATS, _settle, save, svg_text
 from analysis.figures.profiles import profiles
 from analysis.figures.published import published
 from analysis.figures.recruitment import recruitment
@@ -123,12 +123,12 @@ def test_a_folder_without_the_learner(alone):
         configurations(alone, [("descending", ["dual-process/EC1"])])
     with pytest.raises(CoarticError, match=r"no task ascending"):
         configurations(alone, [("ascending", [])])
-    with pytest.raises(CoarticError, match=r"no task 'nope'; it has descending"):
-        bars(alone, tasks=["nope"])
     with pytest.raises(CoarticError, match=r"no method 'cma-es/bandit'; it has corrective"):
         frontier(alone, methods=["cma-es/bandit"])
     with pytest.raises(CoarticError, match="no task with two hands"):
         recruitment(alone)
+    with pytest.raises(CoarticError, match="no method has solved runs on two tasks"):
+        context(alone)
 
 
 def test_bars_are_means_of_the_runs(study):
@@ -257,9 +257,10 @@ def test_any_methods_side_by_side(study):
         Figures(study, methods=["dual-proces/EC4"])
 
 
-def test_learning_curves_against_a_loop(study):
+def test_learning_curves_against_a_loop(study, monkeypatch):
     window = 7
-    data = learning_curves(study, window=window).data
+    monkeypatch.setattr("analysis.figures.learning_curves.WINDOW", window)
+    data = learning_curves(study).data
     learning = study.results.learning()
     spread = 0
     for key, rows in data.groupby(["task", "method"]):
@@ -279,7 +280,6 @@ def test_learning_curves_against_a_loop(study):
             last = np.concatenate([run[max(row.trial - window, 0) : row.trial] for run in runs])
             assert row.trials == pytest.approx(np.nanmean(last))
     assert spread > 100
-    assert learning_curves(study, log=False).figure.axes[0].get_xscale() == "linear"
 
 
 def test_shares_of_hand_sequences(study):
@@ -299,8 +299,6 @@ def test_context_parts_are_the_signatures(study):
     assert (row.task, row.method, row.runs) == ("ascending", "dual-process/EC1", 8)
     assert row.equivalent == frame["motor-equivalent part"]
     assert row.other == frame["non-motor-equivalent part"]
-    with pytest.raises(CoarticError, match="no method has solved runs on two tasks"):
-        context(study, tasks=["ascending"])
 
 
 def test_stars_of_contexts_are_adjusted_over_the_figure(study):
@@ -356,15 +354,13 @@ def test_signature_matrices(study):
 
 
 def test_frontier_and_profiles(study):
-    plots = {plot.id: plot.data for plot in frontier(study, spends=("trials",))}
+    plots = {plot.id: plot.data for plot in frontier(study)}
     last = plots["frontier-trials"].groupby(["task", "method"]).last()
     runs = study.results.runs
     for (task, method), row in last.iterrows():
         own = runs[(runs.task == task) & (runs.method == method)].reward
         assert row["mean"] == pytest.approx(own.astype(float).mean())
         assert row.budget == 120
-    with pytest.raises(ValueError, match="unknown spends"):
-        frontier(study, spends=("money",))
     data = profiles(study).data
     assert set(data.method) == {"learner"}
     learner = {
@@ -415,8 +411,6 @@ def test_files_are_the_same_every_time(study, tmp_path):
 
 def test_files_that_cannot_be_written(study, tmp_path):
     plot = tasks_plot([load_task("ascending")])
-    with pytest.raises(CoarticError, match=r"x\.bmp: the name of a figure must end in"):
-        write(plot, tmp_path / "x.bmp")
     (tmp_path / "file").write_text("")
     with pytest.raises(CoarticError, match="cannot write to"):
         save(plot, tmp_path / "file")

@@ -183,8 +183,10 @@ def test_a_signature_is_a_measure_and_a_row(traced, monkeypatch):
     def length(cell, signature):
         yield within.mean_of(signature, Place(), [run.ticks for run in cell.runs])
 
-    row = Signature("length", length, "ticks", "ticks", "how long", "length",
-                    table="main-signatures")  # fmt: skip
+    row = Signature(
+        name="length", measure=length, unit="ticks", extent="ticks", meaning="how long",
+        heading="length", table="main-signatures",
+    )  # fmt: skip
     monkeypatch.setattr(study_rows, "WITHIN", (*study_rows.WITHIN, row))
     monkeypatch.setitem(REGISTER, "length", row)
     study = Study(traced.results)

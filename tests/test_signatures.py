@@ -177,7 +177,7 @@ def test_motor_equivalence_by_hand():
     assert parts == pytest.approx((5 / math.sqrt(2), 1.0))
     singular = motor_equivalence(np.array([1.0, 1.0, 3.0, 4.0]), JACOBIAN * [[1], [0]])
     assert singular == pytest.approx((math.sqrt(26 / 3), 1.0))
-    assert math.isnan(motor_equivalence(np.ones(2), np.eye(2)).equivalent)
+    assert math.isnan(motor_equivalence(np.ones(2), np.eye(2))[0])
 
 
 def test_self_motion_of_the_robot_is_motor_equivalent():

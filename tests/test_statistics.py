@@ -138,9 +138,9 @@ def test_intervals_of_many_normal_values_are_the_usual_ones():
     found = statistics.difference_of_means(a, b, seed=9)
     expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.03)
-    narrow = statistics.mean(a, seed=9, confidence=0.5)
-    half = 0.6745 * a.std() / 20
-    assert (narrow.low, narrow.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
+    alone = statistics.mean(a, seed=9)
+    half = 1.96 * a.std() / 20
+    assert (alone.low, alone.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
 
 
 def test_pairs_and_known_numbers_are_one_sample():

@@ -20,33 +20,27 @@ def hits(cell: Trajectories, signature: Signature) -> Iterator[Value]:
     """Goals that a run hits."""
     yield mean_of(signature, Place(), [float(len(run.hits)) for run in cell.runs])
 '''
-SIGNATURE = """    Signature(
-        "goals hit",
-        within.hits,
-        "goals",
-        "goals",
-        "how many goals a run hits",
-        "hit",
-        table="main-signatures",
-    ),
+SIGNATURE = """
+[[within]]
+name = "goals hit"
+measure = "analysis.signatures.within.hits"
+unit = "goals"
+extent = "goals"
+meaning = "how many goals a run hits"
+heading = "hit"
+table = "main-signatures"
 """
 CLAIM = """
+["One-armed tasks".all-goals-hit]
+statement = "Every goal is hit."
+place = "Method"
+"""
+JUDGE = """
 
+@decides("all-goals-hit", "counted")
 def _all_hit(data: Data) -> Finding:
     runs = data.cell(ASCENDING, "nearest-hand").runs
     return Finding(all(len(run.hits) == 3 for run in runs), f"all goals hit in {len(runs)} run")
-
-
-ONE_ARMED += (
-    Claim(
-        "all-goals-hit",
-        "Every goal is hit.",
-        "One-armed tasks",
-        "counted",
-        _all_hit,
-        "Method",
-    ),
-)
 """
 FIGURE = '''"""Rewards as dots."""
 
@@ -136,9 +130,10 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     append("analysis/methods.toml", LOOK)
     # A signature: a function, a row.
     append("analysis/signatures/within.py", MEASURE)
-    change("analysis/signatures/register.py", "WITHIN = (\n", f"WITHIN = (\n{SIGNATURE}")
-    # A claim: a judge and its entry.
-    append("analysis/claims/one_armed.py", CLAIM)
+    append("analysis/signatures/register.toml", SIGNATURE)
+    # A claim: its words, a judge.
+    append("analysis/claims/claims.toml", CLAIM)
+    append("analysis/claims/one_armed.py", JUDGE)
     # A figure: a file, an import and a row.
     append("analysis/figures/dots.py", FIGURE)
     change(

@@ -114,7 +114,7 @@ def tests(*, planted: bool) -> list[Check]:
         nominal = None if planted else ALPHA
         found.append(Check(subject, data, partial(seen, *about), nominal))
 
-    away = {name: 1.25 * _SD * basis[:, 0] if planted else None for name, basis in _PARTS.items()}
+    away = {name: 1.25 * _SD * basis[:, 0] * planted for name, basis in _PARTS.items()}
     still = away["motor-equivalent part"]
     ratios = ((20, 0.5), (20, 2.0)) if planted else ((10, 1.0), (20, 1.0))
     for scatter in SCATTERS:
@@ -198,12 +198,7 @@ def entropies(simulations: int, runs: int = 20, seed: int = SEED) -> list[tuple[
     return found
 
 
-def _mean_held(
-    draw: Draw,
-    truth: float,
-    runs: int,
-    rng: np.random.Generator,
-) -> bool:
+def _mean_held(draw: Draw, truth: float, runs: int, rng: np.random.Generator) -> bool:
     _, low, high = intervals.mean(draw(rng, runs))
     return low <= truth <= high
 
@@ -236,24 +231,19 @@ def _context(
     first: int,
     second: int,
     basis: Array | None,
-    shift: Array | None,
+    shift: Array,
     rng: np.random.Generator,
 ) -> bool:
-    groups = scatter(rng, first), scatter(rng, second)
-    if shift is not None:
-        groups = groups[0] + shift, groups[1]
+    groups = scatter(rng, first) + shift, scatter(rng, second)
     return permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA
 
 
-def _lead(scatter: Draw, shift: Array | None, rng: np.random.Generator) -> bool:
+def _lead(scatter: Draw, shift: Array, rng: np.random.Generator) -> bool:
     """Movements of 12 ticks from a common start: whether there is any lead at all."""
     way = np.linspace(0.0, 1.0, 12)[:, None]
-    ends = [scatter(rng, 20), scatter(rng, 20)]
-    if shift is not None:
-        ends[0] = ends[0] + shift
-    groups = [way * end[:, None, :] for end in ends]
-    jitter = [0.005 * rng.standard_normal(group.shape) for group in groups]
-    first, second = (group + noise for group, noise in zip(groups, jitter, strict=True))
+    ends = np.stack([scatter(rng, 20) + shift, scatter(rng, 20)])
+    groups = way * ends[:, :, None, :]
+    first, second = groups + 0.005 * rng.standard_normal(groups.shape)
     return lead_time(first, second, rng, alpha=ALPHA, resamples=RESAMPLES) is not None
 
 
@@ -309,17 +299,14 @@ def _without_regard(seed: int = SEED) -> Array:
     """
     task, rng = load_task("two-armed-1"), np.random.default_rng(seed)
     changes = []
-    for hands in hand_sequences(task):
-        alone = corrective_trial(task, hands)
+    for alone in [corrective_trial(task, hands) for hands in hand_sequences(task)]:
         for _ in range(10):
             movements = []
-            for movement in alone.movements:
-                target = np.array(movement.target) + 0.05 * rng.standard_normal(task.robot.dof)
+            for own in alone.movements:
+                target = np.array(own.target) + 0.05 * rng.standard_normal(task.robot.dof)
                 target[1] = 0.0  # base y is locked
-                movements += [
-                    Movement(movement.goal, movement.hand, "planned", target),
-                    Movement(movement.goal, movement.hand, "corrective"),
-                ]
+                planned = Movement(own.goal, own.hand, "planned", target)
+                movements += [planned, Movement(own.goal, own.hand, "corrective")]
             changes.append(change_from(execute(task, movements), alone))
     return np.array(changes, dtype=np.float64)
 

@@ -6,20 +6,11 @@ import itertools
 import math
 from dataclasses import replace
 
-from analysis.claims.data import (
-    BEST,
-    CELLS,
-    SMOOTH,
-    Data,
-    MissingError,
-    rewards_of,
-)
+from analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
 from analysis.claims.evidence import Arm, by_optimum, estimate_of, measured, of_either_optimum
-from analysis.claims.judges.costs import NEAR, computation, experience
-from analysis.claims.judges.presence import PRESENCE, shared_signatures
-from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
-from analysis.claims.register import Claim, Finding
+from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import Summary, published_cell
 from analysis.report.document import Column, RestsOn, Row
@@ -33,8 +24,14 @@ _EQUIVALENT = f"within ± {MARGIN:.0%}"
 _CELL = (Column("task", "task"), Column("condition", "condition"))
 
 
+@decides(
+    "learned-rewards-as-printed",
+    f"95 % interval of the difference of means (Welch's) within ± {MARGIN:.0%} of the printed "
+    "reward: equivalent, outside: different. EC2 is printed by hand sequence, from which the "
+    "mean over all its runs follows",
+)
 def _as_printed(data: Data) -> Finding:
-    rows, words, verdicts = [], [], []
+    rows, verdicts = [], []
     for task, condition in CELLS:
         printed = published_cell(task, condition)
         assert printed is not None
@@ -54,13 +51,6 @@ def _as_printed(data: Data) -> Finding:
             )
             key = (task, LEARNER + condition)
             rows.append(Row(f"{task} {condition} {name}", values, (key,)))
-            words.append(
-                f"task {task}, condition {condition}, hands {name}, "
-                f"printed (runs) {summary.mean:.1f} ({summary.runs}), "
-                f"ours (runs) {own.mean():.1f} ({len(own)}), "
-                f"difference {interval(apart, '+.1f')}, share of the printed {share:+.1%}, "
-                f"{_EQUIVALENT} {verdict or NONE}"
-            )
             if hands is None:
                 verdicts.append(f"{task} {condition} {verdict or NONE}")
     both: tuple[RestsOn, ...] = ("runs", "paper")
@@ -77,11 +67,15 @@ def _as_printed(data: Data) -> Finding:
     )
     evidence = "; ".join(verdicts)
     title = "Learned rewards as printed"
-    return measured("learned-rewards-as-printed", evidence, title, columns, rows, words)
+    return measured("learned-rewards-as-printed", evidence, title, columns, rows)
 
 
+@decides(
+    "distance-to-optimum",
+    "mean gap with BCa interval; the optimum is the condition's own (other arm free or still)",
+)
 def _to_the_optimum(data: Data) -> Finding:
-    rows, words, shares = [], [], []
+    rows, shares = [], []
     for task, condition in CELLS:
         reward = mean(data.rewards(task, condition), seed=SEED)
         arm: Arm = "free" if condition in ("EC2", "EC4") else "still"
@@ -99,10 +93,6 @@ def _to_the_optimum(data: Data) -> Finding:
         key = (task, LEARNER + condition)
         rows.append(Row(f"{task} {condition}", (task, condition, *values), (key,)))
         shares.append(f"{task} {condition} {share:.1%}")
-        words.append(
-            f"task {task}, condition {condition}, optimum {best.reward}, "
-            f"ticks from it {interval(gap)}, share {share:.1%}"
-        )
     both: tuple[RestsOn, ...] = ("runs", "optimum")
     columns = of_either_optimum(
         Column("optimum", "optimum", "number", rests_on=("optimum",)),
@@ -110,7 +100,7 @@ def _to_the_optimum(data: Data) -> Finding:
         Column("gap_share", "of it", "share", digits=1, rests_on=both),
     )
     evidence, title = "; ".join(shares), "Distance to the optimum"
-    return measured("distance-to-optimum", evidence, title, (*_CELL, *columns), rows, words)
+    return measured("distance-to-optimum", evidence, title, (*_CELL, *columns), rows)
 
 
 _PROPOSALS = {
@@ -120,8 +110,9 @@ _PROPOSALS = {
 """The paper's proposals for the learner, by what they add to a condition's name."""
 
 
+@decides("proposals", "difference of mean learned rewards with BCa interval")
 def _proposals(data: Data) -> Finding:
-    rows, words, gains = [], [], []
+    rows, gains = [], []
     for (task, condition), (proposal, change) in itertools.product(BEST, _PROPOSALS.items()):
         own = data.rewards(task, condition)
         other = rewards_of(data.learned(task, f"{condition}-{proposal}"))
@@ -131,18 +122,19 @@ def _proposals(data: Data) -> Finding:
         )
         values = (task, condition, change, estimate_of(gain))
         rows.append(Row(f"{task} {condition} {proposal}", values, cells))
-        words.append(
-            f"task {task}, condition {condition}, change {change}, gain in reward {interval(gain)}"
-        )
         gains.append(f"{task} {change.split()[0]} {interval(gain)}")
     columns = (
         *_CELL,
         Column("change", "change"),
         Column("gain", "gain in reward", "number", digits=1, rests_on=("runs",)),
     )
-    return measured("proposals", "; ".join(gains), "Proposals", columns, rows, words)
+    return measured("proposals", "; ".join(gains), "Proposals", columns, rows)
 
 
+@decides(
+    "absent-without-looking-ahead",
+    "context distance at goal 1, and ticks against the initial solution (ascending)",
+)
 def _absent_without_looking_ahead(data: Data) -> Finding:
     parts = []
     for method in (f"{LEARNER}EC1", *CONTROLS):
@@ -154,72 +146,3 @@ def _absent_without_looking_ahead(data: Data) -> Finding:
             f"all {change[1]:+.1f} ticks against the initial solution"
         )
     return Finding(None, "; ".join(parts))
-
-
-BEYOND: tuple[Claim, ...] = (
-    Claim(
-        "learned-rewards-as-printed",
-        "How far the learned rewards agree with those that the paper prints.",
-        "Beyond the paper",
-        f"95 % interval of the difference of means (Welch's) within ± {MARGIN:.0%} of the printed "
-        "reward: equivalent, outside: different. EC2 is printed by hand sequence, from which the "
-        "mean over all its runs follows",
-        _as_printed,
-    ),
-    Claim(
-        "absent-without-looking-ahead",
-        "Dependence on context and the sacrifice of the first movement, in methods that do not "
-        "look beyond the current goal. (The paper calls the reward for the whole task crucial; no "
-        "learner here is rewarded for each subtask instead.)",
-        "Beyond the paper",
-        "context distance at goal 1, and ticks against the initial solution (ascending)",
-        _absent_without_looking_ahead,
-    ),
-    *(
-        Claim(
-            f"resembles-{cost}",
-            f"Learned movements beside those planned for {what}: whether {CRITERION}.",
-            "Beyond the paper",
-            TEST,
-            resembles(cost),
-        )
-        for cost, what in SMOOTH.items()
-        if cost != "squared-changes"
-    ),
-    Claim(
-        "distance-to-optimum",
-        "How far the learner stays from the optimum.",
-        "Beyond the paper",
-        "mean gap with BCa interval; the optimum is the condition's own (other arm free or still)",
-        _to_the_optimum,
-    ),
-    Claim(
-        "reward-by-experience",
-        "What uninformed search gets from its trials.",
-        "Beyond the paper",
-        f"trials to come within {NEAR:.0%} of the optimum: Kaplan-Meier median, runs that never "
-        "do counted as censored",
-        experience,
-    ),
-    Claim(
-        "computation",
-        "How much each method evaluates.",
-        "Beyond the paper",
-        "forward kinematics and Jacobians",
-        computation,
-    ),
-    Claim(
-        "proposals",
-        "What the paper's proposals for the learner gain.",
-        "Beyond the paper",
-        "difference of mean learned rewards with BCa interval",
-        _proposals,
-    ),
-    Claim(
-        "shared-signatures",
-        "Which signatures of coarticulation informed and uninformed search share.",
-        "Beyond the paper",
-        PRESENCE,
-        shared_signatures,
-    ),
-)

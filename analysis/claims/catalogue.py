@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.claims.beyond import BEYOND
-from analysis.claims.coarticulation import COARTICULATION
-from analysis.claims.conditions import CONDITIONS
-from analysis.claims.general import GENERAL
-from analysis.claims.one_armed import ONE_ARMED
+from analysis.claims import (  # noqa: F401  (their judges enter themselves)
+    beyond,
+    coarticulation,
+    conditions,
+    general,
+    one_armed,
+    two_armed,
+)
+from analysis.claims.judges import costs, presence, resemblance  # noqa: F401
 from analysis.claims.register import Claim, Judged, judge_claims
-from analysis.claims.two_armed_1 import TWO_ARMED_1
-from analysis.claims.two_armed_2 import TWO_ARMED_2
+from analysis.claims.statements import JUDGED, STATEMENTS
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-CLAIMS: tuple[Claim, ...] = (
-    *ONE_ARMED,
-    *TWO_ARMED_1,
-    *TWO_ARMED_2,
-    *CONDITIONS,
-    *COARTICULATION,
-    *GENERAL,
-    *BEYOND,
+CLAIMS: tuple[Claim, ...] = tuple(JUDGED[name] for name in STATEMENTS)
+_COLUMNS = (
+    *("id", "section", "statement", "verdict", "fitted", "evidence", "test"),
+    *("p", "adjusted_p", "contrary_p", "adjusted_contrary_p"),
+    *("place", "quote", "figure", "runs", "sources"),
 )
 
 
@@ -38,32 +38,19 @@ def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
 def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
     """One row per claim.
 
-    Columns: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence`` (with its
-    table, row by row), ``test``, ``p`` (largest of the claim's tests), ``adjusted_p`` (Holm),
-    ``contrary_p`` (smallest of the contrary's tests, times their number),
-    ``adjusted_contrary_p``, ``place``, ``quote``, ``figure`` (of the paper), ``runs`` (ids,
-    space-separated), ``sources`` (what else it rests on).
+    Columns: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence``, ``test``,
+    ``p`` (largest of the claim's tests), ``adjusted_p`` (Holm), ``contrary_p`` (smallest of the
+    contrary's tests, times their number), ``adjusted_contrary_p``, ``place``, ``quote``,
+    ``figure`` (of the paper), ``runs`` (ids, space-separated), ``sources`` (what else it rests
+    on).
     """
-    return pd.DataFrame(
-        [
-            {
-                "id": entry.claim.id,
-                "section": entry.claim.section,
-                "statement": entry.claim.statement,
-                "verdict": entry.verdict,
-                "fitted": entry.claim.fitted,
-                "evidence": ". ".join(filter(None, (entry.evidence, entry.rows))),
-                "test": entry.claim.test,
-                "p": entry.p,
-                "adjusted_p": entry.adjusted_p,
-                "contrary_p": entry.contrary_p,
-                "adjusted_contrary_p": entry.adjusted_contrary_p,
-                "place": entry.claim.place,
-                "quote": entry.claim.quote,
-                "figure": entry.claim.figure,
-                "runs": " ".join(entry.run_ids),
-                "sources": ", ".join(entry.sources),
-            }
-            for entry in judged
-        ]
-    )
+    rows = [
+        {
+            **vars(entry.claim),
+            **vars(entry),
+            "runs": " ".join(entry.run_ids),
+            "sources": ", ".join(entry.sources),
+        }
+        for entry in judged
+    ]
+    return pd.DataFrame(rows, columns=_COLUMNS)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.claims.data import ONE, Data, MissingError
-from analysis.claims.register import Claim, Finding
+from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
@@ -19,6 +20,11 @@ _CONTROLS = ("corrective-alone/every", "posture-based/one-goal hands=every, othe
 """Methods that do not look beyond the current goal."""
 
 
+@decides(
+    "hand-coarticulation",
+    "exact binomial tests that more than half the runs do so; the quicker hand is that of the "
+    "corrective process from the same posture",
+)
 def _hand_coarticulation(data: Data) -> Finding:
     tests, against, parts = [], [], []
     for condition in ("EC3", "EC4"):
@@ -62,6 +68,12 @@ def _goals(values: Array) -> str:
     return ", ".join(f"goal {k} {row.mean():+.2f}" for k, row in known if len(row))
 
 
+@decides(
+    "other-arm-coarticulation",
+    "one-tailed bootstrap test that preshaping since the arm's last hit (0 where it keeps "
+    "still) is above 0, mean over the goals of a run; controls that do not look beyond the "
+    "current goal stand beside it",
+)
 def _other_arm_prepares(data: Data) -> Finding:
     moving, still = (data.cell(ONE, LEARNER + condition) for condition in ("EC4", "EC3"))
     own = prepared_by_waiting(moving)
@@ -84,33 +96,3 @@ def _other_arm_prepares(data: Data) -> Finding:
         if len(control):
             parts.append(f"{label}, by waiting: {control.mean():.2f}")
     return Finding(test.estimate > 0, "; ".join(parts), (test,))
-
-
-COARTICULATION: tuple[Claim, ...] = (
-    Claim(
-        "hand-coarticulation",
-        "Coarticulation shows in which hand is chosen: a goal that others follow is hit with a "
-        "hand that is not the quicker one for it alone (two-armed task 1, conditions 3 and 4).",
-        "Two-armed tasks",
-        "exact binomial tests that more than half the runs do so; the quicker hand is that of the "
-        "corrective process from the same posture",
-        _hand_coarticulation,
-        "Discussion",
-        "Coarticulation was seen in terms of which arm was used",
-        "Figure 6",
-        fitted=True,
-    ),
-    Claim(
-        "other-arm-coarticulation",
-        "Coarticulation shows in the other arm: under condition 4 the waiting arm moves so that "
-        "its hand gets nearer to its own next goal (two-armed task 1).",
-        "Two-armed tasks",
-        "one-tailed bootstrap test that preshaping since the arm's last hit (0 where it keeps "
-        "still) is above 0, mean over the goals of a run; controls that do not look beyond the "
-        "current goal stand beside it",
-        _other_arm_prepares,
-        "Method, The Learning Process; Discussion",
-        "so that the robot would be able to hit goal 3",
-        fitted=True,
-    ),
-)

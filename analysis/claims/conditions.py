@@ -8,7 +8,8 @@ import numpy as np
 from scipy import stats
 
 from analysis.claims.data import ONE, TWO, Data
-from analysis.claims.register import Claim, Finding
+from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.statistics.estimates import (
     SEED,
     Inference,
@@ -20,6 +21,7 @@ from analysis.words import interval, tally
 from coartic.robot import Array
 
 
+@decides("ec4-beats-ec3", "one-tailed bootstrap tests of two samples")
 def _ec4_beats_ec3(data: Data) -> Finding:
     tests, parts = [], []
     for task in (ONE, TWO):
@@ -33,6 +35,11 @@ def _ec4_beats_ec3(data: Data) -> Finding:
     return Finding(all(test.estimate > 0 for test in tests), "; ".join(parts), tuple(tests))
 
 
+@decides(
+    "proficiency-rises",
+    "one-tailed bootstrap tests of each condition against the next lower one and the initial "
+    "solution",
+)
 def _proficiency_rises(data: Data) -> Finding:
     tests, parts = [], []
     for task, conditions in ((ONE, ("EC2", "EC3", "EC4")), (TWO, ("EC3", "EC4"))):
@@ -48,6 +55,10 @@ def _proficiency_rises(data: Data) -> Finding:
     return Finding(all(test.estimate > 0 for test in tests), "; ".join(parts), tuple(tests))
 
 
+@decides(
+    "sequences-change",
+    "Fisher's tests of sequences: conditions 2 and 3 of task 1, 3 and 4 of task 2",
+)
 def _sequences_change(data: Data) -> Finding:
     tests, parts = [], []
     for task, pair in ((ONE, ("EC2", "EC3")), (TWO, ("EC3", "EC4"))):
@@ -70,43 +81,3 @@ def _sequences_change(data: Data) -> Finding:
     # Fisher's test has no contrary side: no difference leaves it open.
     changed = all(test.estimate > 0 for test in tests)
     return Finding(changed or None, "; ".join(parts), tuple(tests), ())
-
-
-_SUMMARY = "Results, Summary of Two-Armed Task Results"
-
-CONDITIONS: tuple[Claim, ...] = (
-    Claim(
-        "ec4-beats-ec3",
-        "Moving the other arm as well is better: condition 4 beats condition 3 on both tasks.",
-        "Two-armed tasks",
-        "one-tailed bootstrap tests of two samples",
-        _ec4_beats_ec3,
-        "Results, Exploration Condition 4",
-        "but performance increased",
-        "Figure 8",
-        fitted=True,
-    ),
-    Claim(
-        "proficiency-rises",
-        "Reward rises with the number of levels and joints that are explored.",
-        "Two-armed tasks",
-        "one-tailed bootstrap tests of each condition against the next lower one and the initial "
-        "solution",
-        _proficiency_rises,
-        _SUMMARY,
-        "each bar is significantly higher than the bar to its left",
-        "Figure 8",
-        fitted=True,
-    ),
-    Claim(
-        "sequences-change",
-        "The hand sequence changes as more is explored.",
-        "Two-armed tasks",
-        "Fisher's tests of sequences: conditions 2 and 3 of task 1, 3 and 4 of task 2",
-        _sequences_change,
-        _SUMMARY,
-        "the hand recruitment sequence may change as the number of levels",
-        "Figure 8",
-        fitted=True,
-    ),
-)

@@ -13,13 +13,11 @@ import pandas as pd
 from analysis.comparisons.methods import TOLD
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
-from analysis.results.folder import Results
 from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.rows import SignatureRow
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST
-from coartic import Execution, Task, corrective_trial, initial_hands
-from coartic.errors import NotApplicableError
+from coartic import Execution, Task
 from coartic.method import Information
 from coartic.robot import Array
 
@@ -74,11 +72,6 @@ class Data:
     _cells: list[tuple[str, str]] = field(default_factory=list)
 
     @property
-    def results(self) -> Results:
-        """The stored results."""
-        return self.study.results
-
-    @property
     def run_ids(self) -> tuple[str, ...]:
         """Runs read since :meth:`forget`."""
         return tuple(dict.fromkeys(self._runs))
@@ -99,11 +92,17 @@ class Data:
         self._runs += run_ids
 
     def recorded(
-        self, read: Callable[[Data, str], Read], method: str
-    ) -> tuple[Read, tuple[tuple[str, str], ...]]:
-        """What ``read`` gives of a method, and the cells that it has read: tasks and labels."""
+        self, read: Callable[[Data, str], Read | None], method: str
+    ) -> tuple[Read | None, tuple[tuple[str, str], ...]]:
+        """What ``read`` gives of a method, and the cells that it has read: tasks and labels.
+
+        None where the folder lacks what it reads.
+        """
         before = len(self._cells)
-        found = read(self, method)
+        try:
+            found = read(self, method)
+        except MissingError:
+            found = None
         return found, tuple(dict.fromkeys(self._cells[before:]))
 
     def runs(self, task: str, method: str) -> pd.DataFrame:
@@ -142,9 +141,14 @@ class Data:
         self.note(tuple(found.run_id))
         return found
 
-    def rewards(self, task: str, condition: str) -> Array:
-        """Learned rewards, shape ``(runs,)``."""
-        return rewards_of(self.learned(task, condition))
+    def rewards(self, task: str, condition: str, hands: str | None = None) -> Array:
+        """Learned rewards of runs (that learned ``hands``), shape ``(runs,)``."""
+        found = rewards_of(self.learned(task, condition, hands))
+        if len(found) < FEWEST:
+            raise MissingError(
+                f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
+            )
+        return found
 
     def replays(self, task: str, condition: str, hands: str | None = None) -> Array:
         """Rewards of noiseless replays of runs (that learned ``hands``), shape ``(runs,)``.
@@ -157,15 +161,6 @@ class Data:
             raise MissingError(f"a run of {condition} on {task} has no replay")
         return replays
 
-    def group(self, task: str, condition: str, hands: str) -> Array:
-        """Learned rewards of the runs that learned a hand sequence, shape ``(runs,)``."""
-        found = rewards_of(self.learned(task, condition, hands))
-        if len(found) < FEWEST:
-            raise MissingError(
-                f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
-            )
-        return found
-
     def cell(self, task: str, method: str) -> Trajectories:
         """Executed solutions; raises MissingError where there are none."""
         self.runs(task, method)
@@ -177,34 +172,29 @@ class Data:
         """The first value of a signature (at a goal); MissingError without one."""
         self.runs(task, method)
         for row in self.study.signature_rows:
-            if (row.task, row.label, row.signature) == (task, method, name) and (
-                goal in (None, row.place.goal) and not math.isnan(row.value)
-            ):
+            wanted = (row.task, row.label, row.signature) == (task, method, name)
+            if wanted and goal in (None, row.place.goal) and not math.isnan(row.value):
                 return row
         raise MissingError(f"{name} of {method} on {task} has no value")
 
     def task(self, name: str) -> Task:
         """A task of the folder."""
-        known = self.results.tasks
+        known = self.study.results.tasks
         if name not in known:
             raise MissingError(f"this folder has no task {name}")
         return known[name]
 
     def initial(self, name: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
-        task = self.task(name)
-        try:
-            execution = corrective_trial(task, initial_hands(task))
-        except NotApplicableError:
-            execution = None
-        if execution is None or not execution.completed:
+        execution = Trajectories(self.task(name), "", "", ()).initial
+        if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
         self._others.append(f"the corrective process on {name}")
         return execution
 
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""
-        table = self.results.sequences
+        table = self.study.results.sequences
         own = table[table.task == task] if len(table) else table
         if not len(own):
             raise MissingError(
@@ -217,7 +207,7 @@ class Data:
     def best_sequences(self, task: str) -> tuple[list[str], float]:
         """Hand sequences that are best by the corrective process alone, and their reward."""
         known = self.sequences(task)
-        best = best_sequences(self.results.sequences, task)
+        best = best_sequences(self.study.results.sequences, task)
         if not best:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"

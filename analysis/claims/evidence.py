@@ -20,12 +20,11 @@ def measured(
     title: str,
     columns: tuple[Column, ...],
     rows: Sequence[Row],
-    words: Sequence[str],
 ) -> Finding:
-    """A finding that judges nothing: a sentence and a table, also in words, row by row."""
+    """A finding that judges nothing: a sentence and a table."""
     name, caption = f"evidence-{claim}", f"{title} ({claim})."
     table = DataTable(name, caption, columns, tuple(rows)) if rows else None
-    return Finding(None, evidence, table=table, rows="; ".join(words))
+    return Finding(None, evidence, table=table)
 
 
 def estimate_of(found: Inference) -> Estimate:

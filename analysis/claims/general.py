@@ -7,23 +7,14 @@ are a reconstruction.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import (
-    BEST,
-    CELLS,
-    SMOOTH,
-    UNINFORMED,
-    Cells,
-    Data,
-    MissingError,
-)
+from analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
 from analysis.claims.judges.reach import shortest_reach
-from analysis.claims.judges.resemblance import CRITERION, TEST, resembles
-from analysis.claims.register import Claim, Finding
+from analysis.claims.register import Finding
+from analysis.claims.statements import decides_apart
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
 from analysis.signatures.subtasks import postures_before
@@ -38,7 +29,13 @@ CLOSE = 0.10
 _PLAN = "trajectory-optimisation/"
 
 
-def _learning_improves(data: Data, cells: Cells) -> Finding:
+@decides_apart(
+    "learning-improves",
+    "one-tailed bootstrap tests of noiseless replays against the initial reward, a test for "
+    "each task and condition",
+    CELLS,
+)
+def _learning_improves(cells: Cells, data: Data) -> Finding:
     tests, parts = [], []
     for task, condition in cells:
         initial = float(data.learned(task, condition).initial_reward.iloc[0])
@@ -52,7 +49,12 @@ def _learning_improves(data: Data, cells: Cells) -> Finding:
     )
 
 
-def _corrective_ensures(data: Data, cells: Cells) -> Finding:
+@decides_apart(
+    "corrective-ensures",
+    "exact: failed trials of the learner, hand sequences without a reward",
+    CELLS,
+)
+def _corrective_ensures(cells: Cells, data: Data) -> Finding:
     trials = failed = sequences = missed = 0
     for task, condition in cells:
         runs = data.learned(task, condition)
@@ -70,7 +72,13 @@ def _corrective_ensures(data: Data, cells: Cells) -> Finding:
     )
 
 
-def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
+@decides_apart(
+    "corrective-near-shortest",
+    f"exact: no subtask of the initial solution is more than {CLOSE:.0%} longer than the "
+    "shortest way from the same posture (the shortest that a search finds)",
+    CELLS,
+)
+def _corrective_near_shortest(cells: Cells, data: Data) -> Finding:
     parts, all_excess = [], []
     for name in dict.fromkeys(task for task, _ in cells):
         task, initial = data.task(name), data.initial(name)
@@ -93,7 +101,13 @@ def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
     )
 
 
-def _less_experience(data: Data, cells: Cells) -> Finding:
+@decides_apart(
+    "less-experience",
+    "exact: planners make no trial, are told more kinds of information, and planning the "
+    "shortest path is at least as good (letters of what is told: docs/methods.md)",
+    BEST,
+)
+def _less_experience(cells: Cells, data: Data) -> Finding:
     parts, holds = [], True
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
@@ -114,7 +128,15 @@ def _less_experience(data: Data, cells: Cells) -> Finding:
     return Finding(holds, "; ".join(parts))
 
 
-def _low_computation(data: Data, cells: Cells) -> Finding:
+@decides_apart(
+    "low-computation",
+    "evaluations of forward kinematics and Jacobian beside those of every informed method "
+    "with default parameters: supported where a run of the learner takes fewer than any, not "
+    "supported where one of its trials takes as many as all. Not counted: solver iterations, "
+    "gradients and Hessians of costs, quadratic programs",
+    BEST,
+)
+def _low_computation(cells: Cells, data: Data) -> Finding:
     parts, below, above = [], [], []
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
@@ -124,10 +146,7 @@ def _low_computation(data: Data, cells: Cells) -> Finding:
             raise MissingError(f"this folder has no runs of informed search on {task}")
         for label in informed:
             data.runs(task, label)
-        few, many = (
-            min(informed, key=informed.__getitem__),
-            max(informed, key=informed.__getitem__),
-        )
+        few, many = (pick(informed, key=informed.__getitem__) for pick in (min, max))
         below.append(run < informed[few])
         above.append(run / TRIALS >= informed[many])
         parts.append(
@@ -157,7 +176,13 @@ def _informed(data: Data, task: str) -> list[str]:
     ]
 
 
-def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
+@decides_apart(
+    "beats-inaccurate",
+    "one-tailed bootstrap tests against plans for smoothness (free times); at least one "
+    "holds, the smallest p times their number (Bonferroni)",
+    BEST,
+)
+def _beats_inaccurate(cells: Cells, data: Data) -> Finding:
     tests, parts = [], []
     for task, condition in cells:
         rewards = data.rewards(task, condition)
@@ -174,119 +199,3 @@ def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
     if holds:
         best = replace(best, p=min(1.0, best.p * len(tests)))
     return Finding(holds, "; ".join(parts), (best,))
-
-
-def _on_both(
-    name: str,
-    statement: str,
-    test: str,
-    judge: Callable[[Data, Cells], Finding],
-    cells: Cells,
-    place: str,
-    quotes: tuple[str, ...],
-    figures: tuple[str, ...] = ("", ""),
-) -> Iterator[Claim]:
-    """A claim on the one-armed tasks and the same on the two-armed ones."""
-
-    def of(own: Cells) -> Callable[[Data], Finding]:
-        return lambda data: judge(data, own)
-
-    for which, quote, figure in zip(("one-armed", "two-armed"), quotes, figures, strict=True):
-        two = which == "two-armed"
-        own = tuple(cell for cell in cells if cell[0].startswith("two-armed") == two)
-        yield Claim(
-            f"{name}-{which}",
-            f"On the {which} tasks, {statement}",
-            "General",
-            test,
-            of(own),
-            place,
-            quote,
-            figure,
-            fitted=two,
-        )
-
-
-_INTEGRATING = "Discussion, Integrating Informed and Uninformed Search; Introduction"
-
-GENERAL: tuple[Claim, ...] = (
-    *_on_both(
-        "learning-improves",
-        "learning improves on the initial solution under every condition.",
-        "one-tailed bootstrap tests of noiseless replays against the initial reward, a test for "
-        "each task and condition",
-        _learning_improves,
-        CELLS,
-        "Results, Exploration Conditions 1 to 4",
-        (
-            "are a significant improvement over the initial solutions",
-            "each bar is significantly higher than the bar to its left",
-        ),
-        ("Figure 5", "Figure 8"),
-    ),
-    *_on_both(
-        "corrective-ensures",
-        "the corrective process ensures that the task is accomplished in every trial, and "
-        "accomplishes it without experience.",
-        "exact: failed trials of the learner, hand sequences without a reward",
-        _corrective_ensures,
-        CELLS,
-        "Method, The Corrective Process; Discussion, Multiple Controller Schemes",
-        ("to ensure that the overall task is accomplished",) * 2,
-    ),
-    *_on_both(
-        "corrective-near-shortest",
-        "the corrective process alone is close to the shortest way in joint space for each "
-        "subtask in isolation.",
-        f"exact: no subtask of the initial solution is more than {CLOSE:.0%} longer than the "
-        "shortest way from the same posture (the shortest that a search finds)",
-        _corrective_near_shortest,
-        CELLS,
-        "Method, The Corrective Process",
-        ("close to the shortest distance in joint space for each subtask",) * 2,
-    ),
-    Claim(
-        "resembles-squared-changes",
-        f"Learned movements are similar to those planned for smoothness: "
-        f"{SMOOTH['squared-changes']}. The paper says no more than similar; judged is that "
-        f"{CRITERION}.",
-        "General",
-        TEST,
-        resembles("squared-changes"),
-        "Method, The Learning Process",
-        "These movements are similar to movements that would be found through",
-    ),
-    *_on_both(
-        "less-experience",
-        "informed search needs less experience than learning by trial, and more information.",
-        "exact: planners make no trial, are told more kinds of information, and planning the "
-        "shortest path is at least as good (letters of what is told: docs/methods.md)",
-        _less_experience,
-        BEST,
-        _INTEGRATING,
-        ("it requires much more experience to find proficient movements",) * 2,
-    ),
-    *_on_both(
-        "low-computation",
-        "learning by trial needs less computation than informed search.",
-        "evaluations of forward kinematics and Jacobian beside those of every informed method "
-        "with default parameters: supported where a run of the learner takes fewer than any, not "
-        "supported where one of its trials takes as many as all. Not counted: solver iterations, "
-        "gradients and Hessians of costs, quadratic programs",
-        _low_computation,
-        BEST,
-        _INTEGRATING,
-        ("uninformed search has low informational and computational requirements",) * 2,
-    ),
-    *_on_both(
-        "beats-inaccurate",
-        "learning by trial can find better movements than informed search whose objective is not "
-        "the reward.",
-        "one-tailed bootstrap tests against plans for smoothness (free times); at least one "
-        "holds, the smallest p times their number (Bonferroni)",
-        _beats_inaccurate,
-        BEST,
-        "Discussion, Implications of Using a Simple Learning Process",
-        ("movements can be found (if they exist) that deliver better consequences",) * 2,
-    ),
-)

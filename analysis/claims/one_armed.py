@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
-from analysis.claims.register import Claim, Finding
+from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
 from analysis.statistics.estimates import SEED, Inference, mean
@@ -17,6 +18,12 @@ CONTROLS = ("posture-based/one-goal", "corrective-alone/given")
 _EC1 = f"{LEARNER}EC1"
 
 
+@decides(
+    "first-movement-sacrificed",
+    "one-tailed bootstrap tests against the initial solution: the first movement is longer by "
+    f"more than {ROUNDING} tick (rounding), the whole shorter. Controls that do not look "
+    "beyond the current goal stand beside it",
+)
 def _first_movement_sacrificed(data: Data) -> Finding:
     tests, parts = [], []
     for task in (ASCENDING, DESCENDING):
@@ -55,6 +62,11 @@ def sacrifice(data: Data, method: str) -> tuple[float, float] | None:
     return float(first.value), float(total.value)
 
 
+@decides(
+    "context",
+    "permutation test of context dependence at goal 1; seen where it exceeds 1 pooled SD. "
+    "Controls that do not look beyond the current goal stand beside it",
+)
 def _context_matters(data: Data) -> Finding:
     data.runs(DESCENDING, _EC1)
     distance = data.signature(ASCENDING, _EC1, "context distance", 1).value
@@ -83,30 +95,3 @@ def context_distance(data: Data, method: str) -> float | None:
         return float(data.signature(ASCENDING, method, "context distance", 1).value)
     except MissingError:
         return None
-
-
-ONE_ARMED: tuple[Claim, ...] = (
-    Claim(
-        "first-movement-sacrificed",
-        "The first movement gets worse than in the initial solution while the whole gets better.",
-        "One-armed tasks",
-        "one-tailed bootstrap tests against the initial solution: the first movement is longer by "
-        f"more than {ROUNDING} tick (rounding), the whole shorter. Controls that do not look "
-        "beyond the current goal stand beside it",
-        _first_movement_sacrificed,
-        "Results, Exploration Condition 1",
-        "the reward incurred after making the first movement is more negative",
-        "Figure 5",
-    ),
-    Claim(
-        "context",
-        "The same first subtask is done differently in the ascending and the descending task.",
-        "One-armed tasks",
-        "permutation test of context dependence at goal 1; seen where it exceeds 1 pooled SD. "
-        "Controls that do not look beyond the current goal stand beside it",
-        _context_matters,
-        "Results, Exploration Condition 1",
-        "the joint configuration the robot used to hit the first goal differed",
-        "Figure 5",
-    ),
-)

@@ -49,8 +49,9 @@ class Finding:
     """Tests of the contrary, any of which refutes it; None: the other tails of ``tests``."""
     table: DataTable | None = None
     """Numbers that are more than a sentence can hold; its id is ``evidence-`` and the claim's."""
-    rows: str = ""
-    """What the table's rows say, in words."""
+
+
+Judge = Callable[[Data], Finding]
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Claim:
     section: Section
     test: str
     """In inline markup."""
-    judge: Callable[[Data], Finding]
+    judge: Judge
     place: str = ""
     """Section of the paper that makes it; empty for comparisons of our own."""
     quote: str = ""
@@ -73,28 +74,27 @@ class Claim:
     """Whether it rests on a task whose goals were chosen for results like it."""
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A claim with its verdict."""
+@dataclass(frozen=True, kw_only=True)
+class Judged(Finding):
+    """A claim with what was seen of it, and its verdict."""
 
     claim: Claim
     verdict: Verdict
-    evidence: str
-    p: float = math.nan
+    p: float
     """Largest of its tests; NaN without a test, and where nothing is judged."""
-    adjusted_p: float = math.nan
+    adjusted_p: float
     """The same, adjusted over the paper's claims (Holm)."""
-    contrary_p: float = math.nan
+    contrary_p: float
     """Smallest p-value of the contrary, times the number of tests."""
-    adjusted_contrary_p: float = math.nan
-    methods: tuple[str, ...] = ()
-    """Tests, in words."""
-    run_ids: tuple[str, ...] = ()
-    sources: tuple[str, ...] = ()
+    adjusted_contrary_p: float
+    run_ids: tuple[str, ...]
+    sources: tuple[str, ...]
     """What it rests on beside runs."""
-    table: DataTable | None = None
-    rows: str = ""
-    """What the table's rows say, in words."""
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Its tests, in words."""
+        return tuple(dict.fromkeys(map(_in_words, (*self.tests, *(self.against or ())))))
 
     @property
     def marked(self) -> str:
@@ -118,18 +118,15 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     contrary = [_contrary(finding) if claim.place else math.nan for claim, finding, *_ in found]
     return [
         Judged(
-            claim,
-            _verdict(claim, finding, adjusted, refuted, seen=bool(run_ids or sources)),
-            finding.evidence,
-            p,
-            adjusted,
-            against,
-            refuted,
-            tuple(dict.fromkeys(map(_in_words, (*finding.tests, *(finding.against or ()))))),
-            run_ids,
-            sources,
-            finding.table,
-            finding.rows,
+            **vars(finding),
+            claim=claim,
+            verdict=_verdict(claim, finding, adjusted, refuted, seen=bool(run_ids or sources)),
+            p=p,
+            adjusted_p=adjusted,
+            contrary_p=against,
+            adjusted_contrary_p=refuted,
+            run_ids=run_ids,
+            sources=sources,
         )
         for (claim, finding, run_ids, sources), p, adjusted, against, refuted in zip(
             found, largest, holm(largest), contrary, holm(contrary), strict=True
@@ -138,9 +135,7 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
 
 
 def _in_words(test: Inference) -> str:
-    return (
-        test.method if not (math.isnan(test.p) and test.note) else f"{test.method} ({test.note})"
-    )
+    return f"{test.method} ({test.note})" if math.isnan(test.p) and test.note else test.method
 
 
 def _largest(finding: Finding) -> float:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 POINTS = 60
 """Budgets on an anytime curve."""
+COLUMNS = (
+    *("task", "method", "spend", "kind", "budget", "runs"),
+    *("solved", "mean", "low", "high", "median"),
+)
 
 
 def anytime_curves(study: Study, *, seed: int = 0) -> pd.DataFrame:
@@ -41,19 +45,12 @@ def anytime_curves(study: Study, *, seed: int = 0) -> pd.DataFrame:
     for cell, spend, runs in cells_by_spend(study):
         learns = any(run.learns for run in runs)
         budgets = _budgets(runs, spend) if learns else _whole(runs, spend)
+        head = {"task": cell.task, "method": cell.label, "spend": spend}
+        head["kind"] = "curve" if learns else "point"
         if len(budgets):
-            head = {
-                "task": cell.task,
-                "method": cell.label,
-                "spend": spend,
-                "kind": "curve" if learns else "point",
-                "budget": budgets,
-                "runs": len(runs),
-            }
-            parts.append(pd.DataFrame(head | _rewards(runs, spend, budgets, learns, seed)))
-    columns = "task method spend kind budget runs solved mean low high median"
-    empty = pd.DataFrame(columns=columns.split())
-    return pd.concat(parts, ignore_index=True) if parts else empty
+            rewards = _rewards(runs, spend, budgets, learns, seed)
+            parts.append(pd.DataFrame({**head, "budget": budgets, "runs": len(runs), **rewards}))
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=COLUMNS)
 
 
 def _rewards(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.progress import OTHER_ARMS, BestSoFar, cells_by_spend, keeps_to
+from analysis.comparisons.progress import BestSoFar, cells_by_optimum, cells_by_spend
 from analysis.statistics.resampling import mean_interval
 
 if TYPE_CHECKING:
@@ -50,25 +50,20 @@ def areas(study: Study, *, seed: int = 0) -> pd.DataFrame:
     without a run that learns, and methods with a base that a parameter locks have no rows; of
     the optimum with the other arm still neither have methods that move that arm.
     """
-    selected = list(cells_by_spend(study))
     ends: dict[tuple[str, str], float] = {}
-    for cell, spend, runs in selected:
+    for cell, spend, runs in cells_by_spend(study):
         totals = [run.total[spend] for run in runs if run.learns and run.solved]
         ends[cell.task, spend] = max([ends.get((cell.task, spend), 0.0), *totals])
     rows = []
-    for other_arm in OTHER_ARMS:
-        for cell, spend, runs in selected:
-            optimum = study.optima.get((cell.task, other_arm))
-            end, trials = ends[cell.task, spend], ends[cell.task, "trials"]
-            if optimum is None or not optimum.reward or not runs:  # nothing to fall short of
-                continue
-            if trials <= 1 or not keeps_to(cell, other_arm):
-                continue
-            start = end / trials
-            each = np.array([[_area(run, spend, optimum.reward, start, end)] for run in runs])
-            mean, low, high = (float(value[0]) for value in mean_interval(each, seed))
-            head = cell.task, cell.label, other_arm, spend, start, end
-            rows.append(Area(*head, len(runs), mean, low, high))
+    for other_arm, best, cell, spend, runs in cells_by_optimum(study):
+        end, trials = ends[cell.task, spend], ends[cell.task, "trials"]
+        if not best or trials <= 1:  # nothing to fall short of, or nobody who learns
+            continue
+        start = end / trials
+        each = np.array([[_area(run, spend, best, start, end)] for run in runs])
+        mean, low, high = (float(value[0]) for value in mean_interval(each, seed))
+        head = cell.task, cell.label, other_arm, spend, start, end
+        rows.append(Area(*head, len(runs), mean, low, high))
     return pd.DataFrame(rows, columns=Area._fields)
 
 

@@ -31,6 +31,10 @@ TOLD = {
     Information.SECONDARY_OBJECTIVES: "S",
 }
 """A letter for each kind of information, in the order in which the tables show them."""
+_SPENT = (
+    *("trials", "movement_ticks", "forward_kinematics", "jacobians"),
+    *("solver_iterations", "build_s"),
+)
 STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 
 
@@ -134,17 +138,12 @@ def _row(study: Study, cell: CellRuns) -> MethodRow:
         other_arm="still" if still else "moves" if len(good) else "",
         hands=tally(good.hands.value_counts().to_dict()) if len(good) > 1 else "".join(good.hands),
         corrections=int(good.solution_corrections.sum()),
-        trials=_median(runs.trials),
-        movement_ticks=_median(runs.movement_ticks),
-        forward_kinematics=_median(runs.forward_kinematics),
-        jacobians=_median(runs.jacobians),
-        solver_iterations=_median(runs.solver_iterations),
-        build_s=_median(runs.build_s),
-        solve_s=_median(solve_times(good)),
+        **{name: median(runs[name]) for name in _SPENT},
+        solve_s=median(solve_times(good)),
     )
 
 
-def _median(values: pd.Series) -> float:
-    """NaN where there is no value, as for runs that crashed."""
+def median(values: pd.Series) -> float:
+    """Of the values that are known; NaN where none is, as for runs that crashed."""
     known = values.dropna()
     return float(known.median()) if len(known) else math.nan

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from analysis.methods import LEARNER
 from analysis.statistics.across_tasks import (
+    Reached,
     gap_share,
     interquartile_mean,
     normalised,
@@ -37,8 +38,9 @@ WITHIN = {f"within_{near:.0%}".rstrip("%"): near for near in NEAR}
 """The same by the columns that say how many runs came so near."""
 THRESHOLDS = {"gap": np.arange(81) / 200, "score": np.arange(-10, 51) / 50}
 """Of the profiles: gaps from 0 to 40 %, normalised scores from −0.2 to 1."""
-REACHED: Mapping[str, Literal["above", "at most"]] = {"gap": "at most", "score": "above"}
+REACHED: Mapping[str, Reached] = {"gap": "at most", "score": "above"}
 """Which side of a threshold a profile counts."""
+_ENDINGS = ("", "_low", "_high", "_note")
 _CONDITION = re.compile(re.escape(LEARNER) + r"(EC\d)(.*)")
 _ONE_ARMED, _TWO_ARMED = "EC1", ("EC4", "EC3")
 
@@ -53,32 +55,26 @@ def normalised_scores(study: Study) -> pd.DataFrame:
     with all joints free and the corrective process alone with the task's initial hands. A
     run without a solution has NaN for all three.
     """
-    best, parts = study.optima, []
+    parts = []
     alone = study.results.sequences.set_index(["task", "hands"]).reward
     for cell in study.cells.values():
-        task = study.tasks[cell.task]
-        start = alone.get((cell.task, initial_hands(task)))
-        if (cell.task, "free") not in best or start is None or pd.isna(start):
+        best = study.optima.get((cell.task, "free"))
+        start = alone.get((cell.task, initial_hands(study.tasks[cell.task])))
+        if best is None or start is None or pd.isna(start):
+            continue
+        if best.reward in (0, start):  # nothing to fall short of, or to gain
             continue
         rewards = cell.runs.reward.where(cell.runs.status == "ok")
         values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
-        top = best[cell.task, "free"].reward
-        if top in (0, start):  # nothing to fall short of, or to gain
-            continue
-        parts.append(
-            pd.DataFrame(
-                {
-                    "task": cell.task,
-                    "method": cell.label,
-                    "label": cell.label,
-                    "run": cell.runs.run.to_numpy(),
-                    "seed": cell.runs.seed.to_numpy(),
-                    "reward": values,
-                    "score": normalised(values, float(start), top),
-                    "gap": gap_share(values, top),
-                }
-            )
-        )
+        own = {
+            **{"task": cell.task, "method": cell.label, "label": cell.label},
+            "run": cell.runs.run.to_numpy(),
+            "seed": cell.runs.seed.to_numpy(),
+            "reward": values,
+            "score": normalised(values, float(start), best.reward),
+            "gap": gap_share(values, best.reward),
+        }
+        parts.append(pd.DataFrame(own))
     columns = ["task", "method", "label", "run", "seed", "reward", "score", "gap"]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
 
@@ -100,16 +96,16 @@ def combined(scores: pd.DataFrame) -> pd.DataFrame:
     likewise variants of the two with the same name and parameters.
     """
     parts = [scores]
-    labels = set(scores.method)
-    for label in sorted(labels):
+    for label in sorted(set(scores.method)):
         found = _CONDITION.fullmatch(label)
         if found is None or found[1] not in _TWO_ARMED:
             continue
-        one, variant = f"{LEARNER}{_ONE_ARMED}{found[2]}", found[2]
+        condition, variant = found.groups()
         two_armed = scores[scores.method == label]
-        elsewhere = scores[(scores.method == one) & ~scores.task.isin(two_armed.task)]
+        one_armed = scores[scores.method == f"{LEARNER}{_ONE_ARMED}{variant}"]
+        elsewhere = one_armed[~one_armed.task.isin(two_armed.task)]
         if len(elsewhere):
-            name = f"{LEARNER.rstrip('/')} ({_ONE_ARMED}{variant}, {found[1]}{variant})"
+            name = f"{LEARNER.rstrip('/')} ({_ONE_ARMED}{variant}, {condition}{variant})"
             parts.append(pd.concat([elsewhere, two_armed]).assign(method=name))
     return pd.concat(parts, ignore_index=True)
 
@@ -121,11 +117,8 @@ def everywhere(scores: pd.DataFrame) -> list[str]:
     """
     tasks = scores.groupby("method", sort=False).task.nunique()
     most = scores.task.nunique()
-    return [
-        str(name)
-        for name, count in tasks.items()
-        if most > 1 and count == most and not str(name).startswith(SEARCH)
-    ]
+    found = map(str, tasks.index[tasks == most])
+    return [name for name in found if most > 1 and not name.startswith(SEARCH)]
 
 
 def over_tasks(scores: pd.DataFrame) -> pd.DataFrame:
@@ -147,27 +140,15 @@ def over_tasks(scores: pd.DataFrame) -> pd.DataFrame:
             "gap": unknown if failed else task_mean(gap, seed=SEED),
             **{name: _share(gap, near) for name, near in WITHIN.items()},
         }
-        row = {"method": method, "tasks": len(gap), "runs": sum(map(len, gap.values()))}
-        rows.append(row | {"failed": failed} | _columns(measures))
-    nothing = Inference(math.nan, (), "")
-    columns = ["method", "tasks", "runs", "failed"]
-    columns += _columns(dict.fromkeys(("score", "gap", *WITHIN), nothing))
-    frame = pd.DataFrame(rows, columns=columns)
+        row: dict[str, Any] = {"method": method, "tasks": len(gap)}
+        row |= {"runs": sum(map(len, gap.values())), "failed": failed}
+        for name, found in measures.items():
+            row[name] = found.estimate
+            row |= {f"{name}_{part}": getattr(found, part) for part in ("low", "high", "note")}
+        rows.append(row)
+    names = [f"{name}{end}" for name in ("score", "gap", *WITHIN) for end in _ENDINGS]
+    frame = pd.DataFrame(rows, columns=["method", "tasks", "runs", "failed", *names])
     return frame.sort_values("score", ascending=False, kind="stable", ignore_index=True)
-
-
-def _columns(measures: Mapping[str, Inference]) -> dict[str, float | str]:
-    """Each with its interval, and a note that says why there is none."""
-    return {
-        f"{name}{ending}": value
-        for name, found in measures.items()
-        for ending, value in (
-            ("", found.estimate),
-            ("_low", found.low),
-            ("_high", found.high),
-            ("_note", found.note),
-        )
-    }
 
 
 def profiles(scores: pd.DataFrame) -> pd.DataFrame:
@@ -177,44 +158,32 @@ def profiles(scores: pd.DataFrame) -> pd.DataFrame:
     ``threshold``) or ``score`` (share of runs whose normalised score is above it); ``share``
     with its pointwise 95 % interval ``low`` to ``high``, and ``note``, why there is none.
     """
-    parts = []
+    rows = []
     for method in everywhere(scores):
         for kind, thresholds in THRESHOLDS.items():
-            values = by_task(scores, method, kind)
-            found = profile(values, thresholds, REACHED[kind], seed=SEED)
-            notes = [
-                _note(found.n, low, high) for low, high in zip(found.low, found.high, strict=True)
-            ]
-            silent = np.array([bool(note) for note in notes])
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "method": method,
-                        "kind": kind,
-                        "threshold": found.thresholds,
-                        "share": found.share,
-                        "low": np.where(silent, math.nan, found.low),
-                        "high": np.where(silent, math.nan, found.high),
-                        "note": notes,
-                    }
-                )
-            )
+            found = profile(by_task(scores, method, kind), thresholds, REACHED[kind], seed=SEED)
+            shares = zip(found.thresholds, found.share, found.low, found.high, strict=True)
+            for threshold, *share in shares:
+                rows.append((method, kind, threshold, *_with_note(found.n, *share)))
     columns = ["method", "kind", "threshold", "share", "low", "high", "note"]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _share(gaps: dict[str, Array], near: float) -> Inference:
     """Share of runs whose gap is at most ``near``."""
     found = profile(gaps, [near], "at most", seed=SEED)
-    low, high, share = float(found.low[0]), float(found.high[0]), float(found.share[0])
-    note = _note(found.n, low, high)
-    if note:
-        low = high = math.nan
-    return Inference(share, found.n, found.method, low, high, found.confidence, note=note)
+    (share,), (low,), (high,) = found.share, found.low, found.high
+    share, low, high, note = _with_note(found.n, share, low, high)
+    return Inference(share, found.n, "", low, high, note=note)
 
 
-def _note(n: tuple[int, ...], low: float, high: float) -> str:
-    """Why a share of runs has no interval."""
+def _with_note(
+    n: tuple[int, ...], share: float, low: float, high: float
+) -> tuple[float, float, float, str]:
+    """A share of runs with its interval, or the reason why it has none."""
+    note = ""
     if min(n) < FEWEST:
-        return f"no interval: fewer than {FEWEST} runs of a task"
-    return f"no interval: no spread within tasks in {sum(n)} runs" if low == high else ""
+        note = f"no interval: fewer than {FEWEST} runs of a task"
+    elif low == high:
+        note = f"no interval: no spread within tasks in {sum(n)} runs"
+    return (share, math.nan, math.nan, note) if note else (share, low, high, note)

@@ -20,18 +20,17 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import TOLD
+from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.comparisons.targets import SHARES
 from analysis.methods import LEARNER
 from analysis.results.folder import CellRuns
 from analysis.statistics.estimates import (
     SEED,
-    Inference,
     cliffs_delta,
     difference_of_means,
     paired_by_seed,
@@ -40,7 +39,6 @@ from analysis.statistics.estimates import (
 )
 from analysis.statistics.hypotheses import bootstrap_test, holm, permutation_test, sign_flip_test
 from analysis.statistics.power import runs_needed, smallest_difference
-from analysis.statistics.spread import sd
 from coartic.exploration import CONDITIONS
 from coartic.record import SEARCH
 from coartic.robot import Array
@@ -48,13 +46,8 @@ from coartic.robot import Array
 if TYPE_CHECKING:
     from analysis.study import Study
 
-SPENDS = {
-    "trials": ("trials",),
-    "movement_ticks": ("movement_ticks",),
-    "evaluations": ("forward_kinematics", "jacobians"),
-    "solve_s": ("solve_s",),
-}
-"""What a run spends: sums of columns of :class:`analysis.comparisons.methods.MethodRow`."""
+SPENDS = ("trials", "movement_ticks", "evaluations", "solve_s")
+"""What a run spends, of :class:`analysis.comparisons.methods.MethodRow`."""
 RUNS_FOR = {f"runs_{share:.0%}".removesuffix("%"): share for share in SHARES}
 """Differences, as shares of the optimum, for which so many runs are needed."""
 Kind = Literal["conditions", "variant", "method"]
@@ -129,38 +122,38 @@ class PairRow:
     mean_second: float
     sd_first: float
     sd_second: float
-    difference: float
+    difference: float = math.nan
     """Mean reward of the first less the second's."""
-    low: float
+    low: float = math.nan
     """Of its 95 % BCa interval."""
-    high: float
-    interval: str
+    high: float = math.nan
+    interval: str = ""
     """What that is of: pairs of runs that share a seed, independent samples, or a sample
     against a number (:attr:`Pair.known`)."""
-    pairs: int
+    pairs: int = 0
     """Runs that share a seed."""
-    correlation: float
+    correlation: float = math.nan
     """Pearson's, of their rewards."""
-    independent_low: float
+    independent_low: float = math.nan
     """Of the interval that leaves pairing out."""
-    independent_high: float
+    independent_high: float = math.nan
     expected: Literal["higher", "lower"]
     """Of the first."""
-    p_bootstrap: float
+    p_bootstrap: float = math.nan
     """One-tailed, in the direction expected."""
-    p_bootstrap_holm: float
+    p_bootstrap_holm: float = math.nan
     """Adjusted over all pairs of the task."""
-    p_permutation: float
+    p_permutation: float = math.nan
     """Two-tailed; by the signs of the differences where the second is known."""
-    p_permutation_holm: float
-    delta: float
+    p_permutation_holm: float = math.nan
+    delta: float = math.nan
     """Cliff's."""
-    delta_low: float
-    delta_high: float
-    improvement: float
+    delta_low: float = math.nan
+    delta_high: float = math.nan
+    improvement: float = math.nan
     """P(first higher), a tie half."""
-    improvement_low: float
-    improvement_high: float
+    improvement_low: float = math.nan
+    improvement_high: float = math.nan
     trials: float
     """What the second spent in a run over what the first did, medians; NaN where the first
     spent none."""
@@ -203,127 +196,88 @@ def compared(study: Study) -> tuple[PairRow, ...]:
 
 def pairs_table(rows: Sequence[PairRow]) -> pd.DataFrame:
     """The rows with the fields of :class:`PairRow` as columns."""
-    columns = [field.name for field in fields(PairRow)]
-    return pd.DataFrame([vars(row) for row in rows], columns=columns)
+    return pd.DataFrame(list(rows), columns=[field.name for field in fields(PairRow)])
 
 
 def _row(study: Study, pair: Pair) -> PairRow:
     """A pair, its p-values not yet adjusted."""
-    a, b = _rewards(pair.first), _rewards(pair.second)
-    told, told_second = _told(study, pair.first), _told(study, pair.second)
-    found = _inferred(pair, a, b)
-    sd_first, sd_second = sd(a), 0.0 if pair.known and len(b) else sd(b)
-    optimum = study.optima.get((pair.first.task, "free"))
-    best = abs(optimum.reward) if optimum else math.nan
-    fewest = len(a) if pair.known else min(len(a), len(b))
-    smallest = _smallest(sd_first, sd_second, fewest)
+    one, two = (study.method_rows[cell.task, cell.label] for cell in (pair.first, pair.second))
+    optimum = study.optima.get((one.task, "free"))
+    found = _inferred(pair) if one.solved and two.solved else {"note": "no run with a solution"}
+    found |= {name: _ratio(getattr(two, name), getattr(one, name)) for name in SPENDS}
     return PairRow(
-        task=pair.first.task,
+        task=one.task,
         kind=pair.kind,
-        first=pair.first.label,
-        second=pair.second.label,
-        runs_first=len(pair.first.runs),
-        runs_second=len(pair.second.runs),
-        n_first=len(a),
-        n_second=len(b),
-        mean_first=_mean(a),
-        mean_second=_mean(b),
-        sd_first=sd_first,
-        sd_second=sd_second,
-        difference=found.difference.estimate,
-        low=found.difference.low,
-        high=found.difference.high,
-        interval=found.interval,
-        pairs=found.pairs,
-        correlation=found.correlation,
-        independent_low=found.independent.low,
-        independent_high=found.independent.high,
+        first=one.label,
+        second=two.label,
+        runs_first=one.runs,
+        runs_second=two.runs,
+        n_first=one.solved,
+        n_second=two.solved,
+        mean_first=one.reward,
+        mean_second=two.reward,
         expected="higher" if pair.expected == "greater" else "lower",
-        p_bootstrap=found.bootstrap.p,
-        p_bootstrap_holm=math.nan,
-        p_permutation=found.permutation.p,
-        p_permutation_holm=math.nan,
-        **_with_ends("delta", cliffs_delta(found.improvement)),
-        **_with_ends("improvement", found.improvement),
-        **_spent(study, pair),
-        told_more=_letters(told_second - told),
-        told_less=_letters(told - told_second),
-        **{name: _runs_for(share * best, sd_first, sd_second) for name, share in RUNS_FOR.items()},
-        smallest=smallest,
-        smallest_share=smallest / best if best > 0 else math.nan,
-        note="; ".join(found.notes),
+        told_more=_letters(set(two.told) - set(one.told)),
+        told_less=_letters(set(one.told) - set(two.told)),
+        **found,
+        **_sizes(pair, one, two, abs(optimum.reward) if optimum else math.nan),
     )
 
 
-class _Inferred(NamedTuple):
+def _inferred(pair: Pair) -> dict[str, Any]:
     """Difference, tests and effect size of two samples of rewards."""
-
-    difference: Inference
-    independent: Inference
-    bootstrap: Inference
-    permutation: Inference
-    improvement: Inference
-    interval: str = ""
-    pairs: int = 0
-    correlation: float = math.nan
-
-    @property
-    def notes(self) -> list[str]:
-        every = (self.difference, self.bootstrap, self.permutation, self.improvement)
-        return list(dict.fromkeys(found.note for found in every if found.note))
-
-
-def _inferred(pair: Pair, a: Array, b: Array) -> _Inferred:
-    if not (len(a) and len(b)):
-        nothing = Inference(math.nan, (len(a), len(b)), "", note="no run with a solution")
-        return _Inferred(*(nothing,) * 5)
-    second = float(b[0]) if pair.known else b
-    independent = difference_of_means(a, second, seed=SEED)
-    bootstrap = bootstrap_test(a, second, pair.expected, seed=SEED)
-    better = probability_of_improvement(a, second, seed=SEED)
-    if pair.known:
-        flips = sign_flip_test(a, second, "two-sided", seed=SEED)
-        every = independent, independent, bootstrap, flips, better
-        return _Inferred(*every, "against a known value")
-    permutation = permutation_test(a, second, "two-sided", seed=SEED)
+    a, b = (cell.good.reward.to_numpy(dtype=np.float64) for cell in (pair.first, pair.second))
     x, y = paired_by_seed(pair.first.good, pair.second.good)
-    if not len(x):
-        every = independent, independent, bootstrap, permutation, better
-        return _Inferred(*every, "independent")
-    differ = len(x) > 2 and np.ptp(x) and np.ptp(y)
-    correlation = float(np.corrcoef(x, y)[0, 1]) if differ else math.nan
-    paired = paired_difference(x, y, seed=SEED)
-    every = paired, independent, bootstrap, permutation, better
-    return _Inferred(*every, "paired by seed", len(x), correlation)
+    second: Array | float = b
+    interval = "paired by seed" if len(x) else "independent"
+    if pair.known:
+        x, y, second, interval = x[:0], y[:0], float(b[0]), "against a known value"
+    independent = difference_of_means(a, second, seed=SEED)
+    difference = paired_difference(x, y, seed=SEED) if len(x) else independent
+    bootstrap = bootstrap_test(a, second, pair.expected, seed=SEED)
+    permuted = sign_flip_test if pair.known else permutation_test
+    permutation = permuted(a, second, "two-sided", seed=SEED)
+    improvement = probability_of_improvement(a, second, seed=SEED)
+    delta = cliffs_delta(improvement)
+    spread = len(x) > 2 and np.ptp(x) and np.ptp(y)
+    notes = (found.note for found in (difference, bootstrap, permutation, improvement))
+    return {
+        "difference": difference.estimate,
+        "low": difference.low,
+        "high": difference.high,
+        "interval": interval,
+        "pairs": len(x),
+        "correlation": float(np.corrcoef(x, y)[0, 1]) if spread else math.nan,
+        "independent_low": independent.low,
+        "independent_high": independent.high,
+        "p_bootstrap": bootstrap.p,
+        "p_permutation": permutation.p,
+        "delta": delta.estimate,
+        "delta_low": delta.low,
+        "delta_high": delta.high,
+        "improvement": improvement.estimate,
+        "improvement_low": improvement.low,
+        "improvement_high": improvement.high,
+        "note": "; ".join(dict.fromkeys(filter(None, notes))),
+    }
 
 
-def _with_ends(name: str, found: Inference) -> dict[str, float]:
-    return {name: found.estimate, f"{name}_low": found.low, f"{name}_high": found.high}
+def _sizes(pair: Pair, one: MethodRow, two: MethodRow, best: float) -> dict[str, Any]:
+    """SDs, and the runs and differences that follow; ``best``: absolute reward of the optimum."""
+    sds = one.reward_sd, 0.0 if pair.known and two.solved else two.reward_sd
+    fewest = one.solved if pair.known else min(one.solved, two.solved)
+    known = not any(map(math.isnan, sds))
+    smallest = smallest_difference(*sds, fewest) if known else math.nan
+    sizes = {
+        name: runs_needed(share * best, *sds) if known and best > 0 else math.nan
+        for name, share in RUNS_FOR.items()
+    }
+    sizes |= {"smallest": smallest, "smallest_share": smallest / best if best > 0 else math.nan}
+    return {"sd_first": sds[0], "sd_second": sds[1], **sizes}
 
 
-def _spent(study: Study, pair: Pair) -> dict[str, float]:
-    """What the second spends over what the first does."""
-    ratios = {}
-    rows = study.method_rows
-    first, second = (rows[cell.task, cell.label] for cell in (pair.first, pair.second))
-    for name, columns in SPENDS.items():
-        ours, theirs = (
-            sum(getattr(spent, column) for column in columns) for spent in (first, second)
-        )
-        ratios[name] = theirs / ours if ours else math.nan
-    return ratios
-
-
-def _runs_for(difference: float, first_sd: float, second_sd: float) -> float:
-    """Runs that find it; NaN where a number is unknown."""
-    known = difference > 0 and not (math.isnan(first_sd) or math.isnan(second_sd))
-    return runs_needed(difference, first_sd, second_sd) if known else math.nan
-
-
-def _smallest(first_sd: float, second_sd: float, runs: int) -> float:
-    if math.isnan(first_sd) or math.isnan(second_sd):
-        return math.nan
-    return smallest_difference(first_sd, second_sd, runs)
+def _ratio(theirs: float, ours: float) -> float:
+    return theirs / ours if ours else math.nan
 
 
 def _keeping_still(condition: str) -> str | None:
@@ -335,17 +289,9 @@ def _keeping_still(condition: str) -> str | None:
     return None
 
 
-def _rewards(cell: CellRuns) -> Array:
-    return np.asarray(cell.good.reward.to_numpy(dtype=np.float64))
-
-
 def _told(study: Study, cell: CellRuns) -> set[str]:
     return set(study.method_rows[cell.task, cell.label].told)
 
 
 def _letters(told: set[str]) -> str:
     return "".join(letter for letter in TOLD.values() if letter in told)
-
-
-def _mean(values: Array) -> float:
-    return float(values.mean()) if len(values) else math.nan

@@ -84,9 +84,8 @@ def paper_rows(study: Study) -> list[PaperRow]:
     for cell in study.cells.values():
         paper, rewards = published_of(cell), _rewards(cell)
         if paper is not None:
-            apart = _apart(rewards, paper.summary)
             comparable = bool((cell.good.trials == TRIALS).all())
-            rows.append(PaperRow(cell, paper, rewards, apart, comparable))
+            rows.append(PaperRow(cell, paper, rewards, _apart(rewards, paper.summary), comparable))
     return rows
 
 
@@ -103,9 +102,10 @@ def sequence_rows(study: Study) -> list[SequenceRow]:
         printed = {sequence.hands: sequence for sequence in paper.sequences}
         complete = sum(sequence.runs or 0 for sequence in paper.sequences) == RUNS
         for name in dict.fromkeys([*printed, *hands.value_counts().index]):
-            known, rewards = printed.get(name), _rewards(cell)[(hands == name).to_numpy(bool)]
-            summary = known.summary if known else None
-            runs = known.runs if known else 0 if complete else None
+            rewards = _rewards(cell)[(hands == name).to_numpy(bool)]
+            summary, runs = None, 0 if complete else None
+            if name in printed:
+                summary, runs = printed[name].summary, printed[name].runs
             apart = _apart(rewards, summary)
             rows.append(SequenceRow(cell, str(name), summary, runs, rewards, apart))
     return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -49,12 +50,7 @@ def pareto_sets(study: Study, *, seed: int = 0) -> pd.DataFrame:
     left out: a mean of the others flatters them. So are the optimum's searches, which are
     references, and methods with a base that a parameter locks.
     """
-    parts = [
-        part
-        for task in study.tasks
-        if (cells := _solving(study, task))
-        for part in _fronts(study, cells, seed)
-    ]
+    parts = [part for task in study.tasks for part in _fronts(study, _solving(study, task), seed)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=COLUMNS)
 
 
@@ -72,6 +68,8 @@ def _solving(study: Study, task: str) -> list[CellRuns]:
 
 def _fronts(study: Study, cells: Sequence[CellRuns], seed: int) -> Iterator[pd.DataFrame]:
     """The fronts of one task, one a spend."""
+    if not cells:
+        return
     rows = [study.method_rows[cell.task, cell.label] for cell in cells]
     told = [frozenset(row.told) for row in rows]
     no_more: Flags = np.array([[other <= own for other in told] for own in told])
@@ -79,7 +77,7 @@ def _fronts(study: Study, cells: Sequence[CellRuns], seed: int) -> Iterator[pd.D
     rewards = [cell.runs.reward.to_numpy(dtype=np.float64) for cell in cells]
     rewards_again = np.stack([resampled(each, seed).mean(axis=-1) for each in rewards], axis=-1)
     for spend in LABELS:
-        spent = [_spent(cell, spend, letters) for cell, letters in zip(cells, told, strict=True)]
+        spent = [_spent(cell, spend, len(row.told)) for cell, row in zip(cells, rows, strict=True)]
         amount = np.array([float(_median(each)) for each in spent])
         amounts = np.stack([_median(resampled(each, seed)) for each in spent], axis=-1)
         tolerance = TIME_TOLERANCE if spend == "solve_s" else 0.0
@@ -119,22 +117,14 @@ def dominated(reward: Array, amount: Array, tolerance: float = 0.0) -> Flags:
     return as_good & better
 
 
-def _spent(cell: CellRuns, spend: str, told: frozenset[str]) -> Array:
+def _spent(cell: CellRuns, spend: str, told: int) -> Array:
     """What each run spent (n,); NaN for times that are not taken."""
-    if spend == "information":
-        return np.full(len(cell.runs), float(len(told)))
-    if spend == "solve_s":
-        times = solve_times(cell.good)
-        return times.reindex(cell.runs.index).to_numpy(dtype=np.float64, na_value=np.nan)
-    return cell.runs[spend].to_numpy(dtype=np.float64, na_value=np.nan)
+    runs = cell.runs.assign(information=told, solve_s=solve_times(cell.good))
+    return runs[spend].to_numpy(dtype=np.float64, na_value=np.nan)
 
 
 def _median(values: Array) -> Array:
     """Median over the last axis of the values that are known; NaN where none is."""
-    ordered = np.sort(values, axis=-1)  # NaN last
-    count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
-    sides = [np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[-1] - 1)]
-    middle: Array = np.concatenate(
-        [np.take_along_axis(ordered, side, axis=-1) for side in sides], axis=-1
-    ).mean(axis=-1)
-    return middle
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
+        return np.asarray(np.nanmedian(values, axis=-1))

@@ -84,32 +84,30 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that
     makes fewer, or has no budget, ended by itself.
     """
-    rewards = _rewards_by_run(study.results)
-    limit = study.results.manifest.limits.trials
+    trials_of = _rewards_by_run(study.results)
+    limit = study.results.manifest.limits.trials or math.inf
     found = {}
     for cell in study.cells.values():
-        totals = cell.runs[["run_id", *SPENDS]].set_index("run_id").astype("Float64")
-        totals["solve_s"] = solve_times(cell.good.set_index("run_id")).reindex(totals.index)
-        table = totals.to_numpy(dtype=np.float64, na_value=np.nan)
-        solved = (cell.runs.status == "ok").to_numpy(dtype=bool)
-        own = cell.runs.reward.to_numpy(dtype=np.float64, na_value=np.nan)
-        given = cell.runs.parameters.map(lambda text: json.loads(text).get("trials", math.inf))
-        budgets = np.minimum(
-            given.to_numpy(dtype=np.float64), math.inf if limit is None else limit
+        runs = cell.runs.set_index("run_id")
+        totals = runs[list(SPENDS)].astype("Float64")
+        totals["solve_s"] = solve_times(cell.good.set_index("run_id"))
+        table = totals.to_numpy(dtype=np.float64, na_value=np.nan).tolist()
+        rows = zip(
+            map(str, runs.index), table, runs.status, runs.reward, runs.parameters, strict=True
         )
-        for run_id, row, ok, reward, budget in zip(
-            totals.index, table, solved, own, budgets, strict=True
-        ):
-            total = dict(zip(SPENDS, row.tolist(), strict=True))
-            trials = rewards.get(str(run_id))
-            if not ok:
-                nothing = dict.fromkeys(SPENDS, np.empty(0))
-                found[str(run_id)] = BestSoFar(np.empty(0), nothing, total, trials is not None)
+        for run_id, spent, status, reward, parameters in rows:
+            total = dict(zip(SPENDS, spent, strict=True))
+            trials = trials_of.get(run_id)
+            if status != "ok":
+                none = np.empty(0)
+                learns = trials is not None
+                found[run_id] = BestSoFar(none, dict.fromkeys(SPENDS, none), total, learns)
             elif trials is None:
-                spent = {name: np.array([value]) for name, value in total.items()}
-                found[str(run_id)] = BestSoFar(np.array([reward]), spent, total, False)
+                at_once = {name: np.array([value]) for name, value in total.items()}
+                found[run_id] = BestSoFar(np.array([float(reward)]), at_once, total, False)
             else:
-                found[str(run_id)] = by_trial(trials, total, stopped=len(trials) >= budget)
+                budget = min(json.loads(parameters).get("trials", math.inf), limit)
+                found[run_id] = by_trial(trials, total, stopped=len(trials) >= budget)
     return found
 
 
@@ -126,9 +124,16 @@ def cells_by_spend(study: Study) -> Iterator[tuple[CellRuns, str, list[BestSoFar
             yield cell, spend, [run for run in runs if run.known(spend)]
 
 
-def keeps_to(cell: CellRuns, other_arm: str) -> bool:
-    """Whether a method's solutions keep to the restriction of an optimum."""
-    return other_arm == "free" or bool((cell.good.other_arm_travel <= STILL).all())
+def cells_by_optimum(
+    study: Study,
+) -> Iterator[tuple[str, int, CellRuns, str, list[BestSoFar]]]:
+    """The same with other arm and reward of each optimum that the method's solutions keep to."""
+    for other_arm in OTHER_ARMS:
+        for cell, spend, runs in cells_by_spend(study):
+            best = study.optima.get((cell.task, other_arm))
+            keeps = other_arm == "free" or (cell.good.other_arm_travel <= STILL).all()
+            if best is not None and runs and keeps:
+                yield other_arm, best.reward, cell, spend, runs
 
 
 def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) -> BestSoFar:

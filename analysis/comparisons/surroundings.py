@@ -24,10 +24,10 @@ def surroundings(first: Study, second: Study) -> tuple[list[Differing], list[str
     a, b = _facts(first), _facts(second)
     rows = [Differing(name, a[name], b[name]) for name in a if a[name] != b[name]]
     same = [name for name in a if a[name] and a[name] == b[name]]
-    for what, kinds, ours, theirs in (
-        ("task", "tasks", *_task_texts(first, second)),
-        ("code of", "methods", codes(first), codes(second)),
-        ("library", "libraries", _packages(first), _packages(second)),
+    for what, kinds, (ours, theirs) in (
+        ("task", "tasks", _task_texts(first, second)),
+        ("code of", "methods", (codes(first), codes(second))),
+        ("library", "libraries", (_packages(first), _packages(second))),
     ):
         shared = [name for name in ours if name in theirs]
         differing = [name for name in shared if ours[name] != theirs[name]]
@@ -71,16 +71,12 @@ def codes(study: Study) -> dict[str, str]:
 
 def _facts(study: Study) -> dict[str, str]:
     manifest, runs = study.results.manifest, study.runs
-    specification, limits, environment = (
-        manifest.specification,
-        manifest.limits,
-        manifest.environment,
-    )
+    specification, environment = manifest.specification, manifest.environment
     commit = environment.commit
     facts = {
-        **{name: getattr(specification, name) for name in ("suite", "seed", "runs", "trials")},
-        "time limit (s)": limits.time_s,
-        "trial budget": limits.trials,
+        **_named(specification, "suite", "seed", "runs", "trials"),
+        "time limit (s)": manifest.limits.time_s,
+        "trial budget": manifest.limits.trials,
         "rows of runs.parquet": len(runs),
         "coartic": environment.coartic,
         "code of the model": environment.model_code,
@@ -89,10 +85,7 @@ def _facts(study: Study) -> dict[str, str]:
             text[:12] + "+" * text.endswith("+") for text in runs.commit.dropna()
         ),
         "library versions of the runs": _list(runs["packages"].dropna()),
-        **{
-            name: getattr(environment, name)
-            for name in ("python", "platform", "processor", "cores")
-        },
+        **_named(environment, "python", "platform", "processor", "cores"),
     }
     return {name: "" if value is None else str(value) for name, value in facts.items()}
 
@@ -112,6 +105,10 @@ def _task_texts(first: Study, second: Study) -> tuple[dict[str, str], dict[str, 
 
 def _packages(study: Study) -> dict[str, str]:
     return study.results.manifest.environment.packages
+
+
+def _named(of: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(of, name) for name in names}
 
 
 def _list(values: Iterable[Any]) -> str:

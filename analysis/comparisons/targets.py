@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from analysis.comparisons.progress import OTHER_ARMS, BestSoFar, cells_by_spend, keeps_to
+from analysis.comparisons.progress import BestSoFar, cells_by_optimum
+from analysis.results.folder import CellRuns
 from analysis.statistics.estimates import CONFIDENCE
 from analysis.statistics.survival import kaplan_meier_median
 from coartic.robot import Array
@@ -66,34 +67,28 @@ def targets(study: Study, *, shares: Sequence[float] = SHARES) -> pd.DataFrame:
     locks, for which it is no optimum; of the optimum with the other arm still neither have
     methods that move that arm.
     """
-    rows = [row for arm in OTHER_ARMS for row in _of_optimum(study, arm, shares)]
+    rows = [_target(*place, share) for place in cells_by_optimum(study) for share in shares]
     return pd.DataFrame(rows, columns=Target._fields)
 
 
-def _of_optimum(study: Study, other_arm: str, shares: Sequence[float]) -> Iterator[Target]:
-    for cell, spend, runs in cells_by_spend(study):
-        optimum = study.optima.get((cell.task, other_arm))
-        if optimum is None or not runs or not keeps_to(cell, other_arm):
-            continue
-        for share in shares:
-            target = math.ceil(optimum.reward - share * abs(optimum.reward) - 1e-9)
-            times, horizon = _times(runs, spend, target)
-            count = int(np.isfinite(times).sum())
-            chance = binomtest(count, len(runs)).proportion_ci(CONFIDENCE, method="exact")
-            seen = np.minimum(times, horizon)
-            median = kaplan_meier_median(seen, np.isfinite(times) & (times <= horizon), CONFIDENCE)
-            yield Target(
-                *(cell.task, cell.label, other_arm, spend, share, target, len(runs), count),
-                *(chance.low, chance.high, median.value, median.low, median.high, horizon),
-            )
+def _target(
+    other_arm: str, optimum: int, cell: CellRuns, spend: str, runs: list[BestSoFar], share: float
+) -> Target:
+    target = math.ceil(optimum - share * abs(optimum) - 1e-9)
+    times, horizon = _times(runs, spend, target)
+    count = int(np.isfinite(times).sum())
+    chance = binomtest(count, len(runs)).proportion_ci(CONFIDENCE, method="exact")
+    seen = np.isfinite(times) & (times <= horizon)
+    median = kaplan_meier_median(np.minimum(times, horizon), seen)
+    return Target(
+        *(cell.task, cell.label, other_arm, spend, share, target, len(runs), count),
+        *(chance.low, chance.high, median.value, median.low, median.high, horizon),
+    )
 
 
 def _times(runs: Sequence[BestSoFar], spend: str, target: float) -> tuple[Array, float]:
     """Spend of each run to reach a reward, infinite where it did not, and the horizon."""
-    places = [int(np.searchsorted(run.rewards, target)) for run in runs]
-    times = [
-        float(run.spent[spend][place]) if place < len(run.rewards) else math.inf
-        for run, place in zip(runs, places, strict=True)
-    ]
+    reached = (run.spent[spend][run.rewards >= target].tolist() for run in runs)
+    times = [spent[0] if spent else math.inf for spent in reached]
     ends = [run.total[spend] for run in runs if run.stopped and run.solved]
     return np.array(times), min(ends, default=math.inf)

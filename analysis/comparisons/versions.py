@@ -8,37 +8,34 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import solve_times
+from analysis.comparisons.methods import median, solve_times
 from analysis.comparisons.surroundings import Differing, codes, differing_tasks, surroundings
 from analysis.results.folder import CellRuns
 from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
-from analysis.statistics.estimates import (
-    FEWEST,
-    SEED,
-    difference_of_means,
-    paired_by_seed,
-    paired_difference,
-)
+from analysis.statistics.estimates import FEWEST, SEED, difference_of_means, paired_by_seed
 from analysis.statistics.hypotheses import bootstrap_test, holm
-from analysis.study import CellKey, Study, load
+from analysis.study import Study, load
 from coartic import CoarticError
 from coartic.robot import Array
 from coartic.tables import label_of
 
-SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
-"""Spends whose medians are compared; the last one is wall time, s."""
-Verdict = Literal[
-    "identical", "equivalent", "undecided", "different", "no interval", "not compared"
-]
-_VERDICTS: Mapping[Verdict, str] = {
+SPENT = {
+    "trials": "trials",
+    "movement_ticks": "ticks",
+    "forward_kinematics": "kinematics",
+    "jacobians": "Jacobians",
+    "solve_s": "solve time",
+}
+"""Spends whose medians are compared, in words."""
+VERDICTS = {
     "identical": "identical in every run",
     "equivalent": "not identical, equivalent",
     "undecided": "undecided",
@@ -46,6 +43,7 @@ _VERDICTS: Mapping[Verdict, str] = {
     "no interval": "not identical, with too few runs for an interval",
     "not compared": "not compared",
 }
+"""What becomes of a cell, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +82,8 @@ class VersionRow:
     """After Holm over all cells tested."""
     margin: float = math.nan
     """Ticks within which the means count as equivalent."""
-    verdict: Verdict = "not compared"
-    """``identical`` (every run), of an
-    :class:`~analysis.statistics.equivalence.Equivalence`, ``no interval`` (fewer than three
-    runs) or ``not compared`` (``remarks`` say why)."""
+    verdict: str = "not compared"
+    """Of :data:`VERDICTS`; ``remarks`` say why a cell is not compared."""
     trials_a: float = math.nan
     """Medians over runs of what is spent, time in s."""
     trials_b: float = math.nan
@@ -131,17 +127,14 @@ class VersionComparison:
     def cells(self) -> pd.DataFrame:
         """The rows with the fields of :class:`VersionRow` as columns."""
         columns = [field.name for field in fields(VersionRow)]
-        return pd.DataFrame([vars(row) for row in self.rows], columns=columns)
+        return pd.DataFrame(list(self.rows), columns=columns)
 
     @property
     def summary(self) -> list[str]:
         """How many cells came out which way."""
         found = [row.verdict for row in self.rows]
-        parts = [
-            f"{found.count(verdict)} {words}"
-            for verdict, words in _VERDICTS.items()
-            if verdict in found
-        ]
+        counts = {words: found.count(verdict) for verdict, words in VERDICTS.items()}
+        parts = [f"{count} {words}" for words, count in counts.items() if count]
         lines = [f"{len(found)} cells in both: {', '.join(parts) or 'nothing to compare'}."]
         for side, tasks in zip("AB", self.only, strict=True):
             if tasks:
@@ -165,37 +158,43 @@ def load_pair(first: Path, second: Path) -> tuple[Study, Study]:
 def compare_versions(first: Study, second: Study) -> VersionComparison:
     """Everything that differs between A (``first``) and B (``second``)."""
     differing, same = surroundings(first, second)
-    here, there = _cells(first), _cells(second)
     return VersionComparison(
         (first.results.folder, second.results.folder),
         differing,
         same,
-        compared_cells(first, second),
-        (_only(here, there), _only(there, here)),
+        _rows(first, second),
+        (_only(first, second), _only(second, first)),
         (_stale(first), _stale(second)),
     )
 
 
-def compared_cells(first: Study, second: Study) -> list[VersionRow]:
-    """One row a cell that both folders have, in the order of the first one's plan."""
-    there = _cells(second)
-    tasks = differing_tasks(first, second)
-    ours, theirs = codes(first), codes(second)
+def _rows(first: Study, second: Study) -> list[VersionRow]:
+    """One a cell that both folders have, p-values adjusted over all of them."""
+    tasks, ours, theirs = differing_tasks(first, second), codes(first), codes(second)
     rows = []
-    for key, cell in _cells(first).items():
-        if key in there:
-            row = _row(cell, there[key], tasks.get(cell.task))
-            if ours[cell.method] != theirs[cell.method]:
-                row = replace(row, remarks=_joined(row.remarks, "other code"))
-            rows.append(row)
+    for key, cell in first.cells.items():
+        if key in second.cells:
+            other = ours[cell.method] != theirs[cell.method]
+            rows.append(_row(cell, second.cells[key], tasks.get(cell.task), other_code=other))
     adjusted = holm([row.p for row in rows])
     return [replace(row, p_adjusted=p) for row, p in zip(rows, adjusted, strict=True)]
 
 
-def _row(first: CellRuns, second: CellRuns, task: list[str] | None) -> VersionRow:
-    """``task``: keys in which the tasks of the two differ."""
+def _row(
+    first: CellRuns, second: CellRuns, differing: list[str] | None, *, other_code: bool
+) -> VersionRow:
+    """A cell of both; ``differing``: keys in which its tasks differ, None where in none."""
     a, b = first.good, second.good
     both = first.runs.merge(second.runs, on="seed", suffixes=("_a", "_b"), validate="1:1")
+    failed = [
+        f"{side} solved {len(good)} of {len(cell.runs)}"
+        for side, good, cell in (("A", a, first), ("B", b, second))
+        if len(good) < len(cell.runs) or not len(good)
+    ]
+    remarks = [*failed, _parameters(first, second)]
+    if differing:  # the rewards of two tasks say nothing of each other
+        remarks = [f"the tasks of this name differ: {', '.join(differing)}"]
+    remarks += ["other code"] if other_code else []
     row = VersionRow(
         task=first.task,
         method=first.method,
@@ -205,25 +204,16 @@ def _row(first: CellRuns, second: CellRuns, task: list[str] | None) -> VersionRo
         solved_a=len(a),
         solved_b=len(b),
         shared=len(both),
-        identical=int((both.result_a == both.result_b).sum()),
-        remarks=_parameters(first, second),
+        identical=0 if differing else int((both.result_a == both.result_b).sum()),
+        remarks="; ".join(filter(None, remarks)),
     )
-    if task is not None:  # the rewards of two tasks say nothing of each other
-        remarks = f"the tasks of this name differ: {', '.join(task)}"
-        return replace(row, identical=0, remarks=remarks)
-    failed = [
-        f"{side} solved {len(good)} of {len(cell.runs)}"
-        for side, good, cell in (("A", a, first), ("B", b, second))
-        if len(good) < len(cell.runs) or not len(good)
-    ]
-    if failed:
-        return replace(row, remarks=_joined(*failed, row.remarks))
-    spent: dict[str, Any] = {
-        f"{name}_{side}": _spent(runs, name)
-        for name in SPENT
-        for side, runs in (("a", a), ("b", b))
-    }
-    row = replace(row, mean_a=float(a.reward.mean()), mean_b=float(b.reward.mean()), **spent)
+    if differing or failed:
+        return row
+    found: dict[str, Any] = {"mean_a": float(a.reward.mean()), "mean_b": float(b.reward.mean())}
+    for side, good in (("a", a), ("b", b)):
+        spent = good.assign(solve_s=solve_times(good))
+        found |= {f"{name}_{side}": median(spent[name]) for name in SPENT}
+    row = replace(row, **found)
     if row.identical == len(a) == len(b):
         return replace(row, verdict="identical", paired=True, difference=0.0)
     return _with_difference(row, a, b)
@@ -233,56 +223,34 @@ def _with_difference(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> Versi
     """Difference of mean rewards, B less A, with interval, test and verdict."""
     before, after = paired_by_seed(a, b)
     paired = len(before) >= FEWEST
-    if paired:
-        interval = paired_difference(after, before, seed=SEED)
-        samples: tuple[Array, Array | float] = (after - before, 0.0)
-    else:
-        before, after = (runs.reward.to_numpy(dtype=np.float64) for runs in (a, b))
-        interval = difference_of_means(after, before, seed=SEED)
-        samples = (after, before)
+    samples: tuple[Array, Array | float] = after - before, 0.0
+    if not paired:
+        samples = b.reward.to_numpy(dtype=np.float64), a.reward.to_numpy(dtype=np.float64)
+    found = difference_of_means(*samples, seed=SEED)
     row = replace(
         row,
         paired=paired,
-        difference=interval.estimate,
-        low=interval.low,
-        high=interval.high,
+        difference=found.estimate,
+        low=found.low,
+        high=found.high,
         p=bootstrap_test(*samples, "two-sided", seed=SEED).p,
         verdict="no interval",
     )
     margin = MARGIN * abs(row.mean_a)
-    if not margin or min(len(before), len(after)) < FEWEST:
+    if not margin or min(len(a), len(b)) < FEWEST:
         return row
     agreed = bootstrap_equivalence(*samples, margin, seed=SEED)
     # Where most pairs are equal, resamples without any spread leave it without an end.
     if not math.isfinite(agreed.low) or not math.isfinite(agreed.high):
-        agreed = replace(agreed, low=interval.low, high=interval.high)
+        agreed = replace(agreed, low=found.low, high=found.high)
     return replace(row, margin=margin, verdict=agreed.verdict)
 
 
-def _joined(*remarks: str) -> str:
-    return "; ".join(filter(None, remarks))
-
-
-def _spent(runs: pd.DataFrame, name: str) -> float:
-    values = (solve_times(runs) if name == "solve_s" else runs[name]).dropna()
-    return float(values.median()) if len(values) else math.nan
-
-
-def _cells(study: Study) -> dict[CellKey, CellRuns]:
-    """A cell that the plan names twice has its runs once."""
-    return {
-        key: replace(cell, runs=cell.runs.drop_duplicates("run_id"))
-        for key, cell in study.cells.items()
-    }
-
-
-def _only(
-    cells: Mapping[CellKey, CellRuns], others: Mapping[CellKey, CellRuns]
-) -> dict[str, list[str]]:
+def _only(study: Study, other: Study) -> dict[str, list[str]]:
+    """Cells that the other has not."""
     found: dict[str, list[str]] = {}
-    for task, label in cells:
-        if (task, label) not in others:
-            found.setdefault(label, []).append(task)
+    for task, label in (key for key in study.cells if key not in other.cells):
+        found.setdefault(label, []).append(task)
     return found
 
 

@@ -15,6 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
 
 from analysis.figures.robot import MARKERS
 from coartic import CoarticError, Trajectory
@@ -111,8 +116,6 @@ def check_output(path: Path, *, replace: bool = False) -> None:
 
     An ending that is not supported, MP4 without ffmpeg, what :func:`check_outputs` refuses.
     """
-    from matplotlib.animation import FFMpegWriter
-
     if path.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {path}: the name must end in {' or '.join(FORMATS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
@@ -123,29 +126,24 @@ def check_output(path: Path, *, replace: bool = False) -> None:
 class _Scene:
     """What moves in one panel: updated, never drawn anew."""
 
-    def __init__(self, axes: Any, trajectory: Trajectory) -> None:
-        from matplotlib.patches import Circle, Polygon
-
+    def __init__(self, axes: Axes, trajectory: Trajectory) -> None:
         self._trajectory = trajectory
         task = trajectory.task
         self._paths = {hand: trajectory.hand_path(hand) for hand in task.hands}
         self._traces = {
             hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands
         }
-        outline = task.robot.base_outline(task.q0)
-        self._base = axes.add_patch(
-            Polygon(outline, closed=True, facecolor="0.85", edgecolor="black", linewidth=1)
+        self._base = Polygon(
+            task.robot.base_outline(task.q0), facecolor="0.85", edgecolor="black", linewidth=1
         )
         self._goals = [
-            axes.add_patch(
-                Circle(goal, task.radius, facecolor="none", edgecolor="black", zorder=2.5)
-            )
+            Circle(goal, task.radius, facecolor="none", edgecolor="black", zorder=2.5)
             for goal in task.goals
         ]
+        for patch in (self._base, *self._goals):
+            axes.add_patch(patch)
         self._arms = {
-            hand: axes.plot(
-                [], [], color="black", linewidth=1.4, markeredgecolor="black", **MARKERS[hand]
-            )[0]
+            hand: axes.plot([], [], color="black", linewidth=1.4, **MARKERS[hand])[0]
             for hand in task.hands
         }
         self._status = axes.text(
@@ -172,36 +170,29 @@ class _Scene:
         self._status.set_text(f"reward −{row + 1}   {state}")
 
 
-def _figure(panels: Sequence[Panel], width: int) -> tuple[Any, list[_Scene]]:
+def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
-    corners = np.array([_box(panel.trajectory) for panel in panels])
+    movements = [panel.trajectory for panel in panels]
+    corners = np.array([_box(movement) for movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
     inches, count = width / _DPI, len(panels)
     height = (inches / count - _LEFT) * up / across + _ABOVE + _BELOW
     size = inches, 2 * round(height * _DPI / 2) / _DPI  # even in pixels, as MP4 wants it
-    share = 1 / count
+    wide, tall = 1 / count - (_LEFT + _RIGHT) / inches, 1 - (_ABOVE + _BELOW) / size[1]
     places = [
-        (
-            index * share + _LEFT / inches,
-            _BELOW / size[1],
-            share - (_LEFT + _RIGHT) / inches,
-            1 - (_ABOVE + _BELOW) / size[1],
-        )
-        for index in range(count)
+        (index / count + _LEFT / inches, _BELOW / size[1], wide, tall) for index in range(count)
     ]
     backdrop, figure = _empty(size, places, low, high), _empty(size, places, low, high)
     for axes, panel in zip(backdrop.axes, panels, strict=True):
         _dress(axes, panel)
-    backdrop.canvas.draw()
+    canvas: Any = FigureCanvasAgg(backdrop)
+    canvas.draw()
     # Axes take most of the time of drawing: they are drawn once, as a picture.
-    figure.figimage(np.asarray(backdrop.canvas.buffer_rgba()), zorder=-1)
+    figure.figimage(np.asarray(canvas.buffer_rgba()), zorder=-1)
     for axes in figure.axes:
         axes.set_axis_off()
-    scenes = [
-        _Scene(axes, panel.trajectory) for axes, panel in zip(figure.axes, panels, strict=True)
-    ]
-    return figure, scenes
+    return figure, [_Scene(*of) for of in zip(figure.axes, movements, strict=True)]
 
 
 def _empty(
@@ -209,12 +200,8 @@ def _empty(
     places: Sequence[tuple[float, float, float, float]],
     low: Array,
     high: Array,
-) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+) -> Figure:
     figure = Figure(figsize=size, dpi=_DPI)
-    FigureCanvasAgg(figure)
     for place in places:
         axes = figure.add_axes(place, aspect="equal")
         axes.set_xlim(low[0], high[0])
@@ -222,14 +209,12 @@ def _empty(
     return figure
 
 
-def _dress(axes: Any, panel: Panel) -> None:
+def _dress(axes: Axes, panel: Panel) -> None:
     """What stands still: title, scales, the goals' numbers."""
     task = panel.trajectory.task
     for number, (x, y) in enumerate(task.goals, 1):
-        axes.annotate(
-            str(number), (x, y + task.radius), (0, 3), textcoords="offset points",
-            ha="center", va="bottom", fontsize=9,
-        )  # fmt: skip
+        above: Any = {"textcoords": "offset points", "ha": "center", "va": "bottom"}
+        axes.annotate(str(number), (x, y + task.radius), (0, 3), fontsize=9, **above)
     axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
     axes.tick_params(labelsize=8)
     axes.spines[["top", "right"]].set_visible(False)
@@ -245,8 +230,6 @@ def _box(trajectory: Trajectory) -> tuple[Array, Array]:
 
 
 def _writer(path: Path, timed: Timing) -> Any:
-    from matplotlib.animation import FFMpegWriter, PillowWriter
-
     rate: Any = 1 / timed.interval_s
     if path.suffix.lower() == ".mp4":
         return FFMpegWriter(fps=rate, codec="h264")

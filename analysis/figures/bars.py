@@ -12,14 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
+from analysis.comparisons.paper import published_of
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot
-from analysis.figures.selection import CONDITIONS, has, known_tasks, missing, rewards_of, solved
+from analysis.figures.plot import Plot, spoken
+from analysis.figures.selection import CONDITIONS, has, missing, rewards_of, solved
 from analysis.figures.style import (
     GREY,
     INK,
     PAPER,
-    SMALL,
     column_width,
     dagger,
     heading,
@@ -40,30 +40,23 @@ STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 
 
 @styled
-def bars(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Mean learned reward of each method, as a bar from the initial solution up.
 
     By default the paper's conditions on the tasks where the folder has more than one of
     them. Each method is tested against the one to its left, the first against the initial
     solution: one-tailed bootstrap tests, adjusted over the figure by Holm. Raises
-    CoarticError where a task or all of a task's methods are missing.
+    CoarticError where there is no such task.
     """
-    found = known_tasks(study, tasks)
-    labels = {
-        name: [label for label in (methods or _conditions(name)) if has(study, name, label)]
-        for name in found
-    }
-    if tasks is None:
-        labels = {name: own for name, own in labels.items() if len(own) > (methods is None)}
-    empty = [name for name, own in labels.items() if not own]
-    if empty or not labels:
-        raise missing(
-            study,
-            f"no solved runs of {', '.join(methods or CONDITIONS)} on "
-            f"{', '.join(empty) or 'one task, more than one of them'}",
-        )
+    least = 2 if methods is None else 1
+    labels = {}
+    for name in study.tasks:
+        own = [label for label in (methods or _conditions(name)) if has(study, name, label)]
+        if len(own) >= least:
+            labels[name] = own
+    if not labels:
+        asked = ", ".join(methods or CONDITIONS)
+        raise missing(study, f"no solved runs of {asked} on one task, more than one of them")
     data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
     adjusted = holm(data.p.tolist())
     data = data.assign(p_holm=adjusted).reset_index(drop=True)
@@ -75,13 +68,9 @@ def bars(
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
-        axes.set_title(heading(found[name]))
+        axes.set_title(heading(study.tasks[name]))
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     letters(panels)
-    values = "; ".join(
-        f"{row['task']}, {short_name(row['method'])}: {row['reward']:.1f}"
-        for row in data.to_dict("records")
-    )
     return Plot(
         id="learned-reward",
         title="Learned reward by condition",
@@ -93,9 +82,9 @@ def bars(
             "bootstrap test that the mean is higher than what stands to the left "
             f"({RESAMPLES} resamples, seed {SEED}), Holm-adjusted over the figure: "
             "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
-            f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(found[name] for name in labels)}"
+            f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(study.tasks[name] for name in labels)}"
         ),
-        alt=f"Bars of mean learned reward with intervals. {values}.",
+        alt=f"Bars of mean learned reward with intervals. {spoken(data, 'reward', 1)}.",
         figure=figure,
         data=data,
     )
@@ -103,34 +92,25 @@ def bars(
 
 def _conditions(task: str) -> list[str]:
     """The paper's conditions on a task, or all of them on other tasks."""
-    printed = [label for label in CONDITIONS if _paper(task, label) is not None]
+    printed = [name for name in CONDITIONS if published_cell(task, name.removeprefix(LEARNER))]
     return printed or list(CONDITIONS)
-
-
-def _paper(task: str, label: str) -> Any:
-    return published_cell(task, label.removeprefix(LEARNER))
 
 
 def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     """The initial solution, then the methods, each tested against the row before."""
-    initial = -initial_solution(study, task).execution.ticks
+    initial = float(-initial_solution(study, task).execution.ticks)
     printed = published_initial(task)
+    published = float(printed[1]) if printed else math.nan
     rows: list[dict[str, Any]] = [
-        {
-            "task": task,
-            "method": "initial",
-            "reward": float(initial),
-            "published": float(printed[1]) if printed else math.nan,
-        }
+        {"task": task, "method": "initial", "reward": initial, "published": published}
     ]
-    before: Any = float(initial)
+    before: Any = initial
     for label in labels:
-        rewards = rewards_of(solved(study, task, label))
+        cell = solved(study, task, label)
+        rewards, paper = rewards_of(cell), published_of(cell)
         found = mean(rewards, seed=SEED)
-        cell = _paper(task, label) if label in CONDITIONS else None
-        summary = cell.summary if cell else None
-        half = _half(summary)
-        centre = summary.mean if summary else math.nan
+        summary = paper.summary if paper else None
+        centre, half = summary.mean if summary else math.nan, _half(summary)
         rows.append(
             {
                 "task": task,
@@ -162,27 +142,21 @@ def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     initial = float(rows.reward.iloc[0])
     style = looks(rows.method[1:])
     axes.axhline(initial, color=INK, linewidth=0.7, zorder=1)
+    bar: Any = {"bottom": initial, "edgecolor": INK, "linewidth": 0.5, "zorder": 1}
+    dot: Any = {"markersize": 1.6, "color": INK, "alpha": 0.55, "markeredgewidth": 0, "zorder": 3}
+    diamond: Any = {"markersize": 3.4, "color": INK, "markerfacecolor": PAPER, "zorder": 4}
     for place, row in enumerate(rows.to_dict("records")):
         if place:
-            label = row["method"]
-            axes.bar(
-                place, row["reward"] - initial, 0.62, bottom=initial, color=style[label].color,
-                edgecolor=INK, linewidth=0.5, zorder=1,
-            )  # fmt: skip
+            color = style[row["method"]].color
+            axes.bar(place, row["reward"] - initial, 0.62, color=color, **bar)
             _interval(axes, place - 0.16, row["reward"], row["low"], row["high"])
-            rewards = np.sort(runs[label])
+            rewards = np.sort(runs[row["method"]])
             offsets = 0.06 + 0.05 * (np.arange(len(rewards)) % 5)
-            axes.plot(
-                place + offsets, rewards, "o", markersize=1.6, color=INK, alpha=0.55,
-                markeredgewidth=0, zorder=3,
-            )  # fmt: skip
+            axes.plot(place + offsets, rewards, "o", **dot)
         if not math.isnan(row["published"]):
             x = place + (0.42 if place else 0.0)
             _interval(axes, x, row["published"], row["published_low"], row["published_high"])
-            axes.plot(
-                x, row["published"], "D", markersize=3.4, markerfacecolor=PAPER,
-                markeredgecolor=INK, zorder=4,
-            )  # fmt: skip
+            axes.plot(x, row["published"], "D", **diamond)
     _brackets(axes, rows, runs)
     names = ["initial", *(short_name(label) for label in rows.method[1:])]
     axes.set_xticks(range(len(rows)), names)
@@ -191,17 +165,15 @@ def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     if len(rows) > 5 or max(map(len, names)) > 9:
         axes.tick_params(axis="x", labelrotation=40)
         for text in axes.get_xticklabels():
-            text.set_horizontalalignment("right")
-            text.set_rotation_mode("anchor")
+            text.set(horizontalalignment="right", rotation_mode="anchor")
 
 
 def _interval(axes: Axes, x: float, value: float, low: float, high: float) -> None:
     if math.isnan(low):
         return
-    axes.errorbar(
-        x, value, [[value - low], [high - value]], color=INK, linewidth=0.8, capsize=1.8,
-        capthick=0.8, zorder=3,
-    )  # fmt: skip
+    ends = [[value - low], [high - value]]
+    line: Any = {"color": INK, "linewidth": 0.8, "capsize": 1.8, "capthick": 0.8, "zorder": 3}
+    axes.errorbar(x, value, ends, **line)
 
 
 def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
@@ -215,15 +187,11 @@ def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     level = -math.inf
     for place, p in enumerate(rows.p_holm.tolist()[1:], 1):
         level = max(tops[place - 1], tops[place], level) + 1.6 * step
-        axes.plot(
-            [place - 0.95, place - 0.95, place - 0.05, place - 0.05],
-            [level - 0.4 * step, level, level, level - 0.4 * step],
-            color=INK, linewidth=0.7,
-        )  # fmt: skip
-        axes.text(
-            place - 0.5, level, stars(p), ha="center", va="bottom", fontsize=SMALL,
-            color=INK if stars(p).startswith("*") else GREY,
-        )  # fmt: skip
+        left, right, foot = place - 0.95, place - 0.05, level - 0.4 * step
+        ends = [left, left, right, right], [foot, level, level, foot]
+        axes.plot(*ends, color=INK, linewidth=0.7)
+        color = INK if stars(p).startswith("*") else GREY
+        axes.text(place - 0.5, level, stars(p), ha="center", va="bottom", color=color)
     axes.set_ylim(bottom - 1.2 * step, level + 2.2 * step)
 
 

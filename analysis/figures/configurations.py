@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.figures.plot import Plot
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.figures.selection import missing, solved
-from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, number, styled
-from analysis.methods import LEARNER, short_name
+from analysis.figures.selection import CONDITIONS, missing, solved
+from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, entry, number, styled
+from analysis.methods import short_name
 from analysis.signatures.trajectories import Trajectories
 from coartic import Execution, Task, execute
 from coartic.robot import Array
@@ -29,16 +30,10 @@ Rows = Sequence[tuple[str, Sequence[str]]]
 PAPER: dict[str, tuple[str, Rows]] = {
     "configurations-one-armed": (
         "Figure 5",
-        (("ascending", (f"{LEARNER}EC1",)), ("descending", (f"{LEARNER}EC1",))),
+        (("ascending", CONDITIONS[:1]), ("descending", CONDITIONS[:1])),
     ),
-    "configurations-two-armed-1": (
-        "Figure 6",
-        (("two-armed-1", (f"{LEARNER}EC2", f"{LEARNER}EC3", f"{LEARNER}EC4")),),
-    ),
-    "configurations-two-armed-2": (
-        "Figure 7",
-        (("two-armed-2", (f"{LEARNER}EC3", f"{LEARNER}EC4")),),
-    ),
+    "configurations-two-armed-1": ("Figure 6", (("two-armed-1", CONDITIONS[1:]),)),
+    "configurations-two-armed-2": ("Figure 7", (("two-armed-2", CONDITIONS[2:]),)),
 }
 """Figures like the paper's: which one, and methods by task."""
 ROWS = 2
@@ -114,13 +109,12 @@ def typical_run(study: Study, task: str, label: str, hands: str | None = None) -
     return str(candidates.run_id.iloc[int(off.argmin())])
 
 
-def learned_solution(study: Study, task: str, label: str, run_id: str | None = None) -> Solution:
-    """A stored run's solution, executed again; the typical run's where none is named.
+def learned_solution(study: Study, task: str, label: str, run_id: str) -> Solution:
+    """A stored run's solution, executed again.
 
     Raises CoarticError for a run that is not a solved one of the cell.
     """
     good = solved(study, task, label).good
-    run_id = typical_run(study, task, label) if run_id is None else run_id
     if run_id not in set(good.run_id):
         raise missing(study, f"{run_id} is no solved run of {label} on {task}")
     solutions, paths = study.results.solutions(), study.results.paths()
@@ -151,20 +145,20 @@ def configurations(
     has a row for each of so many :func:`common_sequences`. Raises CoarticError for what the
     folder lacks.
     """
-    unknown = [task for task, _ in rows if task not in study.results.tasks]
+    unknown = [task for task, _ in rows if task not in study.tasks]
     if unknown:
         raise missing(study, f"no task {', '.join(unknown)}")
     shown: list[Solution] = []
     for task, methods in rows:
         shown.append(initial_solution(study, task))
         for label in methods:
-            own = (runs or {}).get((task, label))
-            if own is not None or sequences == 1:
-                shown.append(learned_solution(study, task, label, own))
-                continue
-            for hands in common_sequences(study, task, label, sequences):
-                run = typical_run(study, task, label, hands)
-                shown.append(learned_solution(study, task, label, run))
+            asked = (runs or {}).get((task, label))
+            if asked is not None or sequences == 1:
+                found = [asked or typical_run(study, task, label)]
+            else:
+                common = common_sequences(study, task, label, sequences)
+                found = [typical_run(study, task, label, hands) for hands in common]
+            shown += [learned_solution(study, task, label, run) for run in found]
     figure = _draw(shown)
     tasks = {solution.task.name: solution.task for solution in shown}
     named = "; ".join(
@@ -211,64 +205,55 @@ def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | No
 
 
 def _draw(shown: Sequence[Solution]) -> Figure:
-    columns = max(len(solution.task.goals) for solution in shown)
     end, gap, head, foot = 0.46, 0.08, 0.34, 0.3  # inches
-    wide = (TWO - end) / columns
-    corners = {}
-    for solution in shown:
-        own = [s for s in shown if s.task.name == solution.task.name]
-        corners[solution.task.name] = box(
-            solution.task,
-            [solution.task.q0, *(q for s in own for q in s.execution.configurations)],
-        )
+    wide = (TWO - end) / max(len(solution.task.goals) for solution in shown)
+    postures: dict[str, list[Array]] = {}
+    for s in shown:
+        postures.setdefault(s.task.name, [s.task.q0]).extend(s.execution.configurations)
+    corners = {s.task.name: box(s.task, postures[s.task.name]) for s in shown}
     extents = {name: high - low for name, (low, high) in corners.items()}
     scale = (wide - gap) / max(extent[0] for extent in extents.values())
-    heights = [scale * extents[solution.task.name][1] for solution in shown]
-    height = sum(heights) + head * len(shown) + foot
+    sizes = [scale * extents[s.task.name] for s in shown]
+    height = sum(size[1] for size in sizes) + head * len(shown) + foot
     figure = Figure(figsize=(TWO, height))
     top = height
-    several = len(extents) > 1
-    for solution, tall in zip(shown, heights, strict=True):
+    bold: Any = {"va": "top", "fontsize": NORMAL, "weight": "bold"}
+    for solution, (width, tall) in zip(shown, sizes, strict=True):
         task = solution.task
-        title = f"{task.label}: {solution.name}" if several else solution.name
-        figure.text(0.004, (top - 0.03) / height, title, va="top", fontsize=NORMAL, weight="bold")
+        title = f"{task.label}: {solution.name}" if len(extents) > 1 else solution.name
+        figure.text(0.004, (top - 0.03) / height, title, **bold)
         top -= head + tall
-        before: Array = task.q0
-        spent = solution.execution.ticks_by_goal()
-        hands = hands_of(solution.execution.hands)
-        width = scale * extents[task.name][0]
-        for index, q in enumerate(solution.execution.configurations):
-            axes = figure.add_axes(
-                ((index * wide + gap / 2) / TWO, top / height, width / TWO, tall / height)
-            )
-            axes.set_axis_off()
-            axes.set_xlim(corners[task.name][0][0], corners[task.name][1][0])
-            axes.set_ylim(corners[task.name][0][1], corners[task.name][1][1])
-            draw_robot(axes, task, before, color=GREY)
-            draw_goals(axes, task, current=index + 1)
-            draw_robot(axes, task, q, marked=(hands[index],))
-            axes.set_title(
-                f"goal {index + 1}: {hands[index]}, {number(-spent[index])}",
-                fontsize=SMALL,
-                pad=1,
-            )
-            before = q
-        figure.text(
-            1 - 0.02 / TWO,
-            (top + tall / 2) / height,
-            f"total\n{number(-solution.execution.ticks)}",
-            ha="right", va="center", fontsize=NORMAL,
-        )  # fmt: skip
-    before_entry = Line2D([], [], color=GREY, linewidth=0.9, label="before")
-    hands_shown = dict.fromkeys(hand for solution in shown for hand in solution.task.hands)
-    figure.legend(
-        handles=[*legend_entries(hands_shown), before_entry],
-        loc="lower center", ncols=4, fontsize=SMALL, borderaxespad=0.2,
-    )  # fmt: skip
+        panels = [
+            figure.add_axes(((k * wide + gap / 2) / TWO, top / height, width / TWO, tall / height))
+            for k in range(len(task.goals))
+        ]
+        _panels(panels, solution, *corners[task.name])
+        total = f"total\n{number(-solution.execution.ticks)}"
+        place = 1 - 0.02 / TWO, (top + tall / 2) / height
+        figure.text(*place, total, ha="right", va="center", fontsize=NORMAL)
+    before = entry("before", color=GREY, linewidth=0.9)
+    handles = legend_entries(hand for solution in shown for hand in solution.task.hands)
+    figure.legend(handles=[*handles, before], loc="lower center", ncols=4, borderaxespad=0.2)
     bar = np.array([0.08, 0.08 + scale]) / TWO
     figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=INK, linewidth=1.2))
-    figure.text(bar[1] + 0.04 / TWO, 0.13 / height, "1 length unit", va="center", fontsize=SMALL)
+    figure.text(bar[1] + 0.04 / TWO, 0.13 / height, "1 length unit", va="center")
     return figure
+
+
+def _panels(panels: Sequence[Axes], solution: Solution, low: Array, high: Array) -> None:
+    """One a goal: the posture that hits it and the one before."""
+    task, execution = solution.task, solution.execution
+    hands, ticks = hands_of(execution.hands), execution.ticks_by_goal()
+    before = task.q0
+    for k, (axes, q) in enumerate(zip(panels, execution.configurations, strict=True)):
+        axes.set_axis_off()
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        draw_robot(axes, task, before, color=GREY)
+        draw_goals(axes, task, current=k + 1)
+        draw_robot(axes, task, q, marked=(hands[k],))
+        axes.set_title(f"goal {k + 1}: {hands[k]}, {number(-ticks[k])}", fontsize=SMALL, pad=1)
+        before = q
 
 
 def _data(shown: Sequence[Solution]) -> pd.DataFrame:

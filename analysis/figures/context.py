@@ -5,27 +5,27 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from analysis.figures.bars import stars
 from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.selection import chosen, missing
 from analysis.figures.style import (
     BLUE,
     GREY,
-    INK,
     ONE,
     PAPER,
-    SMALL,
     TALLEST,
     VERMILLION,
+    entry,
+    legend,
     letters,
+    name_rows,
     styled,
 )
 from analysis.methods import short_name
@@ -35,31 +35,28 @@ if TYPE_CHECKING:
     from analysis.study import Study
 
 MOST = 6
+_OPEN: Any = {"marker": "s", "color": VERMILLION, "markerfacecolor": PAPER}
 _PARTS = {"motor-equivalent part": "equivalent", "non-motor-equivalent part": "other"}
 
 
 @styled
-def context(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Motor-equivalent and non-motor-equivalent part of the difference between contexts.
 
-    One panel for each goal that two tasks of the folder share before they differ, both
-    among ``tasks`` where these are named. Raises CoarticError where no method has runs on two
-    such tasks, or there are more than :data:`MOST` panels.
+    One panel for each goal that two tasks of the folder share before they differ. Raises
+    CoarticError where no method has runs on two such tasks, or there are more than
+    :data:`MOST` panels.
     """
-    data = _parts(study, methods, tasks)
+    data = _parts(study, methods)
     places = list(data.groupby(["task", "where"], sort=False))
     if len(places) > MOST:
-        raise missing(
-            study, f"{len(places)} pairs of tasks share a goal, more than {MOST}: name some tasks"
-        )
+        raise missing(study, f"{len(places)} pairs of tasks share a goal, more than {MOST}")
     rows = sum(len(group) + 4 for _, group in places)
     figure = Figure(figsize=(ONE, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
     heights = [len(group) + 1 for _, group in places]
-    panels = figure.subplots(len(places), 1, squeeze=False, sharex=True, height_ratios=heights)[
-        :, 0
-    ]
+    panels = figure.subplots(
+        len(places), squeeze=False, sharex=True, height_ratios=heights
+    ).ravel()
     farthest = float(data[["equivalent", "other"]].max().max()) or 1.0  # all the same: any scale
     for axes, ((task, where), group) in zip(panels, places, strict=True):
         _panel(axes, group)
@@ -68,7 +65,11 @@ def context(
     panels[-1].set_xlabel("difference per root of dimension\n(length unit, rad)")
     if len(places) > 1:
         letters(panels)
-    figure.legend(handles=_handles(), loc="outside lower center", ncols=2, fontsize=SMALL)
+    handles = [
+        entry("motor-equivalent", linestyle="", marker="o", color=BLUE),
+        entry("moves the hand", linestyle="", **_OPEN),
+    ]
+    legend(figure, handles, 2)
     words = "; ".join(
         f"{short_name(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
         for row in data.to_dict("records")
@@ -91,13 +92,10 @@ def context(
     )
 
 
-def _parts(
-    study: Study, methods: Sequence[str] | None, tasks: Sequence[str] | None
-) -> pd.DataFrame:
+def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:
     """One row a place and method: both parts, with p raw and adjusted over all rows."""
-    names, frame = set(known_tasks(study, tasks)), study.signatures
+    frame = study.signatures
     frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
-    frame = frame[frame.task.isin(names) & frame.against.isin(names)]
     labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
     frame = frame[frame.label.isin(labels)]
     if not len(frame):
@@ -113,43 +111,23 @@ def _parts(
     together = data[["p_equivalent", "p_other"]].to_numpy(dtype=float)
     adjusted = np.reshape(holm(together.ravel().tolist()), together.shape)
     data = data.assign(holm_equivalent=adjusted[:, 0], holm_other=adjusted[:, 1])
-    order = {label: place for place, label in enumerate(labels)}
-    data = data.assign(order=data.method.map(order)).sort_values(
-        ["task", "where", "order"], kind="stable"
+    return data.sort_values(
+        ["task", "where", "method"],
+        kind="stable",
+        key=lambda column: column.map(labels.index) if column.name == "method" else column,
+        ignore_index=True,
     )
-    return data.drop(columns="order").reset_index(drop=True)
 
 
 def _panel(axes: Axes, data: pd.DataFrame) -> None:
     for place, row in enumerate(data.to_dict("records")):
         values = [row["other"], row["equivalent"]]
         axes.plot(values, [-place, -place], color=GREY, linewidth=0.8, zorder=1)
-        axes.plot(
-            row["other"],
-            -place,
-            "s",
-            color=VERMILLION,
-            markerfacecolor=PAPER,
-            markersize=4,
-            clip_on=False,
-        )
+        axes.plot(row["other"], -place, linestyle="", markersize=4, clip_on=False, **_OPEN)
         axes.plot(row["equivalent"], -place, "o", color=BLUE, markersize=4, clip_on=False)
         if not math.isnan(row["p_equivalent"]):
-            axes.annotate(
-                stars(row["holm_equivalent"]), (max(values), -place), (5, -0.5),
-                textcoords="offset points", va="center", fontsize=SMALL, color=INK,
-            )  # fmt: skip
-    axes.set_yticks([-place for place in range(len(data))], [short_name(m) for m in data.method])
+            mark, end = stars(row["holm_equivalent"]), (max(values), -place)
+            axes.annotate(mark, end, (5, -0.5), textcoords="offset points", va="center")
+    name_rows(axes, [short_name(method) for method in data.method])
     axes.set_ylim(-len(data) + 0.4, 0.6)
     axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.4)
-    axes.tick_params(axis="y", length=0)
-
-
-def _handles() -> list[Line2D]:
-    return [
-        Line2D([], [], linestyle="", marker="o", color=BLUE, label="motor-equivalent"),
-        Line2D(
-            [], [], linestyle="", marker="s", color=VERMILLION, markerfacecolor=PAPER,
-            label="moves the hand",
-        ),
-    ]  # fmt: skip

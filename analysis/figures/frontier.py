@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from analysis.comparisons.progress import SPENDS
-from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, known_tasks, missing
+from analysis.figures.plot import Plot, spoken
+from analysis.figures.selection import chosen, missing
 from analysis.figures.style import (
     INK,
-    SMALL,
-    TWO,
+    OPTIMUM,
     dagger,
-    grid,
-    heading,
-    letters,
+    entry,
+    legend,
     log_axis,
     looks,
     percent,
     styled,
+    task_panels,
 )
 from analysis.methods import short_name
 from analysis.statistics.estimates import CONFIDENCE
@@ -41,45 +39,30 @@ NAMES = {
     "forward_kinematics": "forward-kinematics evaluations",
     "solve_s": "solve time (s)",
 }
+_MARK: Any = {"markersize": 4, "markeredgewidth": 0.4, "markeredgecolor": INK}
+_RING: Any = {"color": INK, "markerfacecolor": "none"}
 
 
 @styled
-def frontier(
-    study: Study,
-    *,
-    spends: Sequence[str] = SPENDS,
-    methods: Sequence[str] | None = None,
-    tasks: Sequence[str] | None = None,
-) -> list[Plot]:
+def frontier(study: Study, *, methods: Sequence[str] | None = None) -> list[Plot]:
     """Best reward so far against each spend, one figure a spend, one panel a task.
 
     Methods that plan are a point at all that they spend; those that spend nothing of a kind
-    stand at the left edge. Raises CoarticError where there is nothing to draw and ValueError
-    for a spend that is not one of :data:`analysis.comparisons.progress.SPENDS`.
+    stand at the left edge. Raises CoarticError where there is nothing to draw.
     """
-    unknown = [spend for spend in spends if spend not in SPENDS]
-    if unknown:
-        raise ValueError(f"unknown spends {unknown}; known: {list(SPENDS)}")
-    found = known_tasks(study, tasks)
-    labels = [
-        label for label in chosen(study, list(found), methods) if not label.startswith(SEARCH)
-    ]
+    found = study.tasks
+    labels = [name for name in chosen(study, list(found), methods) if not name.startswith(SEARCH)]
     frame = study.anytime
     frame = frame[frame.task.isin(found) & frame.method.isin(labels) & frame["mean"].notna()]
-    pareto = study.pareto
-    front = pareto[pareto.front.astype(bool)][["task", "method", "spend"]]
+    keys = ["task", "method", "spend"]
+    front = pd.MultiIndex.from_frame(study.pareto[study.pareto.front.astype(bool)][keys])
+    frame = frame.assign(front=pd.MultiIndex.from_frame(frame[keys]).isin(front))
     plots = []
-    for spend in spends:
-        rows = frame[frame.spend == spend]
-        if not len(rows):
-            continue
-        ends = front[front.spend == spend]
-        on_front = set(zip(ends.task, ends.method, strict=True))
-        data = rows.assign(
-            front=[pair in on_front for pair in zip(rows.task, rows.method, strict=True)]
-        ).reset_index(drop=True)
-        shown = {name: task for name, task in found.items() if name in set(data.task)}
-        plots.append(_plot(study, spend, data, shown, labels))
+    for spend in SPENDS:
+        data = frame[frame.spend == spend].reset_index(drop=True)
+        if len(data):
+            shown = {name: task for name, task in found.items() if name in set(data.task)}
+            plots.append(_plot(study, spend, data, shown, labels))
     if not plots:
         raise missing(study, "no run of the methods has a solution and a known spend")
     return plots
@@ -89,30 +72,19 @@ def _plot(
     study: Study, spend: str, data: pd.DataFrame, tasks: dict[str, Task], labels: Sequence[str]
 ) -> Plot:
     present = [label for label in labels if label in set(data.method)]
-    legend = 0.15 * math.ceil((len(present) + 2) / 4)
-    rows, columns, height = grid(len(tasks), 2.1, 0.25 + legend)
-    figure = Figure(figsize=(TWO, height), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    for axes in panels[len(tasks) :]:
-        axes.set_axis_off()
+    below = 0.25 + 0.15 * math.ceil((len(present) + 2) / 4)
+    figure, panels = task_panels(
+        tasks.values(), 2.1, below, NAMES[spend], "best reward so far (ticks)", sharex=True
+    )
     positive = data.budget[data.budget > 0]
     left = 10 ** math.floor(math.log10(positive.min())) if len(positive) else 1.0
     edge = left if (data.budget > 0).all() else 0.6 * left
-    for place, (axes, task) in enumerate(zip(panels, tasks.values(), strict=False)):
-        optimum = study.optima.get((task.name, "free"))
-        _panel(
-            axes, data[data.task == task.name], present, edge, optimum.reward if optimum else None
-        )
-        axes.set_title(heading(task))
-        axes.set_ylabel("" if place % columns else "best reward so far (ticks)")
-        axes.set_xlabel(NAMES[spend] if place + columns >= len(tasks) else "")
+    for axes, task in zip(panels, tasks, strict=True):
+        optimum = study.optima.get((task, "free"))
+        _panel(axes, data[data.task == task], present, edge, optimum.reward if optimum else None)
     panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
-    letters(panels[: len(tasks)])
     _legend(figure, data, present)
-    ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
-    words = "; ".join(
-        f"{row['task']}, {short_name(row['method'])}: {row['mean']:.0f}" for row in ends
-    )
+    ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "mean")
     return Plot(
         id=f"frontier-{spend.replace('_', '-')}",
         title=f"Reward against {NAMES[spend]}",
@@ -125,7 +97,7 @@ def _plot(
             "optimum with all joints free. Rewards far below are cut off, marks there stand at "
             f"the lower edge.{dagger(tasks.values())}"
         ),
-        alt=f"Curves of reward against {NAMES[spend]}. Last means: {words}.",
+        alt=f"Curves of reward against {NAMES[spend]}. Last means: {ends}.",
         figure=figure,
         data=data,
     )
@@ -149,41 +121,30 @@ def _panel(
             axes.step(
                 rows.budget, rows["mean"], where="post", color=look.color, linestyle=look.dash
             )
-            axes.fill_between(
-                rows.budget, rows.low, rows.high, step="post", color=look.color, alpha=0.2,
-                linewidth=0,
-            )  # fmt: skip
+            band: Any = {"step": "post", "color": look.color, "alpha": 0.2, "linewidth": 0}
+            axes.fill_between(rows.budget, rows.low, rows.high, **band)
         last = rows.iloc[-1]
         x, y = max(last.budget, edge), max(last["mean"], low)
-        axes.plot(
-            x, y, look.marker, color=look.color, markersize=4, clip_on=False, zorder=4,
-            markeredgewidth=0.4, markeredgecolor=INK,
-        )  # fmt: skip
+        axes.plot(x, y, look.marker, color=look.color, clip_on=False, zorder=4, **_MARK)
         if last.front:
             axes.plot(
-                x, y, "o", markersize=8, markerfacecolor="none", color=INK, clip_on=False,
-                markeredgewidth=0.7, zorder=5,
-            )  # fmt: skip
+                x, y, "o", markersize=8, markeredgewidth=0.7, clip_on=False, zorder=5, **_RING
+            )
     if optimum is not None:
-        axes.axhline(optimum, color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)))
+        axes.axhline(optimum, **OPTIMUM)
 
 
 def _legend(figure: Figure, data: pd.DataFrame, labels: Sequence[str]) -> None:
-    style = looks(labels)
     curves = set(data[data.kind == "curve"].method)
     handles = [
-        Line2D(
-            [], [], color=style[label].color, marker=style[label].marker, markersize=4,
-            linestyle=style[label].dash if label in curves else "", markeredgecolor=INK,
-            markeredgewidth=0.4, label=short_name(label),
+        entry(
+            short_name(label),
+            color=look.color,
+            linestyle=look.dash if label in curves else "",
+            marker=look.marker,
+            **_MARK,
         )
-        for label in labels
-    ]  # fmt: skip
-    ring = Line2D(
-        [], [], color=INK, linestyle="", marker="o", markersize=7, markerfacecolor="none",
-        label="Pareto front",
-    )  # fmt: skip
-    line = Line2D([], [], color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)), label="optimum")
-    figure.legend(
-        handles=[*handles, ring, line], loc="outside lower center", ncols=4, fontsize=SMALL
-    )
+        for label, look in looks(labels).items()
+    ]
+    ring = entry("Pareto front", linestyle="", marker="o", markersize=7, **_RING)
+    legend(figure, [*handles, ring, entry("optimum", **OPTIMUM)], 4)

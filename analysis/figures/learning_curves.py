@@ -9,23 +9,20 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot
-from analysis.figures.selection import CONDITIONS, has, known_tasks, missing
+from analysis.figures.plot import Plot, spoken
+from analysis.figures.selection import CONDITIONS, has, missing
 from analysis.figures.style import (
-    GREY,
-    INK,
-    SMALL,
-    TWO,
+    INITIAL,
+    OPTIMUM,
     dagger,
-    grid,
-    heading,
-    letters,
+    entry,
+    legend,
     log_axis,
     looks,
     styled,
+    task_panels,
 )
 from analysis.methods import short_name
 from coartic import CoarticError, Task
@@ -41,28 +38,17 @@ _DEFAULT = (*CONDITIONS, "random-search/climbing", "cma-es/bandit")
 
 
 @styled
-def learning_curves(
-    study: Study,
-    *,
-    methods: Sequence[str] | None = None,
-    tasks: Sequence[str] | None = None,
-    log: bool = True,
-    window: int = WINDOW,
-) -> Plot:
+def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Reward of methods that learn by trial, one panel a task.
 
-    By default the learner's conditions, hill climbing and CMA-ES. ``log``: trials on a
-    logarithmic axis. ``window``: trials averaged. Raises CoarticError where there is nothing
-    to draw and ValueError for a window below 1.
+    By default the learner's conditions, hill climbing and CMA-ES. Raises CoarticError where
+    there is nothing to draw.
     """
-    if window < 1:
-        raise ValueError(f"window {window}: it is a number of trials, at least 1")
-    found = known_tasks(study, tasks)
     learning = study.results.learning()
     by_run = {str(run): rows for run, rows in learning.groupby("run_id", sort=False)}
     parts = [
-        _curves(study, name, label, by_run, log=log, window=window)
-        for name in found
+        _curves(study, name, label, by_run)
+        for name in study.tasks
         for label in (methods or _default(study, name))
         if has(study, name, label)
     ]
@@ -70,35 +56,25 @@ def learning_curves(
     if not parts:
         raise missing(study, f"no run of {', '.join(methods or _DEFAULT)} that learns by trial")
     data = pd.concat(parts, ignore_index=True)
-    shown = {name: found[name] for name in data.task.unique()}
+    shown = {name: study.tasks[name] for name in data.task.unique()}
     asked = list(methods or _DEFAULT)
     labels = sorted(data.method.unique(), key=asked.index)
-    rows, columns, height = grid(len(shown), 2.15, 0.45)
-    figure = Figure(figsize=(TWO, height), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[len(shown) :]:
-        axes.set_axis_off()
-    for place, (axes, task) in enumerate(zip(panels, shown.values(), strict=False)):
-        _panel(axes, study, task, data[data.task == task.name], labels, log=log)
-        axes.set_ylabel("" if place % columns else "reward (ticks)")
-        axes.set_xlabel("trial" if place + columns >= len(shown) else "")
-    letters(panels[: len(shown)])
+    figure, panels = task_panels(shown.values(), 2.15, 0.45, "trial", "reward (ticks)")
+    for axes, task in zip(panels, shown.values(), strict=True):
+        _panel(axes, study, task, data[data.task == task.name], labels)
     _legend(figure, labels)
-    ends = data.groupby(["task", "method"], sort=False).tail(1).to_dict("records")
-    words = "; ".join(
-        f"{row['task']}, {short_name(row['method'])}: {row['best']:.0f}" for row in ends
-    )
+    ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "best")
     return Plot(
         id="learning-curves",
         title="Learning curves",
         caption=(
             "Best reward so far (thick; mean over runs, band: middle half of the runs) and "
             "reward of the trials themselves (thin; mean over runs, averaged over the last "
-            f"{window} trials, fewer at the start; failed trials are left out). Dash-dotted: "
+            f"{WINDOW} trials, fewer at the start; failed trials are left out). Dash-dotted: "
             "initial solution; dotted: optimum with all joints free. Axes are cut below where "
             f"trials fall far short of the initial solution.{dagger(shown.values())}"
         ),
-        alt=f"Curves of reward against trial. Mean best reward at the end: {words}.",
+        alt=f"Curves of reward against trial. Mean best reward at the end: {ends}.",
         figure=figure,
         data=data,
     )
@@ -112,15 +88,7 @@ def _default(study: Study, task: str) -> list[str]:
     return others if two else labels
 
 
-def _curves(
-    study: Study,
-    task: str,
-    label: str,
-    by_run: dict[str, pd.DataFrame],
-    *,
-    log: bool,
-    window: int,
-) -> pd.DataFrame:
+def _curves(study: Study, task: str, label: str, by_run: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Both curves of a method at chosen trials; empty where it does not learn by trial."""
     ids = [str(run) for run in study.cells[task, label].good.run_id if str(run) in by_run]
     if not ids:
@@ -130,9 +98,7 @@ def _curves(
     rewards = np.array([run[:length] for run in runs])
     best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards), axis=1)
     best[np.isinf(best)] = np.nan
-    running = _running(rewards, window)
-    spaced = np.geomspace(1, length, POINTS) if log else np.linspace(1, length, POINTS)
-    at = np.unique(np.round(spaced).astype(np.int64))
+    at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
     # Until every run has a solution there is no mean of them.
     low, high = np.quantile(best[:, at - 1], [0.25, 0.75], axis=0)
     return pd.DataFrame(
@@ -144,25 +110,22 @@ def _curves(
             "best": best[:, at - 1].mean(axis=0),
             "best_low": low,
             "best_high": high,
-            "trials": running[at - 1],
+            "trials": _running(rewards)[at - 1],
         }
     )
 
 
-def _running(rewards: Array, window: int) -> Array:
-    """Mean of the last ``window`` trials of all runs: (runs, n) to (n,), NaN where none."""
-    known = ~np.isnan(rewards)
-    total = np.concatenate([[0.0], np.cumsum(np.where(known, rewards, 0.0).sum(axis=0))])
-    count = np.concatenate([[0], np.cumsum(known.sum(axis=0))])
-    end = np.arange(1, rewards.shape[1] + 1)
-    start = np.maximum(end - window, 0)
-    trials = count[end] - count[start]
-    sums = total[end] - total[start]
-    return np.where(trials > 0, sums / np.maximum(trials, 1), np.nan)
+def _running(rewards: Array) -> Array:
+    """Mean of the last trials of all runs: (runs, n) to (n,), NaN where none."""
+    sums, counts = (
+        pd.Series(values.sum(axis=0)).rolling(WINDOW, min_periods=1).sum()
+        for values in (np.nan_to_num(rewards), ~np.isnan(rewards))
+    )
+    return (sums / counts).to_numpy()
 
 
 def _panel(
-    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str], *, log: bool
+    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
 ) -> None:
     style = looks(labels)
     for label, rows in data.groupby("method", sort=False):
@@ -178,32 +141,22 @@ def _panel(
     except CoarticError:
         initial = None
     if initial is not None:
-        axes.axhline(initial, color=GREY, linewidth=0.8, linestyle=(0, (5, 1.2, 1, 1.2)))
+        axes.axhline(initial, **INITIAL)
         floor, top = initial, max(top, initial)
     optimum = study.optima.get((task.name, "free"))
     if optimum is not None:
-        axes.axhline(optimum.reward, color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)))
+        axes.axhline(optimum.reward, **OPTIMUM)
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
-    if log:
-        log_axis(axes)
+    log_axis(axes)
     axes.set_xlim(1, max(2, data.trial.max()))
-    axes.set_title(heading(task))
 
 
 def _legend(figure: Figure, labels: Sequence[str]) -> None:
-    style = looks(labels)
     handles = [
-        Line2D([], [], color=style[label].color, linestyle=style[label].dash, linewidth=1.3,
-               label=short_name(label))
-        for label in labels
-    ]  # fmt: skip
-    handles += [
-        Line2D(
-            [], [], color=GREY, linewidth=0.8, linestyle=(0, (5, 1.2, 1, 1.2)), label="initial"
-        ),
-        Line2D([], [], color=INK, linewidth=0.8, linestyle=(0, (1, 1.2)), label="optimum"),
+        entry(short_name(label), color=look.color, linestyle=look.dash, linewidth=1.3)
+        for label, look in looks(labels).items()
     ]
-    columns = min(len(handles), 4)
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=SMALL)
+    handles += [entry("initial", **INITIAL), entry("optimum", **OPTIMUM)]
+    legend(figure, handles, min(len(handles), 4))

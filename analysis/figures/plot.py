@@ -17,6 +17,7 @@ from PIL import Image
 
 from analysis.figures.style import GREY, INK, PAPER, RC
 from analysis.figures.svg import compact
+from analysis.methods import short_name
 from coartic import CoarticError
 from coartic.files import write_atomically
 from coartic.text import one_line, printed
@@ -49,6 +50,14 @@ class Plot:
     """What is drawn, tidy: enough to draw it again."""
 
 
+def spoken(rows: pd.DataFrame, value: str, digits: int = 0) -> str:
+    """Task, method and a value of each row, for an alternative text."""
+    return "; ".join(
+        f"{row['task']}, {short_name(row['method'])}: {row[value]:.{digits}f}"
+        for row in rows.to_dict("records")
+    )
+
+
 def picture(plot: Plot, ending: str) -> bytes:
     """The figure as a file with this ending, one of :data:`FORMATS`.
 
@@ -72,17 +81,6 @@ def rendered(plot: Plot, endings: Collection[str] = FILES) -> dict[str, bytes]:
         table = plot.data.to_csv(index=False, lineterminator="\n", float_format="%.8g")
         files[f"{plot.id}.csv"] = table.encode()
     return files
-
-
-def write(plot: Plot, path: Path) -> None:
-    """Write the figure alone to ``path`` in the format of its ending (:data:`FORMATS`).
-
-    Raises CoarticError for other endings and OSError where it cannot be written.
-    """
-    ending = path.suffix.lower()
-    if ending not in FORMATS:
-        raise CoarticError(f"{path}: the name of a figure must end in {', '.join(FORMATS)}")
-    write_atomically(path, picture(plot, ending))
 
 
 def save(plot: Plot, folder: Path) -> list[Path]:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from analysis.comparisons.overall import REACHED, by_task, normalised_scores
 from analysis.figures.plot import Plot
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
-from analysis.figures.style import SMALL, TWO, Look, letters, looks, percent, styled
+from analysis.figures.style import (
+    TWO,
+    Look,
+    entry,
+    legend,
+    letters,
+    looks,
+    percent,
+    styled,
+)
 from analysis.methods import short_name
 from analysis.statistics.across_tasks import profile
 from analysis.statistics.estimates import CONFIDENCE, SEED
-from coartic import CoarticError
-from coartic.robot import Array
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -35,7 +41,8 @@ _SHOWN = {
     "trajectory-optimisation/path-length",
     "trajectory-optimisation/jerk",
 }
-FARTHEST = 0.16  # gap to the optimum at the right end of the performance profile
+_FARTHEST = {"score": 1.0, "gap": 0.16}
+"""Right end of the score profile, and of the performance profile (gap to the optimum)."""
 
 
 @styled
@@ -55,24 +62,21 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     joined = scores[scores.method == scores.task.map(learners)].assign(method=LEARNER)
     scores = pd.concat([joined, scores], ignore_index=True)
     if methods is None:
-        labels = (
-            [
-                label
-                for label in chosen(study, tasks, None)
-                if label in _SHOWN or label not in HEADLINES
-            ]
-            if tasks
-            else []
-        )
-        labels = [LEARNER, *labels]
+        defaults = chosen(study, tasks, None) if tasks else []
+        labels = [
+            LEARNER,
+            *(label for label in defaults if label in _SHOWN or label not in HEADLINES),
+        ]
     else:
         known_methods(study, [label for label in methods if label != LEARNER])
         labels = list(methods)
     everywhere = [label for label in labels if set(by_task(scores, label)) == set(tasks)]
-    if not tasks or not everywhere:
-        raise _incomplete(study, tasks, [label for label in labels if label not in everywhere])
-    data = pd.concat([_profiles(scores, label) for label in everywhere], ignore_index=True)
+    if not tasks:
+        raise missing(study, "no task with a known optimum and an initial solution below it")
     names = ", ".join(tasks)
+    if not everywhere:
+        raise missing(study, f"no runs on every one of {names}: {', '.join(labels)}")
+    data = pd.concat([_profiles(scores, label) for label in everywhere], ignore_index=True)
     absent = [short_name(label) for label in methods or () if label not in everywhere]
     ends = data[(data.kind == "gap") & (data.threshold.round(6) == 0.05)]
     words = "; ".join(
@@ -97,40 +101,14 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     )
 
 
-def _incomplete(study: Study, tasks: Sequence[str], labels: Sequence[str]) -> CoarticError:
-    if not tasks:
-        return missing(study, "no task with a known optimum and an initial solution below it")
-    return missing(
-        study, f"no runs on every one of {', '.join(tasks)}: {', '.join(labels) or 'any method'}"
-    )
-
-
 def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
     parts = []
-    thresholds: dict[str, Array] = {
-        "score": np.linspace(0.0, 1.0, POINTS),
-        "gap": np.linspace(0.0, FARTHEST, POINTS),
-    }
-    for kind, levels in thresholds.items():
-        found = profile(
-            by_task(scores, label, kind),
-            levels,
-            REACHED[kind],
-            seed=SEED,
-        )
-        parts.append(
-            pd.DataFrame(
-                {
-                    "method": label,
-                    "kind": kind,
-                    "threshold": levels,
-                    "share": found.share,
-                    "low": found.low,
-                    "high": found.high,
-                    "runs": sum(found.n),
-                }
-            )
-        )
+    for kind, farthest in _FARTHEST.items():
+        levels = np.linspace(0.0, farthest, POINTS)
+        found = profile(by_task(scores, label, kind), levels, REACHED[kind], seed=SEED)
+        curve = {"share": found.share, "low": found.low, "high": found.high}
+        named = {"method": label, "kind": kind, "threshold": levels}
+        parts.append(pd.DataFrame({**named, **curve, "runs": sum(found.n)}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -145,34 +123,31 @@ def _looks(labels: Sequence[str]) -> dict[str, Look]:
 
 
 def _draw(data: pd.DataFrame, labels: Sequence[str]) -> Figure:
-    style = _looks(labels)
+    lines: dict[str, Any] = {
+        label: {
+            "color": look.color,
+            "linestyle": look.dash,
+            "linewidth": 1.6 if label == LEARNER else 0.9,
+        }
+        for label, look in _looks(labels).items()
+    }
     rows = -(-len(labels) // 3)
     figure = Figure(figsize=(TWO, 2.35 + 0.15 * rows), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, (kind, curves) in zip(panels, data.groupby("kind", sort=False), strict=True):
         for label, own in curves.groupby("method", sort=False):
-            look = style[str(label)]
-            width = 1.6 if label == LEARNER else 0.9
-            axes.plot(
-                own.threshold, own.share, color=look.color, linestyle=look.dash, linewidth=width
-            )
+            line = lines[str(label)]
+            axes.plot(own.threshold, own.share, **line)
             if (own.low < own.high).any():
-                axes.fill_between(
-                    own.threshold, own.low, own.high, color=look.color, alpha=0.15, linewidth=0
-                )
-        axes.set_xlim(0, 1 if kind == "score" else FARTHEST)
-        axes.set_ylim(-0.02, 1.02)
-        axes.set_xlabel(
-            "normalised score above" if kind == "score" else "gap to the optimum at most"
-        )
-        axes.set_title("Score" if kind == "score" else "Gap")
+                band: Any = {"color": line["color"], "alpha": 0.15, "linewidth": 0}
+                axes.fill_between(own.threshold, own.low, own.high, **band)
+        axes.set_xlim(0, _FARTHEST[str(kind)])
+        axes.set_title(str(kind).capitalize())
+    panels[0].set_ylim(-0.02, 1.02)  # shared
     panels[0].set_ylabel("share of runs")
+    panels[0].set_xlabel("normalised score above")
+    panels[1].set_xlabel("gap to the optimum at most")
     panels[1].set_xticks([0, 0.05, 0.1, 0.15], ["0", "5 %", "10 %", "15 %"])
     letters(panels)
-    handles = [
-        Line2D([], [], color=style[label].color, linestyle=style[label].dash,
-               linewidth=1.6 if label == LEARNER else 0.9, label=_name(label))
-        for label in labels
-    ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL)
+    legend(figure, [entry(_name(label), **lines[label]) for label in labels], 3)
     return figure

@@ -11,24 +11,26 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from analysis.figures.plot import Plot
-from analysis.figures.selection import CONDITIONS, has, known_tasks, missing, solved
+from analysis.figures.selection import CONDITIONS, missing
 from analysis.figures.style import (
     BLUE,
     GREY,
     INK,
     ONE,
     PAPER,
-    SMALL,
     VERMILLION,
     dagger,
+    name_rows,
     percent,
     styled,
 )
-from analysis.methods import LEARNER, short_name
-from analysis.published import TRIALS, Summary, published_cell
-from analysis.statistics.equivalence import MARGIN, difference
+from analysis.methods import short_name
+from analysis.published import TRIALS, Summary
+from analysis.statistics.equivalence import MARGIN, Equivalence
 from analysis.statistics.estimates import CONFIDENCE
+from coartic.robot import Array
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -41,21 +43,21 @@ _MARKS = {
 
 
 @styled
-def published(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def published(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Difference of every mean reward to the printed one, with interval and margin.
 
     Cells with the paper's number of trials, by default of its conditions; where it reports
     hand sequences, those too. Raises CoarticError where the folder has none of the paper's cells.
     """
-    found, labels = known_tasks(study, tasks), methods or CONDITIONS
+    found, labels = study.tasks, methods or CONDITIONS
+    places = [(name, label) for name in found for label in labels]
+    whole = {(row.cell.task, row.cell.label): row for row in paper_rows(study) if row.comparable}
+    sequences = sequence_rows(study)
     rows = [
         row
-        for name in found
-        for label in labels
-        if has(study, name, label)
-        for row in _rows(study, name, label)
+        for place in places
+        if place in whole and len(whole[place].rewards)
+        for row in _rows(whole[place], sequences)
     ]
     if not rows:
         raise missing(
@@ -66,7 +68,7 @@ def published(
     data = pd.DataFrame(rows)
     figure = Figure(figsize=(ONE, 0.85 + 0.185 * len(data)), layout="constrained")
     axes = figure.subplots()
-    _draw(axes, data, {name: task.reconstructed != () for name, task in found.items()})
+    _draw(axes, data, {name: name + " †" * bool(own.reconstructed) for name, own in found.items()})
     shown = {name: found[name] for name in data.task.unique()}
     words = "; ".join(
         f"{row['task']}, {short_name(row['method'])} {row['hands']}".strip()
@@ -94,58 +96,48 @@ def published(
     )
 
 
-def _rows(study: Study, task: str, label: str) -> list[dict[str, Any]]:
-    paper = published_cell(task, label.removeprefix(LEARNER))
-    good = solved(study, task, label).good
-    if paper is None or not bool((good.trials == TRIALS).all()):
-        return []
-    rows = []
+def _rows(whole: PaperRow, sequences: Sequence[SequenceRow]) -> list[dict[str, Any]]:
+    """A cell, then each hand sequence that the paper prints a reward of, where it tells them."""
+    paper, rows = whole.paper, []
     if paper.summary is not None:
-        rows.append(_row(task, label, "", good, len(good), paper.summary, paper.summary.runs))
-    if len(paper.sequences) > 1:
-        for sequence in paper.sequences:
-            if sequence.summary is not None:
-                own = good[good.hands == sequence.hands]
-                rows.append(
-                    _row(
-                        task, label, sequence.hands, own, len(good), sequence.summary,
-                        sequence.runs,
-                    )
-                )  # fmt: skip
+        rows.append(
+            _row(whole, "", paper.summary, paper.summary.runs, whole.rewards, whole.difference)
+        )
+    for own in sequences:
+        if own.cell is whole.cell and own.published is not None and len(paper.sequences) > 1:
+            found = own.rewards, own.difference
+            rows.append(_row(whole, own.hands, own.published, own.published_runs, *found))
     return rows
 
 
 def _row(
-    task: str, label: str, hands: str, runs: pd.DataFrame, of: int, paper: Summary,
+    whole: PaperRow,
+    hands: str,
+    paper: Summary,
     paper_runs: int | None,
-) -> dict[str, Any]:  # fmt: skip
-    rewards = runs.reward.to_numpy(dtype=np.float64)
-    row: dict[str, Any] = {
-        "task": task,
-        "method": label,
+    rewards: Array,
+    found: Equivalence | None,
+) -> dict[str, Any]:
+    return {
+        "task": whole.cell.task,
+        "method": whole.cell.label,
         "hands": hands,
         "runs": len(rewards),
-        "of_runs": of,
+        "of_runs": len(whole.rewards),
         "reward": float(rewards.mean()) if len(rewards) else math.nan,
         "published": paper.mean,
         "published_sd": math.nan if paper.sd is None else paper.sd,
         "published_runs": paper_runs,
         "pooled": paper.derived,
         "margin": MARGIN * abs(paper.mean),
-    }
-    if not len(rewards):
-        return row | dict.fromkeys(("difference", "low", "high"), math.nan) | {"verdict": ""}
-    found = difference(rewards, paper)
-    verdict = "" if math.isnan(found.low) else found.verdict
-    return row | {
-        "difference": found.estimate,
-        "low": found.low,
-        "high": found.high,
-        "verdict": verdict,
+        "difference": found.estimate if found else math.nan,
+        "low": found.low if found else math.nan,
+        "high": found.high if found else math.nan,
+        "verdict": found.verdict if found and not math.isnan(found.low) else "",
     }
 
 
-def _draw(axes: Axes, data: pd.DataFrame, reconstructed: dict[str, bool]) -> None:
+def _draw(axes: Axes, data: pd.DataFrame, marked: dict[str, str]) -> None:
     names = []
     for place, row in enumerate(data.to_dict("records")):
         y = -place
@@ -157,22 +149,18 @@ def _draw(axes: Axes, data: pd.DataFrame, reconstructed: dict[str, bool]) -> Non
                 axes.plot([row["low"], row["high"]], [y, y], color=color, linewidth=1.0)
             axes.plot(value, y, marker, color=color, markersize=4, markerfacecolor=face)
         if not row["runs"]:
-            axes.text(
-                1.3 * row["margin"], y, "never found here", va="center", fontsize=SMALL, color=GREY
-            )
+            axes.text(1.3 * row["margin"], y, "never found here", va="center", color=GREY)
         if row["hands"]:
             printed = "" if row["published_runs"] is None else f"; {row['published_runs']:.0f}"
             names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
         else:
-            dagger_ = " †" if reconstructed[row["task"]] else ""
             star = "*" if row["pooled"] else ""
-            names.append(f"{row['task']}{dagger_}, {short_name(row['method'])}{star}")
+            names.append(f"{marked[row['task']]}, {short_name(row['method'])}{star}")
     axes.axvline(0, color=INK, linewidth=0.6)
-    axes.set_yticks([-place for place in range(len(data))], names)
-    axes.tick_params(axis="y", length=0)
+    name_rows(axes, names)
     axes.spines["left"].set_visible(False)
     axes.set_ylim(-len(data) + 0.4, 0.6)
     # The widest interval need not hide the others: symmetric about zero at least to margins.
     reach = np.nanmax(np.abs(data[["low", "high", "difference", "margin"]].to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
-    axes.set_xlabel("ours − published (ticks; right: ours higher)", fontsize=SMALL)
+    axes.set_xlabel("ours − published (ticks; right: ours higher)")

@@ -3,29 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from analysis.comparisons.paper import published_of
 from analysis.figures.plot import Plot
-from analysis.figures.selection import CONDITIONS, chosen, has, known_tasks, missing, solved
+from analysis.figures.selection import chosen, has, missing, solved
 from analysis.figures.style import (
     GREY,
     INK,
     PALETTE,
-    SMALL,
     TWO,
     dagger,
     heading,
+    legend,
     letters,
+    name_rows,
     on,
     styled,
 )
-from analysis.methods import LEARNER, short_name
-from analysis.published import RUNS, published_cell
+from analysis.methods import short_name
+from analysis.published import RUNS
 from coartic import Task
 
 if TYPE_CHECKING:
@@ -34,18 +36,17 @@ if TYPE_CHECKING:
 MOST = len(PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""
 OTHERS = "others"
+_EDGE: Any = {"edgecolor": INK, "linewidth": 0.4}
 
 
 @styled
-def recruitment(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> Plot:
+def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Shares of hand sequences of each method, one panel a task with two hands.
 
     Where the paper prints the number of runs of each sequence, its shares stand below ours.
     Raises CoarticError where no method was run on a task with two hands.
     """
-    found = {name: task for name, task in known_tasks(study, tasks).items() if len(task.hands) > 1}
+    found = {name: task for name, task in study.tasks.items() if len(task.hands) > 1}
     if not found:
         raise missing(study, "no task with two hands")
     labels = chosen(study, list(found), methods)
@@ -89,9 +90,7 @@ def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
             continue
         counts = solved(study, task, label).good.hands.value_counts()
         rows += [(task, label, "ours", str(hands), int(n)) for hands, n in counts.items()]
-        paper = None
-        if label in CONDITIONS:
-            paper = published_cell(task, label.removeprefix(LEARNER))
+        paper = published_of(study.cells[task, label])
         printed = [(s.hands, s.runs) for s in paper.sequences if s.runs] if paper else []
         if sum(runs for _, runs in printed) == RUNS:
             rows += [(task, label, "published", hands, runs) for hands, runs in printed]
@@ -105,22 +104,17 @@ def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None
     names = []
     groups = data.groupby(["method", "source"], sort=False)
     for place, ((label, source), rows) in enumerate(groups):
-        left = 0.0
+        ours, left = source == "ours", 0.0
+        names.append(short_name(str(label)) if ours else "published")
         for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["hands"])):
-            axes.barh(
-                -place, row["share"], 0.78, left=left, color=colors.get(row["hands"], GREY),
-                edgecolor=INK, linewidth=0.4, hatch="" if source == "ours" else "//////",
-            )  # fmt: skip
-            if row["share"] >= 0.08 and source == "ours":
-                axes.text(
-                    left + row["share"] / 2, -place, str(row["runs"]), ha="center", va="center",
-                    fontsize=6, color=on(colors.get(row["hands"], GREY)),
-                )  # fmt: skip
-            left += row["share"]
-        name = short_name(str(label))
-        names.append(name if source == "ours" else "published")
-    axes.set_yticks([-place for place in range(len(names))], names)
-    axes.tick_params(axis="y", length=0)
+            color, share = colors.get(row["hands"], GREY), row["share"]
+            hatch = "" if ours else "//////"
+            axes.barh(-place, share, 0.78, left=left, color=color, hatch=hatch, **_EDGE)
+            if share >= 0.08 and ours:
+                middle = left + share / 2, -place, str(row["runs"])
+                axes.text(*middle, ha="center", va="center", fontsize=6, color=on(color))
+            left += share
+    name_rows(axes, names)
     axes.set_ylim(-len(names) + 0.5, 0.5)
     axes.set_xlim(0, 1)
     axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
@@ -135,11 +129,5 @@ def _colors(order: Sequence[str]) -> dict[str, str]:
 
 def _legend(figure: Figure, order: Sequence[str]) -> None:
     colors = _colors(order) | ({OTHERS: GREY} if len(order) > MOST else {})
-    handles = [
-        Patch(facecolor=color, edgecolor=INK, linewidth=0.4, label=hands)
-        for hands, color in colors.items()
-    ]
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=len(handles), fontsize=SMALL,
-        handlelength=1.0, columnspacing=1.2,
-    )  # fmt: skip
+    handles = [Patch(facecolor=colors[hands], label=hands, **_EDGE) for hands in colors]
+    legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 
-from analysis.figures.style import GREY, INK, PAPER, SMALL
+from analysis.figures.style import GREY, INK, PAPER, entry
 from coartic import Hand, Task
 from coartic.robot import Array
 
@@ -32,22 +32,12 @@ def draw_robot(
     """Draw base and arms in configuration ``q`` (dof,), joints of ``marked`` arms marked."""
     marked = tuple(marked)
     outline = task.robot.base_outline(q)
-    axes.add_patch(
-        Polygon(outline, closed=True, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5)
-    )
-    axes.add_patch(
-        Polygon(outline, closed=True, fill=False, edgecolor=color, linewidth=0.6, zorder=1.6)
-    )
+    axes.add_patch(Polygon(outline, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5))
+    axes.add_patch(Polygon(outline, fill=False, edgecolor=color, linewidth=0.6, zorder=1.6))
     for hand in task.hands:
         style = MARKERS[hand] if hand in marked else {}
-        axes.plot(
-            *task.robot.joint_positions(q, hand).T,
-            color=color,
-            linewidth=0.9,
-            markeredgecolor=color,
-            markeredgewidth=0.7,
-            **style,
-        )
+        joints = task.robot.joint_positions(q, hand).T
+        axes.plot(*joints, color=color, linewidth=0.9, markeredgewidth=0.7, **style)
 
 
 def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
@@ -62,7 +52,7 @@ def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
         )
         axes.annotate(
             str(index), (x, y + task.radius), (0, 1.5), textcoords="offset points",
-            ha="center", va="bottom", fontsize=SMALL, color=color, zorder=4,
+            ha="center", va="bottom", color=color, zorder=4,
             bbox={"boxstyle": "square,pad=0", "facecolor": PAPER, "alpha": 0.8, "linewidth": 0},
         )  # fmt: skip
 
@@ -70,21 +60,13 @@ def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
 def legend_entries(hands: Iterable[Hand]) -> list[Line2D]:
     """Handles for the arms of ``hands`` and a goal."""
     hands = set(hands)
-    entries = [
-        Line2D(
-            [],
-            [],
-            color=INK,
-            linewidth=0.9,
-            markeredgecolor=INK,
-            label=f"{hand} arm",
-            **MARKERS[hand],
-        )
-        for hand in MARKERS
+    arms = (
+        entry(f"{hand} arm", color=INK, linewidth=0.9, **look)
+        for hand, look in MARKERS.items()
         if hand in hands
-    ]
-    goal: dict[str, Any] = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
-    return [*entries, Line2D([], [], linestyle="", markeredgecolor=INK, label="goal", **goal)]
+    )
+    goal: Any = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
+    return [*arms, entry("goal", linestyle="", color=INK, **goal)]
 
 
 def box(task: Task, postures: Iterable[Array]) -> tuple[Array, Array]:

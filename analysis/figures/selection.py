@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.methods import LEARNER, METHODS
 from analysis.results.folder import CellRuns
-from coartic import CoarticError, Task
+from coartic import CoarticError
 from coartic.robot import Array
 from coartic.text import did_you_mean
 
@@ -59,15 +59,6 @@ def known_methods(study: Study, methods: Sequence[str]) -> None:
         if label not in known:
             hint = did_you_mean(label, known) or f"; it has {', '.join(known)}"
             raise missing(study, f"no method {label!r}{hint}")
-
-
-def known_tasks(study: Study, tasks: Sequence[str] | None) -> dict[str, Task]:
-    """The tasks of a folder, or those named; CoarticError for one that it does not have."""
-    found = study.results.tasks
-    for name in tasks or ():
-        if name not in found:
-            raise missing(study, f"no task {name!r}; it has {', '.join(found)}")
-    return {name: found[name] for name in (found if tasks is None else tasks)}
 
 
 def has(study: Study, task: str, label: str) -> bool:

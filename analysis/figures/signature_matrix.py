@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from analysis.figures.plot import Plot
-from analysis.figures.selection import chosen, has, known_tasks, missing
+from analysis.figures.selection import chosen, has, missing
 from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, styled
 from analysis.methods import short_name
 from analysis.signatures.register import REGISTER
@@ -34,16 +34,14 @@ _MAP = "PuOr_r"
 
 
 @styled
-def signature_matrix(
-    study: Study, *, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-) -> list[Plot]:
+def signature_matrix(study: Study, *, methods: Sequence[str] | None = None) -> list[Plot]:
     """One matrix a task: a row a method, a column a signature that some method has there.
 
     The value of a cell is the mean over the places (goals, coordinates) of the signature.
     Raises CoarticError where no method has a signature on any of the tasks.
     """
     plots, ids = [], slugs(study.results.tasks)
-    found, frame = known_tasks(study, tasks), study.signatures
+    found, frame = study.tasks, study.signatures
     if methods is not None:
         chosen(study, list(found), methods)
     for name, task in found.items():

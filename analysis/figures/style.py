@@ -7,18 +7,22 @@ white. All are legible on white and on #111; marks and dashes tell what colours 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
-from functools import wraps
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from string import ascii_lowercase
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, NamedTuple
 
 from matplotlib import style
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter, NullFormatter
 
 from analysis.methods import METHODS, Color, Dash
 from coartic import Task
 
+amount = EngFormatter(sep="")
+"""A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
 INCH = 25.4  # mm
 ONE = 85 / INCH
 """Width of one journal column, inches."""
@@ -27,19 +31,30 @@ TWO = 178 / INCH
 TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
 SMALL, NORMAL = 7.0, 8.0  # pt
-INK, PAPER = "#000000", "#ffffff"
-GREY = "#7a7a7a"
-BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
-    "#0072b2",
-    "#56b4e9",
-    "#009e73",
-    "#e69f00",
-    "#d55e00",
-    "#cc79a7",
-)
+PAPER = "#ffffff"
+_COLORS: Mapping[Color, str] = {
+    "blue": "#0072b2",
+    "sky": "#56b4e9",
+    "green": "#009e73",
+    "orange": "#e69f00",
+    "vermillion": "#d55e00",
+    "purple": "#cc79a7",
+    "grey": "#7a7a7a",
+    "ink": "#000000",
+}
+BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK = _COLORS.values()
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 MARKERS = "osD^vPXd"
-DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.2, 1, 1.2)))
+_DASHES: Mapping[Dash, Any] = {
+    "solid": "-",
+    "dashed": (0, (4, 1.5)),
+    "dotted": (0, (1, 1.2)),
+    "dash-dotted": (0, (5, 1.2, 1, 1.2)),
+}
+SOLID, DASHED, DOTTED, DASH_DOTTED = _DASHES.values()
+OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": DOTTED}
+INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": DASH_DOTTED}
+"""Lines at the rewards of the optimum and of the initial solution."""
 RC: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -75,19 +90,8 @@ RC: Any = {
     "text.parse_math": False,
 }
 
-P = ParamSpec("P")
-T = TypeVar("T")
-
-
-def styled(function: Callable[P, T]) -> Callable[P, T]:
-    """Draw with this style and matplotlib's defaults, whatever the user has set."""
-
-    @wraps(function)
-    def inside(*args: P.args, **kwargs: P.kwargs) -> T:
-        with style.context(["default", RC]):
-            return function(*args, **kwargs)
-
-    return inside
+styled = style.context(["default", RC])
+"""A decorator: draw with this style and matplotlib's defaults, whatever the user has set."""
 
 
 class Look(NamedTuple):
@@ -96,24 +100,6 @@ class Look(NamedTuple):
     color: str
     dash: Any
     marker: str
-
-
-_COLORS: Mapping[Color, str] = {
-    "blue": BLUE,
-    "sky": SKY,
-    "green": GREEN,
-    "orange": ORANGE,
-    "vermillion": VERMILLION,
-    "purple": PURPLE,
-    "grey": GREY,
-    "ink": INK,
-}
-_DASHES: Mapping[Dash, Any] = {
-    "solid": DASHES[0],
-    "dashed": DASHES[1],
-    "dotted": DASHES[2],
-    "dash-dotted": DASHES[3],
-}
 
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:
@@ -126,7 +112,9 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
     free = itertools.cycle(
         Look(color, dash, marker)
         for (dash, color), marker in zip(
-            itertools.product((*DASHES[1:], DASHES[0]), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)),
+            itertools.product(
+                (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
+            ),
             itertools.cycle(MARKERS),
             strict=False,
         )
@@ -163,11 +151,47 @@ def percent(share: float) -> str:
     return f"{share:.0%}".replace("%", " %")
 
 
-def grid(panels: int, tall: float, legend: float) -> tuple[int, int, float]:
-    """Rows, columns and height in inches of panels that are ``tall`` where the page allows."""
+def grid(panels: int) -> tuple[int, int]:
+    """Rows and columns of so many panels."""
     columns = min(2 if panels <= 6 else 3, panels)
-    rows = -(-panels // columns)
-    return rows, columns, min(tall * rows + legend, TALLEST)
+    return -(-panels // columns), columns
+
+
+def task_panels(
+    tasks: Collection[Task], tall: float, legend: float, across: str, up: str, **subplots: Any
+) -> tuple[Figure, list[Axes]]:
+    """A panel a task, lettered, with its name and the axes' labels at the edges of the grid.
+
+    ``tall``, ``legend``: inches of a panel, where the page allows, and of the legend.
+    """
+    rows, columns = grid(len(tasks))
+    figure = Figure(figsize=(TWO, min(tall * rows + legend, TALLEST)), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, **subplots).ravel().tolist()
+    for axes in panels[len(tasks) :]:
+        axes.set_axis_off()
+    for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
+        axes.set_title(heading(task))
+        axes.set_ylabel("" if place % columns else up)
+        axes.set_xlabel(across if place + columns >= len(tasks) else "")
+    shown = panels[: len(tasks)]
+    letters(shown)
+    return figure, shown
+
+
+def name_rows(axes: Axes, names: Sequence[str]) -> None:
+    """Names at the left of rows that stand at 0, -1, -2 and so on."""
+    axes.set_yticks([-place for place in range(len(names))], names)
+    axes.tick_params(axis="y", length=0)
+
+
+def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
+    """A legend below all panels."""
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
+
+
+def entry(label: str, **line: Any) -> Line2D:
+    """What a legend says of a line or mark that looks so."""
+    return Line2D([], [], label=label, **line)
 
 
 def on(color: str) -> str:
@@ -176,19 +200,10 @@ def on(color: str) -> str:
     return "#111111" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.42 else "#fdfdfd"
 
 
-def amount(value: float, _: object = None) -> str:
-    """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
-    if not value:
-        return "0"
-    sizes = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-    size, unit = next(((s, u) for s, u in sizes if abs(value) >= 0.999 * s), sizes[-1])
-    return f"{value / size:.3g}{unit}"
-
-
 def log_axis(axes: Axes) -> None:
     """A logarithmic x axis with plain numbers at whole decades."""
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(amount))
+    axes.xaxis.set_major_formatter(amount)
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 

@@ -29,11 +29,7 @@ def compact(text: str) -> str:
     text = re.sub(r' d="([^"]*)"', lambda m: f' d="{relative(m[1])}"', text, flags=re.DOTALL)
     text = re.sub(r"; font-family: [^;\"]*", "", text)
     text = _DRAWN.sub(_rounded, text)
-    text = re.sub(
-        r' style="([^"]*)"',
-        lambda m: f' style="{m[1].replace("; ", ";").replace(": ", ":")}"',
-        text,
-    )
+    text = re.sub(r' style="[^"]*"', lambda m: re.sub("([;:]) ", r"\1", m[0]), text)
     text = _marks_alone(text)
     text = _short_ids(text)
     text = re.sub(r"\s*\n\s*", "\n", text)
@@ -58,7 +54,8 @@ def relative(path: str) -> str:
 
     def write(command: str, *numbers: int) -> None:
         nonlocal last
-        words = "".join(_joined(numbers, steps))
+        # A minus separates as well as a space.
+        words = " ".join(_decimal(number, steps) for number in numbers).replace(" -", "-")
         if command == last and command not in "mz":  # said once for several
             out.append(words if words.startswith("-") else f" {words}")
         else:
@@ -67,13 +64,12 @@ def relative(path: str) -> str:
 
     def flush() -> None:
         nonlocal run
-        if run != (0, 0):
-            if run[1] == 0:
-                write("h", run[0])
-            elif run[0] == 0:
-                write("v", run[1])
-            else:
-                write("l", *run)
+        if run[0] and run[1]:
+            write("l", *run)
+        elif run[0]:
+            write("h", run[0])
+        elif run[1]:
+            write("v", run[1])
         run = (0, 0)
 
     for command in tokens:
@@ -115,18 +111,10 @@ def _from(at: tuple[int, int], points: list[tuple[int, int]]) -> Iterator[int]:
         yield y - at[1]
 
 
-def _joined(numbers: tuple[int, ...], steps: int) -> Iterator[str]:
-    """Numbers in multiples of a step; a minus separates as well as a space."""
-    for place, number in enumerate(numbers):
-        word = _decimal(number, steps)
-        yield word if place == 0 or word.startswith("-") else f" {word}"
-
-
 def _decimal(number: int, steps: int = _FINE) -> str:
-    sign, size = "-" if number < 0 else "", abs(number)
-    whole, rest = divmod(size, steps)
-    decimals = f".{rest:0{len(str(steps)) - 1}d}".rstrip("0") if rest else ""
-    return f"{sign}{whole or ('' if decimals else 0)}{decimals}"
+    """So many steps without idle zeros."""
+    text = f"{number / steps:.{len(str(steps)) - 1}f}".rstrip("0").rstrip(".")
+    return re.sub(r"^(-?)0(?=\.)", r"\1", text)
 
 
 def _rounded(match: re.Match[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.plot import Plot
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.figures.style import NORMAL, SMALL, TALLEST, TWO, column_width, styled
+from analysis.figures.style import TALLEST, TWO, column_width, grid, legend, styled
 from coartic import Task
 
 if TYPE_CHECKING:
@@ -33,8 +32,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         raise ValueError("no task to draw")
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
-    columns = min(2 if len(tasks) <= 6 else 3, len(tasks))
-    rows = math.ceil(len(tasks) / columns)
+    rows, columns = grid(len(tasks))
     above, around = 0.62, 0.55  # inches of a panel for title and axes
     scale = min(
         (TWO / columns - around) / width, (TALLEST - 0.3 - rows * above) / rows / height, 0.42
@@ -47,7 +45,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         draw_goals(axes, task)
         twice = [other.label for other in tasks].count(task.label) > 1
         name = task.name if twice else task.label
-        axes.set_title(_title(task, name), fontsize=NORMAL)
+        axes.set_title(_title(task, name))
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)
@@ -56,12 +54,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         axes.set_ylabel("y (length unit)")
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()
-    figure.legend(
-        handles=legend_entries(hand for task in tasks for hand in task.hands),
-        loc="outside lower center",
-        ncols=3,
-        fontsize=SMALL,
-    )
+    legend(figure, legend_entries(hand for task in tasks for hand in task.hands), 3)
     names = ", ".join(task.name for task in tasks)
     return Plot(
         id="tasks",

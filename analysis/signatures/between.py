@@ -7,18 +7,14 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain, product
 
 import numpy as np
 
-from analysis.signatures.context import (
-    context_dependence,
-    distance,
-    lead_time,
-    permutation_p,
-)
+from analysis.signatures.context import context_dependence, distance, lead_time, permutation_p
 from analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
-from analysis.signatures.manifold import motor_equivalence, movable, subspaces
-from analysis.signatures.rows import Place, Signature, Value
+from analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
+from analysis.signatures.rows import Place, Signature, SignatureRow
 from analysis.signatures.trajectories import Trajectories, last_ticks, postures
 from analysis.statistics import spread
 from analysis.statistics.estimates import SEED
@@ -35,23 +31,20 @@ class Contexts:
     first: Trajectories
     second: Trajectories
     goal: int
-    hand: Hand | None
-    """None where no hand hit the goal in both contexts."""
+    hand: Hand
 
     @property
     def place(self) -> Place:
         """Of every value."""
-        return Place(goal=self.goal, hand=self.hand or "", against=self.second.task.name)
+        return Place(goal=self.goal, hand=self.hand, against=self.second.task.name)
 
     @cached_property
     def runs(self) -> tuple[Runs, Runs]:
         """Of either context."""
-        if self.hand is None:
-            return (), ()
-        return (
-            self.first.with_hand(self.hand, self.goal),
-            self.second.with_hand(self.hand, self.goal),
+        first, second = (
+            cell.with_hand(self.hand, self.goal) for cell in (self.first, self.second)
         )
+        return first, second
 
     @cached_property
     def postures(self) -> tuple[Array, Array]:
@@ -75,22 +68,12 @@ class Contexts:
         return permutation_p(first, second, rng_of(signature, self.place), basis=basis)
 
 
-def contexts_of(first: Trajectories, second: Trajectories, shared: int) -> Iterator[Contexts]:
-    """Every shared goal with every hand that hit it in both contexts."""
-    for goal in range(1, shared + 1):
-        found: list[Hand | None] = [
-            hand for hand in HANDS if first.with_hand(hand, goal) and second.with_hand(hand, goal)
-        ]
-        for hand in found or [None]:
-            yield Contexts(first, second, goal, hand)
-
-
-def context_distance(contexts: Contexts, signature: Signature) -> Iterator[Value]:
+def context_distance(contexts: Contexts, signature: Signature) -> Iterator[SignatureRow]:
     """Distance of mean postures."""
     yield signature.at(contexts.place, value=distance(*contexts.postures), n=contexts.n)
 
 
-def dependence(contexts: Contexts, signature: Signature) -> Iterator[Value]:
+def dependence(contexts: Contexts, signature: Signature) -> Iterator[SignatureRow]:
     """The distance in pooled standard deviations, with its test."""
     why = "one run a context: no spread within contexts, no test" if contexts.single else ""
     value = context_dependence(*contexts.postures)
@@ -100,14 +83,11 @@ def dependence(contexts: Contexts, signature: Signature) -> Iterator[Value]:
     yield signature.at(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
 
 
-def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Iterator[Value]:
+def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Iterator[SignatureRow]:
     """The difference that leaves the hand in place, and the one that moves it."""
     first, second = contexts.postures
-    task, hand = contexts.first.task, contexts.hand
-    assert hand is not None
-    joints = movable(task, hand)
-    pooled = np.concatenate([first, second])
-    jacobian = task.robot.jacobian(spread.mean(pooled), hand)[:, joints]
+    task = contexts.first.task
+    joints, jacobian = jacobian_of(task, contexts.hand, np.concatenate([first, second]))
     difference = spread.mean(first) - spread.mean(second)
     found = motor_equivalence(difference[joints], jacobian)
     why = "one run a context: no test" if contexts.single else ""
@@ -120,7 +100,7 @@ def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Iterat
         yield signature.at(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
 
 
-def lead(contexts: Contexts, signature: Signature) -> Iterator[Value]:
+def lead(contexts: Contexts, signature: Signature) -> Iterator[SignatureRow]:
     """How long before the hit contexts differ."""
     place, n = contexts.place, contexts.n
     if contexts.single:
@@ -154,41 +134,28 @@ class Members:
         return next(iter(self.of_task.values()))
 
 
-def slopes(members: Members, slope: Signature, norm: Signature) -> Iterator[Value]:
+def slopes(members: Members, slope: Signature, norm: Signature) -> Iterator[SignatureRow]:
     """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
-    moving = members.family.moving
-    goals = len(members.first.task.goals)
-    for goal in (moving - 1, moving + 1):
-        if 1 <= goal <= goals:
-            for hand in HANDS:
-                place = Place(goal=goal, moving=moving, hand=hand)
-                yield from _slopes_at(members, goal, hand, place, slope, norm)
-
-
-def _slopes_at(
-    members: Members, goal: int, hand: Hand, place: Place, slope: Signature, norm: Signature
-) -> Iterator[Value]:
-    positions = dict(zip(members.family.tasks, members.family.positions.tolist(), strict=True))
-    runs = [
-        (run, positions[name])
-        for name, cell in members.of_task.items()
-        for run in cell.with_hand(hand, goal)
-    ]
-    if not runs:
-        return
-    places = [place for _, place in runs]
-    n = len(runs)
-    if len(set(places)) < LEAST:
-        why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-        yield from (signature.without(why, place, n) for signature in (slope, norm))
-        return
-    q = postures(tuple(run for run, _ in runs), goal)
-    joints = members.first.task.robot.joint_names
-    for joint, found in zip(joints, locus_slopes(q, places), strict=True):
-        unit = "1" if joint.startswith("base") else slope.unit
-        yield slope.at(replace(place, joint=joint), **found._asdict(), n=n, unit=unit)
-    whole = slope_norm(q, places, rng_of(norm, place))
-    yield norm.at(place, **whole._asdict(), n=n)
+    family, task = members.family, members.first.task
+    position = dict(zip(family.tasks, family.positions.tolist(), strict=True))
+    for goal, hand in product((family.moving - 1, family.moving + 1), HANDS):
+        if not 1 <= goal <= len(task.goals):
+            continue
+        runs = {name: cell.with_hand(hand, goal) for name, cell in members.of_task.items()}
+        places = [position[name] for name, own in runs.items() for _ in own]
+        n, place = len(places), Place(goal=goal, moving=family.moving, hand=hand)
+        if not n:
+            continue
+        if len(set(places)) < LEAST:
+            why = f"runs with that hand in fewer than {LEAST} tasks of the family"
+            yield from (signature.without(why, place, n) for signature in (slope, norm))
+            continue
+        q = postures(tuple(chain.from_iterable(runs.values())), goal)
+        for joint, found in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
+            unit = "1" if joint.startswith("base") else slope.unit
+            yield slope.at(replace(place, joint=joint), **found._asdict(), n=n, unit=unit)
+        whole = slope_norm(q, places, rng_of(norm, place))
+        yield norm.at(place, **whole._asdict(), n=n)
 
 
 def rng_of(signature: Signature, place: Place) -> np.random.Generator:

@@ -20,14 +20,16 @@ from analysis.statistics.spread import mean
 from coartic import Task
 from coartic.robot import Array
 
+KEPT = ("start", "radius", "hands", "locked_base", "robot")
+"""What tasks that differ in goals alone have in common."""
+
 
 def shared_goals(first: Task, second: Task) -> int:
     """How many goals two tasks share before their first difference.
 
     0 where anything but the goals differs, and where no goal differs.
     """
-    kept = ("start", "radius", "hands", "locked_base", "robot")
-    if any(getattr(first, key) != getattr(second, key) for key in kept):
+    if any(getattr(first, key) != getattr(second, key) for key in KEPT):
         return 0
     if first.goals == second.goals:
         return 0

@@ -18,7 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
+from scipy.cluster.hierarchy import DisjointSet
 
+from analysis.signatures.context import KEPT
 from analysis.signatures.permutation import orders, p_values
 from analysis.statistics.estimates import CONFIDENCE
 from analysis.statistics.spread import mean
@@ -47,9 +49,7 @@ def families(tasks: Mapping[str, Task]) -> list[Family]:
     found = []
     groups: dict[tuple[int, str], list[str]] = {}
     for name, task in tasks.items():
-        kept = task.model_dump_json(
-            include={"start", "radius", "hands", "locked_base", "robot"},
-        )
+        kept = task.model_dump_json(include={*KEPT})
         for index in range(len(task.goals)):
             others = task.goals[:index] + task.goals[index + 1 :]
             groups.setdefault((index, f"{kept}{others}"), []).append(name)
@@ -62,16 +62,11 @@ def families(tasks: Mapping[str, Task]) -> list[Family]:
 
 def variants(groups: Sequence[Family]) -> list[set[str]]:
     """Tasks that families join, directly or through tasks that they share."""
-    found: list[set[str]] = []
+    joined = DisjointSet(name for family in groups for name in family.tasks)
     for family in groups:
-        joined = set(family.tasks)
-        apart = []
-        for other in found:
-            if joined & other:
-                joined |= other
-            else:
-                apart.append(other)
-        found = [*apart, joined]
+        for name in family.tasks:
+            joined.merge(family.tasks[0], name)
+    found: list[set[str]] = joined.subsets()
     return found
 
 

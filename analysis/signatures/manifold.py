@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg, stats
 
 from analysis.statistics.estimates import CONFIDENCE
-from analysis.statistics.spread import sd
+from analysis.statistics.spread import mean, sd
 from coartic import Hand, Task
 from coartic.robot import Array
 
@@ -28,6 +28,12 @@ def movable(task: Task, hand: Hand) -> Array:
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
+def jacobian_of(task: Task, hand: Hand, configurations: Array) -> tuple[Array, Array]:
+    """Joints that can move a hand, and its Jacobian in these, ``(2, k)``, at the mean posture."""
+    joints = movable(task, hand)
+    return joints, task.robot.jacobian(mean(configurations), hand)[:, joints]
+
+
 def subspaces(jacobian: Array) -> tuple[Array, Array]:
     """Orthonormal bases of nullspace and of its complement, ``(k, d)`` each.
 
@@ -36,31 +42,22 @@ def subspaces(jacobian: Array) -> tuple[Array, Array]:
     return linalg.null_space(jacobian), linalg.orth(jacobian.T)
 
 
-class Equivalence(NamedTuple):
-    """The two parts of a joint-space difference, each per root of its dimension."""
+def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
+    """Of a difference between configurations, the motor-equivalent and the other part.
 
-    equivalent: float
-    """Motor-equivalent: does not move the hand. ≥ 0; length unit and rad mixed."""
-    other: float
-    """Non-motor-equivalent: moves it."""
-
-
-def motor_equivalence(difference: Array, jacobian: Array) -> Equivalence:
-    """A difference between configurations, divided by what it does to the hand.
-
-    ``difference`` has shape ``(k,)``. Each part is its length over the root of the
-    dimension of its space, so that a difference in a random direction has equal parts. A
-    difference between contexts is motor-equivalent where the first exceeds the second: the
-    same subgoal reached by another posture. Caveat: hits of one disc bound the second part, and
-    nothing bounds the first. NaN for a space of dimension 0. Source: Mattos,
+    ``difference`` has shape ``(k,)``, length unit and rad mixed. Each part, ≥ 0, is its length
+    over the root of the dimension of its space, so that a difference in a random direction has
+    equal parts. A difference between contexts is motor-equivalent where the first exceeds the
+    second: the same subgoal reached by another posture. Caveat: hits of one disc bound the
+    second part, and nothing bounds the first. NaN for a space of dimension 0. Source: Mattos,
     Latash and colleagues, Experimental Brain Research (doi:10.1007/s00221-015-4327-4,
     10.1007/s00221-018-5215-5).
     """
-    parts = []
-    for basis in subspaces(jacobian):
-        size = basis.shape[1]
-        parts.append(float(np.linalg.norm(basis.T @ difference)) / math.sqrt(size or math.nan))
-    return Equivalence(*parts)
+    equivalent, other = (
+        float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
+        for basis in subspaces(jacobian)
+    )
+    return equivalent, other
 
 
 class Synergy(NamedTuple):

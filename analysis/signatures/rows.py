@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ImportString
 
 from coartic.tables import label_of
 
@@ -53,10 +55,14 @@ class Place:
         return ", ".join(parts)
 
 
-@dataclass(frozen=True)
-class Value:
+@dataclass(frozen=True, kw_only=True)
+class SignatureRow:
     """One value of a signature, or why there is none."""
 
+    task: str = ""
+    """Empty, as are method and variant, in what a measure yields: the study fills them in."""
+    method: str = ""
+    variant: str = ""
     signature: str
     place: Place = Place()
     value: float = math.nan
@@ -72,64 +78,43 @@ class Value:
     why_not: str = ""
     """Why there is no value, or no interval or test; empty where all is there."""
 
-    def of(self, task: str, method: str, variant: str) -> SignatureRow:
-        """The same as a row of a study."""
-        return SignatureRow(**vars(self), task=task, method=method, variant=variant)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SignatureRow(Value):
-    """A value of one method with parameters on one task."""
-
-    task: str
-    method: str
-    variant: str
-
     @property
     def label(self) -> str:
         """The method with its variant."""
         return label_of(self.method, self.variant)
 
 
-Measure = Callable[..., Iterator[Value]]
+Measure = Callable[..., Iterator[SignatureRow]]
 """Takes what is measured (:class:`~.trajectories.Trajectories`, a pair of contexts or a family
 of tasks), then the signatures that it measures, in the order of the register."""
 
 
-@dataclass(frozen=True)
-class Signature:
-    """One signature: how it is measured, called, explained and shown."""
+class Signature(BaseModel):
+    """One signature, as a row of ``register.toml``, which says what the fields are."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    measure: Measure
-    """Signatures that are computed together share one."""
+    measure: ImportString[Measure]
     unit: str
     extent: str
-    """Unit and range, for people."""
     meaning: str
-    """What it says, in inline markup."""
     heading: str
-    """Short name, for tables and figures."""
-    table: str = ""
-    """Id of the table of a task that shows it (:mod:`analysis.report.tables.signatures`)."""
-    digits: int | None = 2
-    """Decimals shown; None: three figures."""
+    table: str
+    digits: int | None = None
     matrix: str = ""
-    """Heading of its column in the matrix of signatures; empty: it has none."""
     macro: str = ""
-    """Of the number that a paper may quote; empty: there is none."""
     sources: tuple[str, ...] = ()
-    """Keys of ``references.bib``."""
 
     @property
     def share(self) -> bool:
         """Whether it is a share of runs."""
         return self.extent.startswith("share")
 
-    def at(self, place: Place = Place(), **values: Any) -> Value:
-        """A value of it, with its unit; ``values`` as :class:`Value` has them."""
-        return replace(Value(self.name, place, unit=self.unit), **values)
+    def at(self, place: Place = Place(), **values: Any) -> SignatureRow:
+        """A value of it, with its unit; ``values`` as :class:`SignatureRow` has them."""
+        return SignatureRow(signature=self.name, place=place, **{"unit": self.unit, **values})
 
-    def without(self, why: str, place: Place = Place(), n: int = 0) -> Value:
+    def without(self, why: str, place: Place = Place(), n: int = 0) -> SignatureRow:
         """That it does not apply."""
-        return Value(self.name, place, n=n, why_not=why)
+        return SignatureRow(signature=self.name, place=place, n=n, why_not=why)

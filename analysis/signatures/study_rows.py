@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.signatures.between import Contexts, Members, contexts_of
+from analysis.signatures.between import Contexts, Members
 from analysis.signatures.context import context_pairs
 from analysis.signatures.locus import LEAST, families, variants
 from analysis.signatures.register import CONTEXTS, FAMILIES, WITHIN
-from analysis.signatures.rows import Measure, Signature, SignatureRow, Value
+from analysis.signatures.rows import Measure, Place, Signature, SignatureRow
 from analysis.signatures.trajectories import Trajectories
+from coartic.robot import HANDS
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 NO_CONTEXT = "the method did no other task that shares the start and the first goals"
 IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
 NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
+_NOWHERE = Place()
 
 
 def signature_rows(study: Study) -> list[SignatureRow]:
@@ -38,46 +40,43 @@ def signature_rows(study: Study) -> list[SignatureRow]:
     ]
     rows: list[SignatureRow] = []
     for (task, label), cell in study.trajectories.items():
+        done = {name: its for (name, whose), its in study.trajectories.items() if whose == label}
         values = [*_measured(WITHIN, cell)]
-        partners = [
-            (first, second, shared)
-            for first, second, shared in pairs
-            if task in (first, second)
-            and {(first, label), (second, label)} <= study.trajectories.keys()
-        ]
+        partners = [pair for pair in pairs if task in pair[:2] and {*pair[:2]} <= done.keys()]
         for first, second, shared in partners:
             if task == first:
-                values += _of_pair(cell, study.trajectories[second, label], shared)
+                values += _of_pair(cell, done[second], shared)
         if not partners:
             slopes = any(task in names for names in joined)
             values += _without(CONTEXTS, IN_FAMILY if slopes else NO_CONTEXT)
         own = [group for group in groups if task in group.tasks]
         for group in own:
-            cells = {
-                name: study.trajectories[name, label]
-                for name in group.tasks
-                if (name, label) in study.trajectories
-            }
+            cells = {name: done[name] for name in group.tasks if name in done}
             if task == next(iter(cells)):
                 values += _measured(FAMILIES, Members(group, cells))
         if not own:
             values += _without(FAMILIES, NO_FAMILY)
-        rows += [value.of(task, cell.method, cell.variant) for value in values]
+        rows += [
+            replace(row, task=task, method=cell.method, variant=cell.variant) for row in values
+        ]
     return rows
 
 
-def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Iterator[Value]:
-    for contexts in contexts_of(first, second, shared):
-        if contexts.hand is None:
-            why = "no hand hit the goal in both contexts"
-            yield from (signature.without(why, contexts.place) for signature in CONTEXTS)
-        else:
+def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Iterator[SignatureRow]:
+    """Of every shared goal with every hand that hit it in both contexts."""
+    for goal in range(1, shared + 1):
+        every = [Contexts(first, second, goal, hand) for hand in HANDS]
+        found = [contexts for contexts in every if all(contexts.runs)]
+        for contexts in found:
             yield from _measured(CONTEXTS, contexts)
+        if not found:
+            place = Place(goal=goal, against=second.task.name)
+            yield from _without(CONTEXTS, "no hand hit the goal in both contexts", place)
 
 
 def _measured(
     signatures: Sequence[Signature], what: Trajectories | Contexts | Members
-) -> Iterator[Value]:
+) -> Iterator[SignatureRow]:
     """Values of all signatures, those with the same measure together."""
     measures: dict[Measure, list[Signature]] = {}
     for signature in signatures:
@@ -86,30 +85,21 @@ def _measured(
         yield from measure(what, *measured)
 
 
-def _without(signatures: Sequence[Signature], why: str) -> Iterator[Value]:
-    return (signature.without(why) for signature in signatures)
+def _without(
+    signatures: Sequence[Signature], why: str, place: Place = _NOWHERE
+) -> Iterator[SignatureRow]:
+    return (signature.without(why, place) for signature in signatures)
 
 
 def signatures_table(rows: Sequence[SignatureRow]) -> pd.DataFrame:
     """The rows as ``signatures.csv`` has them, and ``label``.
 
-    Columns: ``task``, ``method``, ``variant``, ``signature``, ``where`` (the place, in words),
-    ``value``, ``low`` and ``high`` (95 % interval), ``p`` (uncorrected), ``n`` (runs that went
-    into it), ``unit``, ``why_not`` (why there is no value, or no test; empty where all is
-    there), then the place's own: ``goal``, ``hand``, ``hands``, ``against``, ``moving``,
-    ``joint``, ``neutral``, ``longest`` (:class:`~.rows.Place`). Signatures over runs are means
-    with Student's interval, shares of runs have Wilson's.
+    Columns are the fields of :class:`~.rows.SignatureRow`, with the place in words (``where``),
+    then those of its :class:`~.rows.Place`. Signatures over runs are means with Student's
+    interval, shares of runs have Wilson's.
     """
-    first = ("task", "method", "variant", "signature")
-    last = ("value", "low", "high", "p", "n", "unit", "why_not")
     frame = pd.DataFrame(
-        {
-            **{name: getattr(row, name) for name in first},
-            "where": str(row.place),
-            **{name: getattr(row, name) for name in last},
-            **asdict(row.place),
-            "label": row.label,
-        }
+        {**vars(row), "place": str(row.place), **vars(row.place), "label": row.label}
         for row in rows
-    )
+    ).rename(columns={"place": "where"})
     return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))

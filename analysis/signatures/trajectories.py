@@ -57,10 +57,8 @@ class Trajectories:
     @cached_property
     def typical(self) -> tuple[Trajectory, ...]:
         """Runs with the most frequent hand sequence, so that postures compare."""
-        if not self.runs:
-            return ()
-        sequence = Counter(self.sequences).most_common(1)[0][0]
-        return tuple(run for run in self.runs if run.execution.hands == sequence)
+        commonest = dict(Counter(self.sequences).most_common(1))
+        return tuple(run for run in self.runs if run.execution.hands in commonest)
 
     def with_hand(self, hand: Hand, goal: int) -> tuple[Trajectory, ...]:
         """Runs that hit a goal with ``hand``; ``goal`` counts from 1."""

@@ -6,16 +6,21 @@ A measure takes :class:`~.trajectories.Trajectories`, then the signatures that i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.signatures import intervals
-from analysis.signatures.manifold import movable
-from analysis.signatures.manifold import synergy as synergy_of
-from analysis.signatures.other_arm import travel
+from analysis.signatures.manifold import jacobian_of, synergy
+from analysis.signatures.other_arm import (
+    preshaping,
+    preshaping_from_base,
+    preshaping_since_hit,
+    travel,
+)
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
 from analysis.signatures.recruitment import entropy, isolated_agreement
 from analysis.signatures.rows import (
@@ -26,49 +31,43 @@ from analysis.signatures.rows import (
     Measure,
     Place,
     Signature,
-    Value,
+    SignatureRow,
 )
 from analysis.signatures.subtasks import excess, sacrifice_p, sacrifices
 from analysis.signatures.trajectories import Trajectories, postures
-from analysis.statistics import spread
 from analysis.statistics.estimates import SEED
-from coartic import Execution, Trajectory
 from coartic.robot import Array
 
 
-def first_subtask(changes: Callable[[Trajectories], Array]) -> Measure:
-    """Measure the mean change of the first subtask; ``changes`` has shape ``(runs, G)``."""
-
-    def measure(cell: Trajectories, signature: Signature) -> Iterator[Value]:
-        found = changes(cell)
-        yield (
-            mean_of(signature, Place(goal=1), found[:, 0])
-            if len(found)
-            else signature.without(_no_reference(cell))
-        )
-
-    return measure
+def against_initial(
+    cell: Trajectories, first: Signature, total: Signature
+) -> Iterator[SignatureRow]:
+    """Mean change of the first subtask and of the whole, from the initial solution."""
+    yield from _changes(cell, cell.against_initial, first, total)
 
 
-def whole(changes: Callable[[Trajectories], Array]) -> Measure:
-    """Measure the mean change of all subtasks together."""
+def against_same_hands(
+    cell: Trajectories, first: Signature, total: Signature
+) -> Iterator[SignatureRow]:
+    """The same, from the corrective process with each run's own hands."""
+    yield from _changes(cell, cell.against_same_hands, first, total)
 
-    def measure(cell: Trajectories, signature: Signature) -> Iterator[Value]:
-        found = changes(cell)
-        yield (
-            mean_of(signature, Place(), found.sum(axis=1))
-            if len(found)
-            else signature.without(_no_reference(cell))
-        )
 
-    return measure
+def _changes(
+    cell: Trajectories, changes: NDArray[np.int64], first: Signature, total: Signature
+) -> Iterator[SignatureRow]:
+    if len(changes):
+        yield mean_of(first, Place(goal=1), changes[:, 0])
+        yield mean_of(total, Place(), changes.sum(axis=1))
+    else:
+        yield from (signature.without(_no_reference(cell)) for signature in (first, total))
 
 
 def _no_reference(cell: Trajectories) -> str:
     return NO_INITIAL if cell.runs else NO_RUN
 
 
-def sacrificed(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def sacrificed(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Share of runs that sacrifice the first subtask, against their own hands."""
     changes = cell.against_same_hands
     if not len(changes):
@@ -82,7 +81,7 @@ def sacrificed(cell: Trajectories, signature: Signature) -> Iterator[Value]:
     yield replace(shown, p=p, why_not=why)
 
 
-def against_isolated_reach(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def against_isolated_reach(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Mean excess of each subtask over an isolated reach."""
     missing = "the corrective process reaches the goal from the posture before with no hand"
     values = [excess(run) for run in cell.runs]
@@ -92,17 +91,17 @@ def against_isolated_reach(cell: Trajectories, signature: Signature) -> Iterator
 def of_two_hands(measure: Measure) -> Measure:
     """Restrict a measure to solved tasks with two hands."""
 
-    def restricted(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+    def restricted(cell: Trajectories, *signatures: Signature) -> Iterator[SignatureRow]:
         if len(cell.task.hands) < 2 or not cell.runs:
-            yield signature.without(ONE_HAND if cell.runs else NO_RUN)
-        else:
-            yield from measure(cell, signature)
+            why = ONE_HAND if cell.runs else NO_RUN
+            return (signature.without(why) for signature in signatures)
+        return measure(cell, *signatures)
 
     return restricted
 
 
 @of_two_hands
-def hand_entropy(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def hand_entropy(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Entropy of the hand sequences."""
     counts = pd.Series(cell.sequences).value_counts()
     yield signature.at(
@@ -114,15 +113,15 @@ def hand_entropy(cell: Trajectories, signature: Signature) -> Iterator[Value]:
 
 
 @of_two_hands
-def as_in_isolation(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def as_in_isolation(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Share of runs that hit each goal with the hand that is quickest for it by itself."""
-    agreement = np.array([isolated_agreement(run) for run in cell.runs])
-    for number, agrees in enumerate(agreement.T, 1):
-        yield share_of(signature, Place(goal=number), agrees.tolist())
+    by_run = map(isolated_agreement, cell.runs)
+    for number, agrees in enumerate(zip(*by_run, strict=True), 1):
+        yield share_of(signature, Place(goal=number), agrees)
 
 
 @of_two_hands
-def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Share of runs with a hand sequence that is best by the corrective process alone."""
     best = cell.best_hands
     if best:
@@ -132,29 +131,27 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Iterator
         yield signature.without("the folder's table of sequences has no reward")
 
 
-def nearer_than_initially(preshaping: Callable[[Trajectory, Execution], Array]) -> Measure:
-    """Measure one of the preshapings of :mod:`~.other_arm` at every goal but the last."""
-
-    @of_two_hands
-    def measure(cell: Trajectories, signature: Signature) -> Iterator[Value]:
-        initial = cell.initial
+@of_two_hands
+def preshapings(cell: Trajectories, *signatures: Signature) -> Iterator[SignatureRow]:
+    """All preshaping, that seen from the base, that since the last hit; but at the last goal."""
+    measures = (preshaping, preshaping_from_base, preshaping_since_hit)
+    initial = cell.initial
+    for signature, nearer in zip(signatures, measures, strict=True):
         if initial is None:
             yield signature.without(NO_INITIAL)
-            return
-        values = [preshaping(run, initial) for run in cell.runs]
-        missing = "the other hand hits no later goal"
-        yield from by_goal(signature, len(cell.task.goals) - 1, values, missing)
-
-    return measure
+        else:
+            values = [nearer(run, initial) for run in cell.runs]
+            missing = "the other hand hits no later goal"
+            yield from by_goal(signature, len(cell.task.goals) - 1, values, missing)
 
 
 @of_two_hands
-def travel_of_the_other_arm(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def travel_of_the_other_arm(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Mean travel of the arm that is not chosen, by subtask."""
     yield from by_goal(signature, len(cell.task.goals), [travel(run) for run in cell.runs])
 
 
-def base_reversals(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def base_reversals(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Mean number of reversals of each base coordinate."""
     reversals = [reversals_of(run) for run in cell.runs]
     for k, name in enumerate("xy"):
@@ -165,7 +162,7 @@ def base_reversals(cell: Trajectories, signature: Signature) -> Iterator[Value]:
             yield mean_of(signature, place, [run[k] for run in reversals])
 
 
-def turning(cell: Trajectories, signature: Signature) -> Iterator[Value]:
+def turning(cell: Trajectories, signature: Signature) -> Iterator[SignatureRow]:
     """Mean turning angle at every goal but the last."""
     goals = len(cell.task.goals)
     if goals < 2:
@@ -177,7 +174,7 @@ def turning(cell: Trajectories, signature: Signature) -> Iterator[Value]:
     yield from by_goal(signature, goals - 1, turns, "a subtask without displacement")
 
 
-def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Iterator[Value]:
+def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Iterator[SignatureRow]:
     """Smoothness of the chosen hand's path."""
     found = [smoothness(run) for run in cell.runs]
     short = "every subtask is too short, or its path is without jerk"
@@ -187,7 +184,7 @@ def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Iterator[Va
 
 def synergies(
     cell: Trajectories, within: Signature, across: Signature, delta: Signature, z: Signature
-) -> Iterator[Value]:
+) -> Iterator[SignatureRow]:
     """Variance over runs by what it does to the hand, over runs with the commonest hands."""
     runs, n = cell.typical, len(cell.typical)
     if n < 2:
@@ -196,27 +193,25 @@ def synergies(
         return
     for number in range(1, len(cell.task.goals) + 1):
         hand = runs[0].hands[number - 1]
-        joints = movable(cell.task, hand)
         q = postures(runs, number)
-        jacobian = cell.task.robot.jacobian(spread.mean(q), hand)[:, joints]
-        found = synergy_of(q[:, joints], jacobian)
+        joints, jacobian = jacobian_of(cell.task, hand, q)
+        found = synergy(q[:, joints], jacobian)
         place = Place(goal=number, hand=hand, hands=runs[0].execution.hands)
         why = "runs do not differ" if math.isnan(found.z) else ""
-        yield within.at(place, value=found.within, n=n, why_not=why)
-        yield across.at(place, value=found.orthogonal, n=n, why_not=why)
-        yield delta.at(place, value=found.delta, n=n, why_not=why)
+        parts = (within, found.within), (across, found.orthogonal), (delta, found.delta)
+        for signature, value in parts:
+            yield signature.at(place, value=value, n=n, why_not=why)
         if not why:
             place = replace(place, neutral=found.neutral)
             if math.isnan(found.p):
                 why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield z.at(
-            place, value=found.z, low=found.low, high=found.high, p=found.p, n=n, why_not=why
-        )
+        test = {"value": found.z, "low": found.low, "high": found.high, "p": found.p}
+        yield z.at(place, **test, n=n, why_not=why)
 
 
 def by_goal(
     signature: Signature, goals: int, values: Sequence[Array], missing: str = ""
-) -> Iterator[Value]:
+) -> Iterator[SignatureRow]:
     """Means at the first ``goals`` goals of ``values``, a row of them a run."""
     for number in range(1, goals + 1):
         own = [run[number - 1] for run in values]
@@ -224,8 +219,8 @@ def by_goal(
 
 
 def mean_of(
-    signature: Signature, place: Place, values: Sequence[float] | Array, missing: str = ""
-) -> Value:
+    signature: Signature, place: Place, values: ArrayLike, missing: str = ""
+) -> SignatureRow:
     """Mean over the runs that have a value, with Student's interval.
 
     ``missing`` says why a run may have none.
@@ -237,11 +232,12 @@ def mean_of(
     return _estimated(signature, place, intervals.mean(known), len(known))
 
 
-def share_of(signature: Signature, place: Place, agrees: Sequence[bool]) -> Value:
+def share_of(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
     """Share of runs, with Wilson's interval."""
     return _estimated(signature, place, intervals.share(agrees), len(agrees))
 
 
-def _estimated(signature: Signature, place: Place, found: intervals.Interval, n: int) -> Value:
-    why = ONE_RUN if n == 1 else ""
-    return signature.at(place, **found._asdict(), n=n, why_not=why)
+def _estimated(
+    signature: Signature, place: Place, found: intervals.Interval, n: int
+) -> SignatureRow:
+    return signature.at(place, **found._asdict(), n=n, why_not=ONE_RUN if n == 1 else "")

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from analysis.statistics import spread
 from analysis.statistics.estimates import (
-    CONFIDENCE,
     RESAMPLES,
+    TAILS,
     Inference,
     bootstrap_estimate,
     middle_mean,
@@ -31,6 +31,8 @@ from coartic.robot import Array
 
 PROFILE_RESAMPLES = 1_999
 """A profile takes percentiles of many thresholds, to be drawn: fewer do for a line's width."""
+Reached = Literal["above", "at most"]
+"""Which side of a threshold counts."""
 
 
 def normalised(rewards: ArrayLike, initial: float, optimum: float) -> Array:
@@ -49,11 +51,7 @@ def gap_share(rewards: ArrayLike, optimum: float) -> Array:
 
 
 def interquartile_mean(
-    scores: Mapping[str, ArrayLike],
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    scores: Mapping[str, ArrayLike], *, seed: int, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of the middle half of all tasks' runs (Agarwal et al. 2021), with BCa interval.
 
@@ -63,33 +61,20 @@ def interquartile_mean(
     interval (NaN).
     """
     samples = tuple(sample(values) for values in scores.values())
-    weights = np.concatenate([np.full(len(values), 1 / len(values)) for values in samples])
 
     def statistic(*strata: Array, axis: int = -1) -> Array:
-        # scipy's jackknife leaves one run out of a stratum: its weights are then made anew.
-        lengths = [values.shape[-1] for values in strata]
-        fits = lengths == [len(values) for values in samples]
-        shares = weights if fits else np.concatenate([np.full(n, 1 / n) for n in lengths])
+        # Of the runs at hand: scipy's jackknife leaves one out of a stratum.
+        shares = np.concatenate([np.full(v.shape[-1], 1 / v.shape[-1]) for v in strata])
         shape = np.broadcast_shapes(*(values.shape[:-1] for values in strata))
         together = [np.broadcast_to(v, (*shape, v.shape[-1])) for v in strata]
         return middle_mean(np.concatenate(together, axis=-1), axis, shares)
 
-    return bootstrap_estimate(
-        f"interquartile mean over {len(samples)} tasks, stratified",
-        samples,
-        statistic,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    name = f"interquartile mean over {len(samples)} tasks, stratified"
+    return bootstrap_estimate(name, samples, statistic, seed, resamples)
 
 
 def task_mean(
-    values: Mapping[str, ArrayLike],
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    values: Mapping[str, ArrayLike], *, seed: int, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean over tasks of the mean over runs, with stratified BCa interval.
 
@@ -100,14 +85,9 @@ def task_mean(
     def statistic(*strata: Array, axis: int = -1) -> Array:
         return np.asarray(sum(spread.mean(runs, axis) for runs in strata) / len(strata))
 
-    return bootstrap_estimate(
-        f"mean over {len(values)} tasks, stratified",
-        tuple(sample(runs) for runs in values.values()),
-        statistic,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    samples = tuple(sample(runs) for runs in values.values())
+    name = f"mean over {len(values)} tasks, stratified"
+    return bootstrap_estimate(name, samples, statistic, seed, resamples)
 
 
 @dataclass(frozen=True)
@@ -118,20 +98,16 @@ class Profile:
     share: Array
     low: Array
     high: Array
-    confidence: float
     n: tuple[int, ...]
     """Runs of each task."""
-    method: str
-    seed: int
 
 
 def profile(
     values: Mapping[str, ArrayLike],
     thresholds: ArrayLike,
-    reached: Literal["above", "at most"],
+    reached: Reached,
     *,
     seed: int,
-    confidence: float = CONFIDENCE,
     resamples: int = PROFILE_RESAMPLES,
 ) -> Profile:
     """Share of runs, each task counting the same, that reach each threshold.
@@ -155,22 +131,11 @@ def profile(
         # How often each run is drawn, times what it reaches.
         counts = rng.multinomial(len(runs), np.full(len(runs), 1 / len(runs)), size=resamples)
         drawn += counts @ runs / len(runs)
-    tail = (1 - confidence) / 2
-    low, high = np.quantile(drawn / len(reaches), [tail, 1 - tail], axis=0)
-    return Profile(
-        levels,
-        share,
-        low,
-        high,
-        confidence,
-        tuple(len(runs) for runs in reaches),
-        f"share of runs {reached} the threshold over {len(reaches)} tasks; stratified "
-        f"percentile bootstrap, {resamples} resamples, pointwise",
-        seed,
-    )
+    low, high = np.quantile(drawn / len(reaches), TAILS, axis=0)
+    return Profile(levels, share, low, high, tuple(map(len, reaches)))
 
 
-def _reached(values: ArrayLike, thresholds: Array, reached: Literal["above", "at most"]) -> Array:
+def _reached(values: ArrayLike, thresholds: Array, reached: Reached) -> Array:
     """1 where a run (row) reaches a threshold (column), else 0."""
     runs = np.asarray(values, dtype=np.float64)
     if runs.ndim != 1 or runs.size == 0:

@@ -20,6 +20,7 @@ from scipy import optimize, special
 from analysis.statistics.estimates import (
     CONFIDENCE,
     FEWEST,
+    NO_SPREAD,
     RESAMPLES,
     Inference,
     sample,
@@ -86,7 +87,6 @@ def difference(ours: ArrayLike, published: Summary, *, margin: float | None = No
         n=(len(values), published.runs) if spread else (len(values),),
         method="difference to the published mean, "
         + ("Welch's interval" if spread else "Student's interval, published mean as exact"),
-        confidence=CONFIDENCE,
         margin=margin,
     )
     if len(values) < 2:
@@ -98,7 +98,7 @@ def difference(ours: ArrayLike, published: Summary, *, margin: float | None = No
         freedoms.append(published.runs - 1)
     total = sum(variances)
     if total == 0.0:
-        return replace(found, low=value, high=value, note="the interval is a point: no spread")
+        return replace(found, low=value, high=value, note=NO_SPREAD)
     freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
     error = math.sqrt(total)
     half = float(special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
@@ -112,35 +112,33 @@ def bootstrap_equivalence(
     margin: float,
     *,
     seed: int,
-    confidence: float = CONFIDENCE,
     resamples: int = RESAMPLES,
 ) -> Equivalence:
     """Mean of ``first`` less mean of ``second`` with its studentised bootstrap interval.
 
     Independent samples, or one against a number taken as known. The bootstrap-t interval of
     Efron & Tibshirani (1993, section 12.5), whose ends are order statistics, so that it lies
-    within the margin just where ``p`` is below (1 − ``confidence``)/2. Fewer than three
-    values in a sample: no interval. No spread in any: a point.
+    within the margin just where ``p`` is below 2.5 %. Fewer than three values in a sample: no
+    interval. No spread in any: a point.
     """
     samples, margin = samples_of(first, second), _positive(margin)
     means = [float(mean(values)) for values in samples]
     value = means[0] - sum(means[1:])
     found = Equivalence(
         estimate=value,
-        n=tuple(len(values) for values in samples),
+        n=tuple(map(len, samples)),
         method=f"difference of means, studentised bootstrap, {resamples} resamples",
-        confidence=confidence,
         margin=margin,
     )
     if min(found.n) < FEWEST:
         return replace(found, note=f"no interval: a sample has fewer than {FEWEST} values")
     error = standard_error(samples)
     if error == 0.0:
-        return replace(found, low=value, high=value, note="the interval is a point: no spread")
+        return replace(found, low=value, high=value, note=NO_SPREAD)
     null = np.sort(studentised_null(samples, resamples, np.random.default_rng(seed)))
-    outside = int((resamples + 1) * (1 - confidence) / 2 + 1e-9)
+    outside = int((resamples + 1) * (1 - CONFIDENCE) / 2 + 1e-9)
     if outside < 1:
-        raise ValueError(f"{resamples} resamples are too few for an interval of {confidence}")
+        raise ValueError(f"{resamples} resamples are too few for an interval of {CONFIDENCE}")
     above = 1 + int((null >= (value + margin) / error).sum())
     below = 1 + int((null <= (value - margin) / error).sum())
     return replace(
@@ -155,34 +153,22 @@ def bootstrap_equivalence(
 def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:
     """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
 
-    Newcombe's interval (:func:`difference_of_shares`). ``p`` is
-    half the error rate at which the interval just touches the margin, 1 where the shares
-    themselves differ by the margin or more.
+    Newcombe's interval (:func:`difference_of_shares`). ``p`` is half the error rate at which
+    the interval just touches the margin, 1 where the shares themselves differ by the margin or
+    more.
     """
-    margin = _positive(margin)
-    found = difference_of_shares(first, second)
+    margin, found = _positive(margin), difference_of_shares(first, second)
 
     def room(z: float) -> float:
         """What the interval of ± z standard errors leaves of the margin."""
         at = difference_of_shares(first, second, confidence=2 * float(special.ndtr(z)) - 1)
         return margin - max(-at.low, at.high)
 
-    p = 1.0
+    touching, widest = -math.inf, 8.0
     if room(0.0) > 0:
-        widest = 8.0
-        p = float(
-            special.ndtr(-(optimize.brentq(room, 0.0, widest) if room(widest) < 0 else widest))
-        )
-    return Equivalence(
-        estimate=found.estimate,
-        n=found.n,
-        method=found.method,
-        low=found.low,
-        high=found.high,
-        confidence=found.confidence,
-        p=p,
-        margin=margin,
-    )
+        touching = widest if room(widest) >= 0 else float(optimize.brentq(room, 0.0, widest))
+    given = {**vars(found), "p": float(special.ndtr(-touching))}
+    return Equivalence(**given, margin=margin)
 
 
 def difference_of_shares(
@@ -205,14 +191,12 @@ def difference_of_shares(
         "difference of shares, score interval (Newcombe 1998, method 10)",
         a - b - math.hypot(a - low_a, high_b - b),
         a - b + math.hypot(high_a - a, b - low_b),
-        confidence,
     )
 
 
 def _wilson(count: int, total: int, confidence: float) -> tuple[float, float, float]:
     """A share with Wilson's interval."""
-    z2 = float(special.ndtri(0.5 + confidence / 2)) ** 2
-    share = count / total
+    z2, share = float(special.ndtri(0.5 + confidence / 2)) ** 2, count / total
     middle = (count + z2 / 2) / (total + z2)
     half = math.sqrt(z2 * (total * share * (1 - share) + z2 / 4)) / (total + z2)
     return share, max(0.0, middle - half), min(1.0, middle + half)

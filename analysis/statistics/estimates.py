@@ -29,6 +29,9 @@ from analysis.statistics import spread
 from coartic.robot import Array
 
 CONFIDENCE = 0.95
+"""Nominal coverage of every interval."""
+TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
+"""The quantiles that such an interval lies between."""
 LEVEL = 0.05
 """Of a test."""
 RESAMPLES = 9_999
@@ -37,6 +40,8 @@ SEED = 0
 """Of every resampling; it has nothing to do with the seeds of the runs."""
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
+_ZERO = np.zeros(1)
+NO_SPREAD = "the interval is a point: no spread"
 
 
 @dataclass(frozen=True)
@@ -49,9 +54,8 @@ class Inference:
     method: str
     """The interval or test, in words."""
     low: float = math.nan
+    """Of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
-    confidence: float = math.nan
-    """Nominal coverage of ``low`` to ``high``."""
     p: float = math.nan
     seed: int | None = None
     """Seed of the resampling; None where nothing was drawn."""
@@ -74,21 +78,14 @@ def sample(values: ArrayLike) -> Array:
     return vector
 
 
-def paired_by_seed(
-    first: pd.DataFrame, second: pd.DataFrame, column: str = "reward"
-) -> tuple[Array, Array]:
-    """A column of two frames of runs, for the values of ``seed`` where both have one.
+def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Array]:
+    """Rewards of two frames of runs, for the values of ``seed`` where both have one.
 
     Raises ValueError where a seed occurs twice in one of them.
     """
-    both = first[["seed", column]].merge(
-        second[["seed", column]], on="seed", validate="one_to_one", suffixes=("_first", "_second")
-    )
-    both = both.dropna()
-    return (
-        both[f"{column}_first"].to_numpy(dtype=np.float64),
-        both[f"{column}_second"].to_numpy(dtype=np.float64),
-    )
+    a, b = (runs[["seed", "reward"]] for runs in (first, second))
+    both = a.merge(b, on="seed", validate="one_to_one").dropna()
+    return both.reward_x.to_numpy(dtype=np.float64), both.reward_y.to_numpy(dtype=np.float64)
 
 
 def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
@@ -98,96 +95,44 @@ def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]
     return sample(first), sample(second)
 
 
-def mean(
-    values: ArrayLike,
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
-) -> Inference:
+def mean(values: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> Inference:
     """Mean with its BCa interval (Efron & Tibshirani 1993, section 14.3).
 
     Fewer than three values: no interval (NaN). All values equal: the interval is that
     point, which says that the sample has no spread, not that the population has none; the
     note says which. Below some ten values the interval is too short.
     """
-    return bootstrap_estimate(
-        "mean",
-        (sample(values),),
-        spread.last_mean,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    return bootstrap_estimate("mean", (sample(values),), spread.mean, seed, resamples)
 
 
 def difference_of_means(
-    first: ArrayLike,
-    second: ArrayLike | float,
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    first: ArrayLike, second: ArrayLike | float, *, seed: int, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of ``first`` less mean of ``second``, independent samples; see :func:`mean`."""
     samples = samples_of(first, second)
-    return bootstrap_estimate(
-        "difference of means" if len(samples) > 1 else "difference to a known value",
-        samples,
-        spread.difference,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    name = "difference of means" if len(samples) > 1 else "difference to a known value"
+    return bootstrap_estimate(name, samples, spread.difference, seed, resamples)
 
 
 def paired_difference(
-    first: ArrayLike,
-    second: ArrayLike,
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    first: ArrayLike, second: ArrayLike, *, seed: int, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of ``first − second``, pair by pair; see :func:`mean`.
 
     Raises ValueError for samples of different length.
     """
-    return bootstrap_estimate(
-        "mean of paired differences",
-        (differences_of_pairs(first, second),),
-        spread.last_mean,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    samples = (differences_of_pairs(first, second),)
+    return bootstrap_estimate("mean of paired differences", samples, spread.mean, seed, resamples)
 
 
-def interquartile_mean(
-    values: ArrayLike,
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
-) -> Inference:
+def interquartile_mean(values: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> Inference:
     """Mean of the middle half of the values (Agarwal et al. 2021); see :func:`mean`."""
-    return bootstrap_estimate(
-        "interquartile mean",
-        (sample(values),),
-        middle_mean,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    samples = (sample(values),)
+    return bootstrap_estimate("interquartile mean", samples, middle_mean, seed, resamples)
 
 
 def probability_of_improvement(
-    first: ArrayLike,
-    second: ArrayLike | float,
-    *,
-    seed: int,
-    confidence: float = CONFIDENCE,
-    resamples: int = RESAMPLES,
+    first: ArrayLike, second: ArrayLike | float, *, seed: int, resamples: int = RESAMPLES
 ) -> Inference:
     """P(a run of ``first`` is higher than one of ``second``), a tie counting half.
 
@@ -197,17 +142,11 @@ def probability_of_improvement(
     then is Newcombe's (2006, method 5), with the estimate as one of its ends. Fewer than
     three values in a sample give no interval here either.
     """
-    found = bootstrap_estimate(
-        "probability of improvement",
-        samples_of(first, second),
-        _improvement,
-        confidence=confidence,
-        resamples=resamples,
-        seed=seed,
-    )
+    samples = samples_of(first, second)
+    found = bootstrap_estimate("probability of improvement", samples, higher, seed, resamples)
     if found.estimate not in (0.0, 1.0) or min(found.n) < FEWEST:
         return found
-    far = _separated(found.n, found.estimate, confidence)
+    far = _separated(found.n, found.estimate)
     return replace(
         found,
         method="probability of improvement, score interval (Newcombe 2006, method 5)",
@@ -236,10 +175,8 @@ def bootstrap_estimate(
     name: str,
     samples: tuple[Array, ...],
     statistic: Callable[..., Any],
-    *,
-    confidence: float,
-    resamples: int,
     seed: int,
+    resamples: int,
 ) -> Inference:
     """A statistic of one or more independent samples with its BCa interval.
 
@@ -249,19 +186,12 @@ def bootstrap_estimate(
     differ there is no interval; where they differ but BCa is not defined, the percentile
     interval stands in, and the note says so.
     """
-    estimate = float(statistic(*samples, axis=-1))
-    found = Inference(
-        estimate,
-        tuple(len(values) for values in samples),
-        f"{name}, BCa bootstrap, {resamples} resamples",
-        confidence=confidence,
-    )
-    if min(found.n) < FEWEST:
+    estimate, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
+    found = Inference(estimate, n, f"{name}, BCa bootstrap, {resamples} resamples")
+    if min(n) < FEWEST:
         return replace(found, note=f"no interval: a sample has fewer than {FEWEST} values")
     if all(np.ptp(values) == 0 for values in samples):
-        return replace(
-            found, low=estimate, high=estimate, note="the interval is a point: no spread"
-        )
+        return replace(found, low=estimate, high=estimate, note=NO_SPREAD)
     with warnings.catch_warnings():
         # scipy warns where BCa is undefined; that case is dealt with below.
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
@@ -272,25 +202,20 @@ def bootstrap_estimate(
             n_resamples=resamples,
             batch=1_000,
             vectorized=True,
-            confidence_level=confidence,
+            confidence_level=CONFIDENCE,
             method="BCa",
             rng=np.random.default_rng(seed),
         )
-    if np.ptp(result.bootstrap_distribution) == 0:
+    drawn = result.bootstrap_distribution
+    if np.ptp(drawn) == 0:
         return replace(found, note="no interval: no resample differs from the sample")
     low, high = map(float, result.confidence_interval)
-    found = replace(found, low=low, high=high, seed=seed)
     if math.isfinite(low) and math.isfinite(high):
-        return found
-    tail = (1 - confidence) / 2
-    low, high = np.quantile(result.bootstrap_distribution, [tail, 1 - tail])
-    return replace(
-        found,
-        method=f"{name}, percentile bootstrap, {resamples} resamples",
-        low=float(low),
-        high=float(high),
-        note="BCa is not defined for this sample",
-    )
+        return replace(found, low=low, high=high, seed=seed)
+    low, high = map(float, np.quantile(drawn, TAILS))
+    method = f"{name}, percentile bootstrap, {resamples} resamples"
+    note = "BCa is not defined for this sample"
+    return replace(found, method=method, low=low, high=high, seed=seed, note=note)
 
 
 def middle_mean(values: Array, axis: int = -1, weights: Array | None = None) -> Array:
@@ -311,10 +236,11 @@ def middle_mean(values: Array, axis: int = -1, weights: Array | None = None) -> 
     return spread.within((inside * ordered).sum(axis=-1) / inside.sum(axis=-1), values, -1)
 
 
-def higher(first: Array, second: Array) -> Array:
+def higher(first: Array, second: Array = _ZERO, axis: int = -1) -> Array:
     """Share of pairs over the last axes in which ``first`` is higher, ties counting half.
 
-    Shapes ``(..., n)`` and ``(..., m)``; takes no more room than one of them.
+    Shapes ``(..., n)`` and ``(..., m)``; takes no more room than one of them. Of one sample
+    alone, differences to a number, those that are positive.
     """
     shape = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
     above, tied = np.zeros(shape), np.zeros(shape)
@@ -326,18 +252,17 @@ def higher(first: Array, second: Array) -> Array:
     return np.asarray(above / pairs + 0.5 * (tied / pairs))
 
 
-def _separated(n: tuple[int, ...], estimate: float, confidence: float) -> float:
+def _separated(n: tuple[int, ...], estimate: float) -> float:
     """Far end of Newcombe's interval (method 5) where the estimate is 0 or 1.
 
     A number taken as known counts as a sample so large that it adds no variance: what
     remains is Wilson's interval of a proportion.
     """
-    z2 = float(special.ndtri(0.5 + confidence / 2)) ** 2
-    many = len(n) > 1
+    z2 = float(special.ndtri(TAILS[1])) ** 2
 
     def excess(theta: float) -> float:
         """Distance to the estimate 1, squared, less z² variances, over 1 − θ."""
-        if not many:
+        if len(n) == 1:
             return (1 - theta) - z2 * theta / n[0]
         spread = (sum(n) / 2 - 1) * ((1 - theta) / (2 - theta) + theta / (1 + theta))
         return (1 - theta) - z2 * theta * (1 + spread) / (n[0] * n[1])
@@ -352,7 +277,3 @@ def differences_of_pairs(first: ArrayLike, second: ArrayLike) -> Array:
     if a.shape != b.shape:
         raise ValueError(f"pairs need samples of one length, not {len(a)} and {len(b)}")
     return a - b
-
-
-def _improvement(*groups: Array, axis: int = -1) -> Array:
-    return higher(groups[0], groups[1] if len(groups) > 1 else np.zeros(1))

@@ -11,7 +11,7 @@ Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, c
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -61,12 +61,14 @@ def bootstrap_test(
     estimate = float(spread.difference(*samples))
     found = Inference(
         estimate,
-        tuple(len(values) for values in samples),
+        tuple(map(len, samples)),
         f"{_TAILS[alternative]} {'two' if len(samples) > 1 else 'one'}-sample bootstrap test "
         f"of the mean, studentised, {resamples} resamples",
     )
-    if (note := _untestable(samples)) is not None:
-        return replace(found, note=note)
+    if min(found.n) < 2:
+        return replace(found, note="no test: a sample has fewer than 2 values")
+    if all(np.ptp(values) == 0 for values in samples):
+        return replace(found, note="no test: no spread to resample")
     error = standard_error(samples)
     observed = np.asarray(estimate / error)
     null = studentised_null(samples, resamples, np.random.default_rng(seed))
@@ -98,16 +100,8 @@ def permutation_test(
     )
     if min(found.n) < 2:
         return replace(found, note="no test: a sample has fewer than 2 values")
-    p = stats.permutation_test(
-        (a, b),
-        _bounded_t,
-        n_resamples=resamples,
-        batch=1_000,
-        vectorized=True,
-        alternative=alternative,
-        rng=np.random.default_rng(seed),
-    ).pvalue
-    return replace(found, p=float(p), seed=None if exact else seed)
+    p = _permuted((a, b), _bounded_t, "independent", alternative, seed, resamples)
+    return replace(found, p=p, seed=None if exact else seed)
 
 
 def sign_flip_test(
@@ -130,23 +124,35 @@ def sign_flip_test(
     )
     exact = 2 ** len(differences) <= resamples
     found = Inference(
-        float(spread.last_mean(differences)),
+        float(spread.mean(differences)),
         (len(differences),),
         f"{_TAILS[alternative]} {_drawn(exact, resamples)} sign-flip test of paired differences",
     )
     if len(differences) < 2:
         return replace(found, note="no test: fewer than 2 pairs")
-    p = stats.permutation_test(
-        (differences,),
-        spread.last_mean,
-        permutation_type="samples",
+    p = _permuted((differences,), spread.mean, "samples", alternative, seed, resamples)
+    return replace(found, p=p, seed=None if exact else seed)
+
+
+def _permuted(
+    samples: tuple[Array, ...],
+    statistic: Callable[..., Array],
+    kind: Literal["independent", "samples"],
+    alternative: Alternative,
+    seed: int,
+    resamples: int,
+) -> float:
+    found = stats.permutation_test(
+        samples,
+        statistic,
+        permutation_type=kind,
+        alternative=alternative,
+        vectorized=True,
         n_resamples=resamples,
         batch=1_000,
-        vectorized=True,
-        alternative=alternative,
         rng=np.random.default_rng(seed),
-    ).pvalue
-    return replace(found, p=float(p), seed=None if exact else seed)
+    )
+    return float(found.pvalue)
 
 
 def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:
@@ -219,14 +225,6 @@ def _p_value(null: Array, observed: Array, alternative: Alternative) -> float:
     tied = np.isclose(null, observed, rtol=1e-9, atol=0.0)
     extreme = tied | (null <= observed if alternative == "less" else null >= observed)
     return float(1 + extreme.sum()) / (1 + len(null))
-
-
-def _untestable(samples: tuple[Array, ...]) -> str | None:
-    if min(len(values) for values in samples) < 2:
-        return "no test: a sample has fewer than 2 values"
-    if all(np.ptp(values) == 0 for values in samples):
-        return "no test: no spread to resample"
-    return None
 
 
 def _drawn(exact: bool, resamples: int) -> str:

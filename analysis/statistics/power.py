@@ -9,6 +9,7 @@ the SDs from runs that show all of them.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 
 from scipy import optimize, special, stats
 
@@ -72,11 +73,7 @@ def runs_needed(
     most = 2
     while not enough(most):
         most *= 2
-    fewest = max(2, most // 2)
-    while fewest < most:
-        middle = (fewest + most) // 2
-        fewest, most = (fewest, middle) if enough(middle) else (middle + 1, most)
-    return most
+    return bisect_left(range(most), True, lo=max(2, most // 2), key=enough)
 
 
 def smallest_difference(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from analysis.statistics import spread
-from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.estimates import TAILS
 from coartic.robot import Array
 
 RESAMPLES = 2_000
@@ -27,8 +27,7 @@ def mean_interval(values: Array, seed: int) -> tuple[Array, Array, Array]:
     drawn = [np.bincount(draw, minlength=len(values)) for draw in _draws(len(values), seed)]
     weights = np.array(drawn) / len(values)
     means = spread.within(weights @ values, values)
-    tail = (1 - CONFIDENCE) / 2
-    low, high = np.quantile(means, [tail, 1 - tail], axis=0)
+    low, high = np.quantile(means, TAILS, axis=0)
     return spread.mean(values), low, high
 
 

@@ -42,11 +42,6 @@ def sd(values: ArrayLike) -> float:
     return math.sqrt(variance(known)) if len(known) > 1 else math.nan
 
 
-def last_mean(values: Array, axis: int = -1) -> Array:
-    """:func:`mean` of the last axis: a statistic as resampling calls it."""
-    return mean(values, axis)
-
-
 def difference(*groups: Array, axis: int = -1) -> Array:
-    """Mean of the first less that of the second, if there is one; likewise."""
+    """Mean of the first less that of the second, if there is one."""
     return mean(groups[0], axis) - (mean(groups[1], axis) if len(groups) > 1 else 0.0)

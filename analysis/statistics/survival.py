@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import CensoredData, ecdf
 
+from analysis.statistics.estimates import CONFIDENCE, TAILS
+
 
 @dataclass(frozen=True)
 class Median:
@@ -20,7 +22,7 @@ class Median:
     high: float
 
 
-def kaplan_meier_median(times: ArrayLike, reached: ArrayLike, confidence: float = 0.95) -> Median:
+def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Median:
     """Median of the product-limit estimate S(t) (Kaplan & Meier, 1958) of the times (n,).
 
     ``reached`` is False for runs that are right-censored at their time, which is infinite
@@ -39,22 +41,21 @@ def kaplan_meier_median(times: ArrayLike, reached: ArrayLike, confidence: float 
     if not len(times):
         raise ValueError("no times")
     if not reached.any():
-        return Median(math.inf, _none_before(len(times), confidence), math.inf)
+        return Median(math.inf, _none_before(len(times)), math.inf)
     times = np.where(np.isinf(times), times[np.isfinite(times)].max(), times)
     estimate = ecdf(CensoredData.right_censored(times, ~reached)).sf
     at, survival = estimate.quantiles, estimate.probabilities
     with warnings.catch_warnings():
         # Where the interval is not defined it is NaN, and seen to below.
         warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-        interval = estimate.confidence_interval(confidence, method="log-log")
+        interval = estimate.confidence_interval(CONFIDENCE, method="log-log")
     lower, upper = interval.low.probabilities, interval.high.probabilities
-    tail = (1 - confidence) / 2
     lower = np.where(survival <= 0, 0.0, np.where(survival >= 1, 1.0, lower))
-    none_left = 1 - tail ** (1 / reached.sum())
+    none_left = 1 - TAILS[0] ** (1 / reached.sum())
     upper = np.where(survival <= 0, none_left, np.where(survival >= 1, 1.0, upper))
     return Median(
         _first(at, survival),
-        min(_first(at, lower), _none_before(len(times), confidence)),
+        min(_first(at, lower), _none_before(len(times))),
         _first(at, upper),
     )
 
@@ -65,6 +66,6 @@ def _first(times: np.ndarray[tuple[int], np.dtype[np.float64]], curve: ArrayLike
     return float(times[below[0]]) if len(below) else math.inf
 
 
-def _none_before(n: int, confidence: float) -> float:
+def _none_before(n: int) -> float:
     """0 where n runs, none of which reached it, do not show that the median is later."""
-    return 0.0 if ((1 - confidence) / 2) ** (1 / n) <= 0.5 else math.inf
+    return 0.0 if TAILS[0] ** (1 / n) <= 0.5 else math.inf

@@ -5,15 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from analysis.claims.data import BEST, UNINFORMED, Data, MissingError
 from analysis.claims.evidence import by_optimum, measured, of_either_optimum
 from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.comparisons.methods import TOLD
 from analysis.methods import LEARNER
 from analysis.report.document import Column, RestsOn, Row, Value
-from analysis.words import NONE, short
 from coartic.method import Information
 from coartic.record import SEARCH
 
@@ -45,36 +45,18 @@ def _learners_runs(data: Data) -> None:
         data.runs(task, LEARNER + condition)
 
 
-class Beside(NamedTuple):
-    """What one method gets on one task, beside others."""
-
-    task: str
-    label: str
-    told: str
-    values: tuple[Value, ...]
-    words: str
-
-    @property
-    def row(self) -> Row:
-        """As a row of a table with the columns :data:`_BESIDE` and those of the values."""
-        key = (self.task, self.label)
-        values = (self.label, self.task, self.told, *self.values)
-        return Row(f"{self.label} on {self.task}", values, (key,))
-
-
 _BESIDE = (
     Column("method", "method"),
     Column("task", "task"),
     Column("told", "told", rests_on=("text",)),
+    Column("reward", "mean reward", "number", digits=1, rests_on=("runs",)),
 )
 
 
 def _beside(
-    data: Data,
-    labels: Iterable[str],
-    values: Callable[[str, str], tuple[tuple[Value, ...], str] | None],
-) -> list[Beside]:
-    """Each method on each task where it can be judged and has values."""
+    data: Data, labels: Iterable[str], values: Callable[[str, str], tuple[Value, ...] | None]
+) -> list[Row]:
+    """Each method on each task where it can be judged and has values, which follow its reward."""
     found = []
     for label, task in itertools.product(labels, _TASKS):
         try:
@@ -83,22 +65,18 @@ def _beside(
             continue
         own = values(task, label)
         if own is not None:
-            found.append(Beside(task, label, data.study.method_rows[task, label].told, *own))
+            row = data.study.method_rows[task, label]
+            shown = (label, task, row.told, row.reward, *own)
+            found.append(Row(f"{label} on {task}", shown, ((task, label),)))
     return found
 
 
-def _in_words(beside: Iterable[Beside]) -> list[str]:
-    """A line a method: what it is told, and its values by task, a dash where it has none."""
-    lines = []
-    for label, own in itertools.groupby(beside, key=lambda entry: entry.label):
-        by_task = {entry.task: entry for entry in own}
-        told = next(reversed(by_task.values())).told
-        shown = (f"{t} {by_task[t].words if t in by_task else NONE}" for t in _TASKS)
-        lines.append(", ".join((f"method {label}", f"told {told}", *shown)))
-    return lines
-
-
-def experience(data: Data) -> Finding:
+@decides(
+    "reward-by-experience",
+    f"trials to come within {NEAR:.0%} of the optimum: Kaplan-Meier median, runs that never "
+    "do counted as censored",
+)
+def _experience(data: Data) -> Finding:
     """Trials until methods that are told no more than the learner come near the optimum."""
     targets = data.study.targets
     near = targets[(targets.spend == "trials") & (targets.share == NEAR)]
@@ -106,53 +84,42 @@ def experience(data: Data) -> Finding:
     # Methods that keep the other arm still, to the optimum with it still: their last row.
     reached = {(row.task, row.method): row for row in rows}
 
-    def values(task: str, label: str) -> tuple[tuple[Value, ...], str] | None:
+    def values(task: str, label: str) -> tuple[Value, ...] | None:
         row = reached.get((task, label))
         if row is None:
             return None
-        reward = data.study.method_rows[task, label].reward
         median = None if math.isinf(row.median) else float(row.median)
-        said = "never" if median is None else f"{median:.0f}"
-        found = by_optimum(row.other_arm, int(row.reached), median)
-        return (
-            (reward, int(row.runs), *found),
-            f"{row.reached}/{row.runs}, {said} ({reward:.1f})",
-        )
+        return (int(row.runs), *by_optimum(row.other_arm, int(row.reached), median))
 
     _learners_runs(data)
-    beside = _beside(data, _labels(data, _uninformed), values)
     near_it = f"within {NEAR:.0%} of the optimum"
     rests: tuple[RestsOn, ...] = ("runs", "optimum")
     return measured(
         "reward-by-experience",
         f"runs {near_it} (of that with the other arm still, for methods "
-        "that keep it so), median trials until then, and in brackets the mean reward at the end; "
+        "that keep it so), median trials until then, and the mean reward at the end; "
         "every method that is told no more than the learner",
         f"Runs that come {near_it}, and median trials until then, over all runs",
         (
             *_BESIDE,
-            Column("reward", "mean reward", "number", digits=1, rests_on=("runs",)),
             Column("runs", "runs", "number", rests_on=("runs",)),
             *of_either_optimum(
                 Column("reached", f"within {NEAR:.0%}", "number", rests_on=rests),
                 Column("median_trials", "median trials", "number", digits=0, rests_on=rests),
             ),
         ),
-        [entry.row for entry in beside],
-        _in_words(beside),
+        _beside(data, _labels(data, _uninformed), values),
     )
 
 
-def computation(data: Data) -> Finding:
+@decides("computation", "forward kinematics and Jacobians")
+def _computation(data: Data) -> Finding:
     """Kinematics that uninformed methods evaluate, and informed ones in their default form."""
     _learners_runs(data)
 
-    def values(task: str, label: str) -> tuple[tuple[Value, ...], str]:
+    def values(task: str, label: str) -> tuple[Value, ...]:
         row = data.study.method_rows[task, label]
-        spent = row.evaluations
-        trial = spent / row.trials if row.trials > 1 else None
-        each = "" if trial is None else f", {short(trial)} a trial"
-        return (row.reward, spent, trial), f"{short(spent)}{each} ({row.reward:.1f})"
+        return (row.evaluations, row.evaluations / row.trials if row.trials > 1 else None)
 
     uninformed = _labels(data, _uninformed)
     informed = [
@@ -160,19 +127,16 @@ def computation(data: Data) -> Finding:
         for label in _labels(data, lambda told: not _uninformed(told))
         if " " not in label and not label.startswith(LEARNER)
     ]
-    beside = _beside(data, [*uninformed, *informed], values)
     return measured(
         "computation",
-        "evaluations of forward kinematics and Jacobian in a run (median), and per trial; in "
-        "brackets the mean reward they buy; letters of what is told: docs/methods.md. First "
+        "evaluations of forward kinematics and Jacobian in a run (median), and per trial, beside "
+        "the mean reward they buy; letters of what is told: docs/methods.md. First "
         "methods that are told no more than the learner, then informed search in its default form",
         "Evaluations of forward kinematics and Jacobian in a run (median)",
         (
             *_BESIDE,
-            Column("reward", "mean reward", "number", digits=1, rests_on=("runs",)),
             Column("evaluations", "evaluations", "number", digits=0, rests_on=("runs",)),
             Column("evaluations_a_trial", "a trial", "number", rests_on=("runs",)),
         ),
-        [entry.row for entry in beside],
-        _in_words(beside),
+        _beside(data, [*uninformed, *informed], values),
     )

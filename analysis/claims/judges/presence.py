@@ -11,10 +11,10 @@ from analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError,
 from analysis.claims.evidence import measured
 from analysis.claims.one_armed import context_distance, sacrifice
 from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.report.document import CellKey, Column, Row, Value
 from analysis.statistics.estimates import LEVEL
-from analysis.words import NONE
 
 _PLAN, _POSTURES = "trajectory-optimisation/", "posture-based/"
 _FREE = " hands=every, other_arm=free"
@@ -52,7 +52,6 @@ PRESENCE = (
 
 _INITIAL = "corrective-alone/given"
 """Whose solution of the one-armed tasks is the initial one."""
-_ANSWERS = {True: "yes", False: "no"}
 
 Seen = tuple[bool, tuple[float, ...]] | None
 """Whether a method shows a signature, and the numbers that say so; None: cannot be said."""
@@ -70,10 +69,7 @@ def _context(data: Data, label: str) -> Seen:
 
 
 def _sacrifice(data: Data, label: str) -> Seen:
-    try:
-        runs = data.signature(ASCENDING, label, "first subtask sacrificed")
-    except MissingError:
-        return None
+    runs = data.signature(ASCENDING, label, "first subtask sacrificed")
     ticks = sacrifice(data, label)
     assert ticks is not None
     low = runs.value if math.isnan(runs.low) else runs.low
@@ -92,34 +88,36 @@ def _equivalence(data: Data, label: str) -> Seen:
 
 
 def _preshaping(data: Data, label: str) -> Seen:
-    try:
-        own = prepared_by_waiting(data.cell(ONE, label))
-    except MissingError:
-        return None
+    own = prepared_by_waiting(data.cell(ONE, label))
     nearer = float(own.mean()) if len(own) else math.nan
     return None if math.isnan(nearer) else (nearer > STEP_APART, (nearer,))
 
 
 def _lead(data: Data, label: str) -> Seen:
+    data.runs(ASCENDING, label)
+    several = len(data.runs(DESCENDING, label)) > 1
     try:
-        data.runs(ASCENDING, label)
-        several = len(data.runs(DESCENDING, label)) > 1
         lead = data.signature(ASCENDING, label, "lead time", 1).value
     except MissingError:
-        seen = context_distance(data, label) is not None and several
-        return (False, (math.nan,)) if seen else None
+        known = several and context_distance(data, label) is not None
+        return (False, (math.nan,)) if known else None
     return lead > 0, (lead,)
 
 
 def _turning(data: Data, label: str) -> Seen:
-    try:
-        own, initial = (
-            sum(data.signature(ASCENDING, name, "turning angle", goal).value for goal in (1, 2))
-            for name in (label, _INITIAL)
-        )
-    except MissingError:
-        return None
+    own, initial = (
+        sum(data.signature(ASCENDING, name, "turning angle", goal).value for goal in (1, 2))
+        for name in (label, _INITIAL)
+    )
     return own <= initial - TURN_APART, (own,)
+
+
+def _reward(data: Data, label: str) -> float:
+    return float(rewards_of(data.runs(ASCENDING, label)).mean())
+
+
+def _number(name: str, header: str, unit: str = "", digits: int = 2) -> Column:
+    return Column(name, header, "number", unit, digits, rests_on=("runs",), printed=False)
 
 
 class _Sign(NamedTuple):
@@ -127,70 +125,45 @@ class _Sign(NamedTuple):
 
     name: str
     show: Callable[[Data, str], Seen]
-    style: str
-    """Of its numbers in words."""
     numbers: tuple[Column, ...]
-    said: str = ""
-    """What the numbers in words are."""
     two_armed: bool = False
 
     @property
-    def head(self) -> str:
-        """Its name with what stands behind it in words."""
-        return f"{self.name} ({self.said})" if self.said else self.name
-
-    def words(self, seen: Seen) -> str:
-        """``yes, 0.43``."""
-        if seen is None:
-            return NONE
-        present, numbers = seen
-        known = not math.isnan(numbers[0])
-        return ", ".join((_ANSWERS[present], *([self.style.format(*numbers)] if known else [])))
+    def columns(self) -> tuple[Column, ...]:
+        """Whether it is there, and its numbers."""
+        return (Column(self.name.replace("-", "_"), self.name, rests_on=("runs",)), *self.numbers)
 
 
-def _number(name: str, header: str, unit: str = "", digits: int = 2) -> Column:
-    return Column(name, header, "number", unit, digits, rests_on=("runs",), printed=False)
-
-
-_CHANGES = (
-    _number("first_change", "first movement", "ticks", 1),
-    _number("total_change", "all movements", "ticks", 1),
-)
-_PARTS = (
-    _number("equivalent_part", "motor-equivalent part", digits=3),
-    _number("other_part", "other part", digits=3),
-)
-_APART = (_number("context_distance", "postures apart"),)
-_NEARER = (_number("nearer", "waiting hand nearer"),)
-_LEAD = (_number("lead_time", "lead time", "ticks", 0),)
-_ANGLES = (_number("turning_angles", "turning angles", "rad"),)
 _SIGNS = (
-    _Sign("context", _context, "{:.2f}", _APART),
-    _Sign("sacrifice", _sacrifice, "{:+.1f}, {:+.1f}", _CHANGES, "first, all"),
-    _Sign("motor-equivalent", _equivalence, "{:.3f} and {:.3f}", _PARTS),
-    _Sign("preshaping", _preshaping, "{:+.2f}", _NEARER, two_armed=True),
-    _Sign("lead", _lead, "{:.0f} ticks", _LEAD),
-    _Sign("turning", _turning, "{:.2f} rad", _ANGLES),
+    _Sign("context", _context, (_number("context_distance", "postures apart"),)),
+    _Sign(
+        "sacrifice",
+        _sacrifice,
+        (
+            _number("first_change", "first movement", "ticks", 1),
+            _number("total_change", "all movements", "ticks", 1),
+        ),
+    ),
+    _Sign(
+        "motor-equivalent",
+        _equivalence,
+        (
+            _number("equivalent_part", "motor-equivalent part", digits=3),
+            _number("other_part", "other part", digits=3),
+        ),
+    ),
+    _Sign("preshaping", _preshaping, (_number("nearer", "waiting hand nearer"),), two_armed=True),
+    _Sign("lead", _lead, (_number("lead_time", "lead time", "ticks", 0),)),
+    _Sign("turning", _turning, (_number("turning_angles", "turning angles", "rad"),)),
 )
-_HEADS = ("method", "reward (ascending)", *(sign.head for sign in _SIGNS))
 
 
-def _columns(sign: _Sign) -> tuple[Column, ...]:
-    return (Column(sign.name.replace("-", "_"), sign.name, rests_on=("runs",)), *sign.numbers)
-
-
-def _reward(data: Data, label: str) -> float | None:
-    try:
-        return float(rewards_of(data.runs(ASCENDING, label)).mean())
-    except MissingError:
-        return None
-
-
-def shared_signatures(data: Data) -> Finding:
+@decides("shared-signatures", PRESENCE)
+def _shared_signatures(data: Data) -> Finding:
     """Every representative that the folder has, with every signature."""
     data.runs(ASCENDING, f"{LEARNER}EC1")
     data.runs(DESCENDING, f"{LEARNER}EC1")
-    rows, words = [], []
+    rows = []
     shown: dict[str, list[str]] = {}
     for name, one, two in REPRESENTATIVES:
         seen = [data.recorded(sign.show, two if sign.two_armed else one) for sign in _SIGNS]
@@ -198,25 +171,24 @@ def shared_signatures(data: Data) -> Finding:
             continue
         reward, cells = data.recorded(_reward, one)
         values: list[Value] = [name, reward]
-        texts = [name, NONE if reward is None else f"{reward:.1f}"]
         by_column: dict[str, tuple[CellKey, ...]] = {}
         for sign, (found, own) in zip(_SIGNS, seen, strict=True):
-            present, numbers = found or (None, (None,) * len(sign.numbers))
-            values += [None if present is None else _ANSWERS[present], *numbers]
-            texts.append(sign.words(found))
-            by_column |= {column.name: own for column in _columns(sign) if own != cells}
-            if present is not None:
-                shown.setdefault(sign.head, []).extend([name] * present)
+            if found is None:
+                values += [None] * len(sign.columns)
+            else:
+                present, numbers = found
+                values += ["yes" if present else "no", *numbers]
+                shown.setdefault(sign.name, []).extend([name] * present)
+            by_column |= {column.name: own for column in sign.columns if own != cells}
         rows.append(Row(name, tuple(values), cells, by_column))
-        words.append(", ".join(map(" ".join, zip(_HEADS, texts, strict=True))))
     columns = (
         Column("method", "method"),
         Column("reward", "reward, ascending", "number", digits=1, rests_on=("runs",)),
-        *(column for sign in _SIGNS for column in _columns(sign)),
+        *(column for sign in _SIGNS for column in sign.columns),
     )
-    found_in = {
-        sign.head: ", ".join(shown[sign.head]) or "none" if sign.head in shown else "not judged"
+    evidence = "; ".join(
+        f"{sign.name}: "
+        + (", ".join(shown[sign.name]) or "none" if sign.name in shown else "not judged")
         for sign in _SIGNS
-    }
-    evidence = "; ".join(map(": ".join, found_in.items()))
-    return measured("shared-signatures", evidence, "Signatures", columns, rows, words)
+    )
+    return measured("shared-signatures", evidence, "Signatures", columns, rows)

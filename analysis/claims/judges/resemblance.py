@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from analysis.claims.data import Data, MissingError
+from analysis.claims.data import SMOOTH, Data, MissingError
 from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.hypotheses import bootstrap_test
@@ -16,40 +17,37 @@ from analysis.words import interval
 from coartic.robot import Array
 
 SHARE = 0.5
-CRITERION = (
-    "the postures at the goals lie less than half as far from the plan's as the initial "
-    "solution's do"
-)
-TEST = (
+"""Of the initial solution's distance to the plan; ``claims.toml`` says half."""
+_TEST = (
     "one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to the "
     "plan, learned over initial, is below 0.5; BCa interval of the ratio"
 )
 _OPTIMUM = "optimum/dynamic-programming"
 
 
-def resembles(cost: str) -> Callable[[Data], Finding]:
-    """A judge of the resemblance to the plan of one smoothness cost."""
+def _resembles(cost: str, data: Data) -> Finding:
+    """Whether learned postures resemble the plan of one smoothness cost."""
+    tests, parts = [], []
+    for task in ("ascending", "descending"):
+        learner, initial = data.cell(task, f"{LEARNER}EC1"), data.initial(task)
+        (plan,) = data.cell(task, f"trajectory-optimisation/{cost}").runs
+        planned = plan.execution.configurations
+        before = _apart(initial.configurations, planned)
+        ratios = np.array(
+            [_apart(run.execution.configurations, planned) / before for run in learner.runs]
+        )
+        test = bootstrap_test(-ratios, -SHARE, seed=SEED)
+        tests.append(replace(test, method=f"{test.method}, sign turned"))
+        parts.append(
+            f"{task}: initial {before:.2f} from the plan, learned "
+            f"{interval(mean(ratios, seed=SEED), '.2f')} times as far"
+            + _optimum(data, task, planned, before)
+        )
+    return Finding(all(t.estimate > 0 for t in tests), "; ".join(parts), tuple(tests))
 
-    def decide(data: Data) -> Finding:
-        tests, parts = [], []
-        for task in ("ascending", "descending"):
-            learner, initial = data.cell(task, f"{LEARNER}EC1"), data.initial(task)
-            (plan,) = data.cell(task, f"trajectory-optimisation/{cost}").runs
-            planned = plan.execution.configurations
-            before = _apart(initial.configurations, planned)
-            ratios = np.array(
-                [_apart(run.execution.configurations, planned) / before for run in learner.runs]
-            )
-            test = bootstrap_test(-ratios, -SHARE, seed=SEED)
-            tests.append(replace(test, method=f"{test.method}, sign turned"))
-            parts.append(
-                f"{task}: initial {before:.2f} from the plan, learned "
-                f"{interval(mean(ratios, seed=SEED), '.2f')} times as far"
-                + _optimum(data, task, planned, before)
-            )
-        return Finding(all(t.estimate > 0 for t in tests), "; ".join(parts), tuple(tests))
 
-    return decide
+for _cost in SMOOTH:
+    decides(f"resembles-{_cost}", _TEST)(partial(_resembles, _cost))
 
 
 def _optimum(data: Data, task: str, planned: Array, before: float) -> str:

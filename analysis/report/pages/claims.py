@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.claims.register import Judged
 from analysis.markup import code, escaped
-from analysis.report.document import Block, Bullets, Document, Prose, Section
+from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from analysis.report.legends import with_legends
 from analysis.report.summary import verdicts
 from analysis.report.tables import claims_table
@@ -23,7 +24,7 @@ def claims_document(study: Study) -> Document:
     """The register as a document: counts, a table of verdicts, then claim by claim."""
     specification = study.results.manifest.specification
     table = claims_table(study)
-    counted = verdicts(study.judged, "verdicts")
+    shown = [_as_printed(table)] if table else []
     groups = [
         (title, list(own))
         for title, own in itertools.groupby(study.judged, key=lambda entry: entry.claim.section)
@@ -32,7 +33,7 @@ def claims_document(study: Study) -> Document:
     return Document(
         "Claims",
         (
-            Section("verdicts", "Verdicts", (counted, *([table] if table else []))),
+            Section("verdicts", "Verdicts", (verdicts(study.judged, "verdicts"), *shown)),
             *(
                 Section(names[title], title, (), tuple(map(claim_section, own)))
                 for title, own in groups
@@ -66,6 +67,13 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
         blocks.append(with_legends(entry.table))
     title = f"{claim.id}: {entry.marked}"
     return Section(f"claim-{claim.id}", title, tuple(blocks), folded=True)
+
+
+def _as_printed(table: DataTable) -> DataTable:
+    """Without what the claims' own sections say."""
+    kept = [place for place, column in enumerate(table.columns) if column.printed]
+    rows = [replace(row, values=tuple(row.values[place] for place in kept)) for row in table.rows]
+    return replace(table, columns=tuple(table.columns[place] for place in kept), rows=tuple(rows))
 
 
 def _basis(entry: Judged) -> str:

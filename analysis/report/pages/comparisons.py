@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from analysis.comparisons.overall import everywhere
 from analysis.comparisons.pairs import PairRow
 from analysis.markup import code, escaped
 from analysis.report.document import Block, Bullets, Document, Prose, Section
@@ -27,11 +26,8 @@ _OTHERS = {"conditions": "other conditions", "variant": "its variants", "method"
 def comparisons_document(study: Study) -> Document:
     """Pairs of methods task by task, then the methods that ran on all tasks."""
     specification = study.results.manifest.specification
-    about: Block = Prose(
-        ("The folder has no runs of the learner under a condition of the paper.",)
-    )
-    if study.pair_rows:
-        about = Bullets(reading_of_pairs(study))
+    none = Prose(("The folder has no runs of the learner under a condition of the paper.",))
+    about = Bullets(reading_of_pairs(study)) if study.pair_rows else none
     return Document(
         "Methods against each other",
         (
@@ -41,7 +37,7 @@ def comparisons_document(study: Study) -> Document:
         ),
         f"On suite {code(specification.suite)}, seed {specification.seed}. Numbers and more "
         "of them: `comparisons.csv`, `across_tasks.csv`, `profiles.csv` (docs/statistics.md).",
-        {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
+        study.run_ids,
     )
 
 
@@ -102,27 +98,21 @@ def _across(study: Study) -> Iterator[Block]:
     tasks = list(dict.fromkeys(study.scores.task))
     names = escaped(", ".join(tasks)) or "none"
     table = overall_table(study)
+    text = (
+        f"On {names}. Intervals are about other runs, not other tasks; there are none for "
+        "methods that are run once, and none where the runs of each task all reach a gap "
+        "or none does. *dual-process (EC1, EC4)*: EC1 on one-armed tasks, EC4 on those "
+        "with two arms; likewise EC3, and variants."
+    )
     if len(tasks) < 2:
-        yield Prose(
-            (f"Needs at least two tasks with known optimum and initial solution; here: {names}.",)
-        )
+        text = f"Needs at least two tasks with known optimum and initial solution; here: {names}."
     elif table is None:
-        yield Prose((f"No method ran on all of {names}, the optimum's searches aside.",))
-    else:
-        yield Prose(
-            (
-                f"On {names}. Intervals are about other runs, not other tasks; there are none for "
-                "methods that are run once, and none where the runs of each task all reach a gap "
-                "or none does. *dual-process (EC1, EC4)*: EC1 on one-armed tasks, EC4 on those "
-                "with two arms; likewise EC3, and variants.",
-            )
-        )
-        yield with_legends(table)
-        complete = everywhere(study.scores)
-        left = [
-            name
-            for name in dict.fromkeys(study.scores.method)
-            if name not in complete and not name.startswith(SEARCH)
-        ]
-        if left:
-            yield Prose((f"Not run on all of these tasks: {escaped(', '.join(left))}.",))
+        text = f"No method ran on all of {names}, the optimum's searches aside."
+    yield Prose((text,))
+    if table is None:
+        return
+    yield with_legends(table)
+    others = dict.fromkeys(study.scores.method[~study.scores.method.isin(study.overall.method)])
+    left = escaped(", ".join(name for name in others if not name.startswith(SEARCH)))
+    if left:
+        yield Prose((f"Not run on all of these tasks: {left}.",))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from analysis.markup import escaped
-from analysis.report.document import Bullets, DataTable, Document, Prose, Section
+from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from analysis.report.legends import with_legends
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.cost import (
@@ -25,19 +25,14 @@ if TYPE_CHECKING:
 
 def frontier_document(study: Study) -> Document:
     """All tables of reward against cost, task by task."""
-    sections = [
-        Section(
-            f"on-{slug}",
-            marked(study, task),
-            (optima_known(study, task), *cost_tables(study, task)),
-        )
-        for task, slug in table_ids(study).items()
-    ]
-    return Document(
-        "Reward and what it costs",
-        (Section("reading", "How to read it", (Bullets(READING_OF_COST),)), *sections),
-        runs={key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()},
-    )
+    reading = Section("reading", "How to read it", (Bullets(READING_OF_COST),))
+    by_task = (_on(study, task, slug) for task, slug in table_ids(study).items())
+    return Document("Reward and what it costs", (reading, *by_task), runs=study.run_ids)
+
+
+def _on(study: Study, task: str, slug: str) -> Section:
+    blocks: tuple[Block, ...] = optima_known(study, task), *cost_tables(study, task)
+    return Section(f"on-{slug}", marked(study, task), blocks)
 
 
 def cost_tables(study: Study, task: str) -> Iterator[DataTable]:
@@ -61,21 +56,15 @@ def _optimum(study: Study, task: str, arm: str) -> str:
     known = study.optima.get((task, arm))
     if known is None:
         return f"none is known with the other arm {arm}, so nothing is said of nearness to it"
-    best = typographic(str(known.reward))
+    sure = "**not proven**: the best that was found, by search alone"
     if known.proven:
         sure = "proven"
-    elif known.bound is None:
-        sure = "**not proven**: the best that was found, by search alone"
-    else:
+    elif known.bound is not None:
         bound = typographic(str(known.bound))
         sure = f"**not proven**: the best that was found; none exceeds {bound}"
-    return f"{best} with the other arm {arm} ({sure})" + _nobody(study, task, arm)
-
-
-def _nobody(study: Study, task: str, arm: str) -> str:
-    """Where no run came near there is no table that says so."""
+    said = f"{typographic(str(known.reward))} with the other arm {arm} ({sure})"
     frame = study.targets[(study.targets.task == task) & (study.targets.other_arm == arm)]
     if not len(frame) or frame.reached.any():
-        return ""
-    names = ", ".join(dict.fromkeys(frame.method))
-    return f", which no run came near: {escaped(names)}"
+        return said
+    # There is no table that says so.
+    return f"{said}, which no run came near: {escaped(', '.join(dict.fromkeys(frame.method)))}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -11,13 +11,13 @@ from analysis.markup import escaped
 from analysis.report.document import CellKey, Column, DataTable, Row, Value
 from analysis.report.tables.common import table, table_ids
 from analysis.report.tables.signatures import (
-    estimate_of,
+    cells_of,
     holm_adjusted,
     identifier,
+    known,
     labels_of,
     p_column,
     runs_column,
-    spot_of,
     value_column,
 )
 from analysis.signatures.locus import families
@@ -34,28 +34,23 @@ _NO_SLOPE = 1e-12
 
 def contexts_table(study: Study) -> DataTable | None:
     """Postures at a shared goal before different successors; long ones are folded."""
-    found: dict[tuple[str, str, str], list[SignatureRow]] = {}
+    found: dict[tuple[str, str, str], dict[str, SignatureRow]] = defaultdict(dict)
+    places: dict[tuple[str, str], list[SignatureRow]] = defaultdict(list)
     for row in study.signature_rows:
-        if REGISTER[row.signature] in CONTEXTS and row.place.against and not math.isnan(row.value):
+        if REGISTER[row.signature] in CONTEXTS and row.place.against and known(row):
             at = str(replace(row.place, longest=None))
-            found.setdefault((row.task, at, row.label), []).append(row)
-    adjusted: dict[tuple[str, str, str, str], float] = {}
-    for task, at in dict.fromkeys(key[:2] for key in found):
-        own = [row for key, rows in found.items() if key[:2] == (task, at) for row in rows]
-        for (label, spot), p in holm_adjusted(own).items():
-            adjusted[task, at, label, spot.signature.name] = p
-    tested = {name for *_, name in adjusted}
+            found[row.task, at, row.label][row.signature] = row
+            places[row.task, at].append(row)
+    adjusted = {row: p for own in places.values() for row, p in holm_adjusted(own).items()}
+    tested = {row.signature for row in adjusted}
     rows = []
-    for (task, at, label), group in found.items():
-        own_rows = {row.signature: row for row in group}
-        values: list[Value] = [label, f"{task}, {at}", max(row.n for row in group)]
+    for (task, at, label), own in found.items():
+        values: list[Value] = [label, f"{task}, {at}", max(row.n for row in own.values())]
         for signature in CONTEXTS:
-            one = own_rows.get(signature.name)
-            values.append(estimate_of(one) if one else None)
-            if signature.name in tested:
-                values.append(adjusted.get((task, at, label, signature.name)))
-        values.append(max((row.place.longest or 0 for row in group), default=0) or None)
-        cells = _cells_there(study, [(task, label), (group[0].place.against, label)])
+            values += cells_of(own.get(signature.name), adjusted, signature.name in tested)
+        values.append(max(row.place.longest or 0 for row in own.values()) or None)
+        against = next(iter(own.values())).place.against
+        cells = _cells_there(study, [(task, label), (against, label)])
         rows.append(Row(f"{task}, {at}, {label}", tuple(values), cells))
     made = table(
         "contexts",
@@ -88,10 +83,10 @@ def _columns_of_contexts(tested: set[str]) -> tuple[Column, ...]:
 
 def slopes_tables(study: Study) -> list[DataTable]:
     """How the posture at a goal follows a neighbouring goal, a table for each goal and hand."""
-    found: dict[tuple[str, Place], list[SignatureRow]] = {}
+    found: dict[tuple[str, Place], list[SignatureRow]] = defaultdict(list)
     for row in study.signature_rows:
-        if REGISTER[row.signature] in FAMILIES and not math.isnan(row.value):
-            found.setdefault((row.task, replace(row.place, joint="")), []).append(row)
+        if REGISTER[row.signature] in FAMILIES and known(row):
+            found[row.task, replace(row.place, joint="")].append(row)
     made = [_slopes_at(study, task, place, rows) for (task, place), rows in found.items()]
     return [replace(table, folded=True) for table in made if table is not None]
 
@@ -102,20 +97,17 @@ def _slopes_at(
     """Norm and slopes of all methods; joints that nowhere follow are left out."""
     kept = {row.place.joint for row in rows if abs(row.value) > _NO_SLOPE}
     rows = [row for row in rows if row.place.joint in kept]
-    own = {(row.label, spot_of(row)): row for row in rows}
-    adjusted = {
-        **holm_adjusted(row for row in rows if row.place.joint),
-        **holm_adjusted(row for row in rows if not row.place.joint),
-    }
+    norms, slopes = ([row for row in rows if bool(row.place.joint) == of] for of in (False, True))
+    adjusted = holm_adjusted(norms) | holm_adjusted(slopes)
     family = next(f for f in families(study.tasks) if task in f.tasks and f.moving == place.moving)
     found = []
     for label in labels_of(study, task):
         cells = _cells_there(study, [(name, label) for name in family.tasks])
-        mine = [(spot, row) for (whose, spot), row in own.items() if whose == label]
-        for spot, row in sorted(mine, key=lambda pair: bool(pair[0].joint)):
-            what = spot.joint or "norm"
-            values = (label, what, row.n, estimate_of(row), adjusted.get((label, spot)))
-            found.append(Row(f"{label}, {what}", values, cells))
+        for row in (*norms, *slopes):
+            if row.label == label:
+                what = row.place.joint or "norm"
+                values = (label, what, row.n, *cells_of(row, adjusted, True))
+                found.append(Row(f"{label}, {what}", values, cells))
     slope = REGISTER["locus slope"]
     return table(
         f"slopes-{table_ids(study)[task]}-{place.goal}-of-{place.moving}-{place.hand}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
@@ -13,7 +14,7 @@ from analysis.comparisons.pareto import TIME_TOLERANCE
 from analysis.comparisons.progress import LABELS, SPENDS
 from analysis.comparisons.targets import Target
 from analysis.markup import escaped
-from analysis.report.document import Column, DataTable, Estimate, RestsOn, Row, Value
+from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.report.tables.common import finite, table, table_ids, with_interval
 from analysis.words import typographic
 from coartic.record import SEARCH
@@ -46,8 +47,8 @@ READING_OF_COST = (
     "left out; methods on no front are in `pareto.csv`.",
 )
 """What is behind the tables of this module."""
-_RUNS: tuple[RestsOn, ...] = ("runs",)
-_OPTIMUM: tuple[RestsOn, ...] = ("runs", "optimum")
+_number = partial(Column, kind="number", rests_on=("runs",))
+_of_optimum = partial(Column, kind="number", rests_on=("runs", "optimum"))
 _SUFFIX = {"trials": "", "forward_kinematics": "-kinematics"}
 
 
@@ -62,33 +63,33 @@ def targets_table(
     """Spend to come near an optimum, the method that does so most often on top."""
     frame = _of_methods(study.targets, task)
     frame = frame[(frame.spend == spend) & (frame.other_arm == other_arm)]
-    methods: dict[str, list[Target]] = {}
-    for row in frame.itertuples(index=False, name=None):
-        target = Target(*row)
-        methods.setdefault(target.method, []).append(target)
+    methods = {
+        str(name): [Target(*row) for row in own.itertuples(index=False, name=None)]
+        for name, own in frame.groupby("method", sort=False)
+    }
     near = [rows for rows in methods.values() if any(row.reached for row in rows)]
     if not near:
         return None
-    columns = [
-        Column("method", "method"),
-        *_within(near[0], spend, other_arm),
-        Column("horizon", "horizon", "number", digits=0, rests_on=_RUNS, printed=False),
-    ]
-    widest = near[0][0].share
+    of_spend, of_arm = _SUFFIX[spend], "" if other_arm == "free" else "-still"
     never = ", ".join(name for name, rows in methods.items() if rows not in near)
-    ending = "" if other_arm == "free" else "-still"
+    note = (
+        "Runs that came within a share of the optimum, and the median spend to get there "
+        "over all runs (Kaplan-Meier; runs stopped by their budget are censored at the "
+        f"horizon).{' Planners need no trials.' if spend == 'trials' else ''}"
+    )
+    if never:
+        note += f" Never within {100 * near[0][0].share:.0f} %: {escaped(never)}."
     return table(
-        f"targets-{table_ids(study)[task]}{_SUFFIX[spend]}{ending}",
+        f"targets-{table_ids(study)[task]}{of_spend}{of_arm}",
         f"{LABELS[spend].capitalize()} to come near the optimum of {escaped(task)}, other arm "
         f"{other_arm}.",
-        tuple(columns),
-        [_target_row(rows) for rows in sorted(near, key=_nearness)],
         (
-            "Runs that came within a share of the optimum, and the median spend to get there "
-            "over all runs (Kaplan-Meier; runs stopped by their budget are censored at the "
-            f"horizon).{' Planners need no trials.' if spend == 'trials' else ''}"
-            + (f" Never within {100 * widest:.0f} %: {escaped(never)}." if never else ""),
+            Column("method", "method"),
+            *_within(near[0], spend, other_arm),
+            _number("horizon", "horizon", digits=0, printed=False),
         ),
+        [_target_row(rows) for rows in sorted(near, key=_nearness)],
+        (note,),
     )
 
 
@@ -96,15 +97,11 @@ def _within(targets: list[Target], spend: str, other_arm: OtherArm) -> Iterator[
     """Of each share two columns: runs that came so near, and what it took."""
     for target in targets:
         name = f"within_{target.share:.0%}".rstrip("%")
-        printed = target in (targets[0], targets[-1])
         head = f"within {100 * target.share:.0f} %: {typographic(str(target.target))}"
-        yield Column(
-            f"{name}_reached", head, rests_on=_OPTIMUM, other_arm=other_arm, printed=printed
-        )
-        yield Column(
-            name, f"median {LABELS[spend]}", "number", digits=0, rests_on=_OPTIMUM,
-            other_arm=other_arm, printed=printed,
-        )  # fmt: skip
+        ends = target in (targets[0], targets[-1])
+        column = partial(_of_optimum, other_arm=other_arm, printed=ends)
+        yield column(f"{name}_reached", head, kind="text")
+        yield column(name, f"median {LABELS[spend]}", digits=0)
 
 
 def _target_row(targets: list[Target]) -> Row:
@@ -136,29 +133,30 @@ def areas_table(study: Study, task: str) -> DataTable | None:
     frame = _of_methods(study.areas, task)
     arms = [arm for arm in other_arms(study, task) if (frame.other_arm == arm).any()]
     spends = [spend for spend in SPENDS if (frame.spend == spend).any()]
-    known = {
-        (area.method, area.other_arm, area.spend): area
-        for area in (Area(*row) for row in frame.itertuples(index=False, name=None))
-    }
-    rows = [
-        Row(
-            method,
-            (method, *(_area(known.get((method, arm, of))) for arm in arms for of in spends)),
-            ((task, method),),
-        )
-        for method in dict.fromkeys(map(str, frame.method))
-    ]
-    rows.sort(key=lambda row: _number(row.values[1]))  # noqa: PD011 (no frame)
+    places = [(arm, spend) for arm in arms for spend in spends]
+    known: dict[str, dict[tuple[str, str], Area]] = {}
+    for row in frame.itertuples(index=False, name=None):
+        area = Area(*row)
+        known.setdefault(area.method, {})[area.other_arm, area.spend] = area
+
+    def first(method: str) -> float:
+        return known[method][places[0]].area if places[0] in known[method] else math.inf
+
+    rows = []
+    for method in sorted(known, key=first):
+        own = (known[method].get(place) for place in places)
+        values = (found and with_interval(found.area, found.low, found.high) for found in own)
+        rows.append(Row(method, (method, *values), ((task, method),)))
     heads = [
-        Column(
+        _of_optimum(
             spend if arm == "free" else f"{spend}_still",
             f"over {LABELS[spend]}" + ("" if arm == "free" else ", arm still"),
-            "number", digits=3, rests_on=_OPTIMUM, other_arm=arm,
-            printed=arm == "free" and place < 2,
+            digits=3,
+            other_arm=arm,
+            printed=arm == "free" and spend in spends[:2],
         )
-        for arm in arms
-        for place, spend in enumerate(spends)
-    ]  # fmt: skip
+        for arm, spend in places
+    ]
     return table(
         f"areas-{table_ids(study)[task]}",
         f"Area under the anytime curve on {escaped(task)}.",
@@ -172,10 +170,6 @@ def areas_table(study: Study, task: str) -> DataTable | None:
     )
 
 
-def _area(area: Area | None) -> Value:
-    return None if area is None else with_interval(area.area, area.low, area.high)
-
-
 def pareto_table(study: Study, task: str) -> DataTable | None:
     """Methods on some Pareto set of reward and spend."""
     frame = study.pareto[study.pareto.task == task]
@@ -187,17 +181,15 @@ def pareto_table(study: Study, task: str) -> DataTable | None:
     heads = [
         Column("method", "method"),
         Column("told", "told", rests_on=("text",)),
-        Column("reward", "reward", "number", "ticks", 1, rests_on=_RUNS),
+        _number("reward", "reward", unit="ticks", digits=1),
     ]
-    for place, spend in enumerate(LABELS):
-        printed = place < 3
+    for place, (spend, label) in enumerate(LABELS.items()):
+        share = partial(_number, kind="share", digits=0)
         heads += [
-            Column(spend, LABELS[spend], "number", rests_on=_RUNS, printed=printed),
-            Column(f"{spend}_front", "on front", "share", digits=0, rests_on=_RUNS,
-                   printed=printed),
-            Column(f"{spend}_told", "of those told no more", "share", digits=0, rests_on=_RUNS,
-                   printed=False),
-        ]  # fmt: skip
+            _number(spend, label, printed=place < 3),
+            share(f"{spend}_front", "on front", printed=place < 3),
+            share(f"{spend}_told", "of those told no more", printed=False),
+        ]
     return table(
         f"pareto-{table_ids(study)[task]}",
         f"Pareto sets of reward and spend on {escaped(task)}.",
@@ -223,9 +215,3 @@ def _on_fronts(rows: pd.DataFrame) -> Iterator[Value]:
 def _of_methods(frame: pd.DataFrame, task: str) -> pd.DataFrame:
     """Rows of a task without the optimum's searches, which are what the others are held to."""
     return frame[(frame.task == task) & ~frame.method.str.startswith(SEARCH)]
-
-
-def _number(value: Value) -> float:
-    if isinstance(value, Estimate):
-        return value.value
-    return value if isinstance(value, int | float) else math.inf

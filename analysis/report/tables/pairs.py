@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.comparisons.pairs import PairRow
+from analysis.comparisons.pairs import RUNS_FOR, PairRow
 from analysis.comparisons.targets import SHARES
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, RestsOn, Row, Value
@@ -17,10 +18,7 @@ from analysis.words import typographic
 if TYPE_CHECKING:
     from analysis.study import Study
 
-Cell = tuple[Column, Callable[[PairRow], Value]]
-"""A column, and its value of a pair."""
 _KINDS = ("conditions", "method", "variant")
-_RUNS: tuple[RestsOn, ...] = ("runs",)
 _OPTIMUM: tuple[RestsOn, ...] = ("runs", "optimum")
 
 
@@ -112,100 +110,85 @@ def _pairing(study: Study) -> str:
     )
 
 
-def _number(
-    name: str,
-    header: str,
-    unit: str = "",
-    digits: int | None = None,
-    rests_on: tuple[RestsOn, ...] = _RUNS,
-    printed: bool = True,
-) -> Cell:
-    column = Column(name, header, "number", unit, digits, rests_on=rests_on, printed=printed)
-    return column, lambda row: _value(getattr(row, name))
-
-
-def _estimate(name: str, header: str, unit: str, digits: int, printed: bool = True) -> Cell:
-    """A number with its interval, whose ends are fields of their own."""
-    of = "" if name == "difference" else f"{name}_"
-    column = Column(name, header, "number", unit, digits, rests_on=_RUNS, printed=printed)
-    return column, lambda row: with_interval(
-        getattr(row, name), getattr(row, f"{of}low"), getattr(row, f"{of}high")
-    )
-
-
-def _p(name: str, header: str, printed: bool = False) -> Cell:
-    column = Column(name, header, "p", digits=4, rests_on=_RUNS, printed=printed)
-    return column, lambda row: finite(getattr(row, name))
-
-
-def _text(name: str, header: str, printed: bool = True) -> Cell:
-    return Column(name, header, printed=printed), lambda row: getattr(row, name) or None
-
-
-def _value(value: float) -> float | int | None:
-    """Counts stay whole."""
-    return value if isinstance(value, int) else finite(value)
-
-
-_NAMES = (_text("first", "first"), _text("second", "second"))
+_number = partial(Column, kind="number", rests_on=("runs",))
+_p = partial(Column, kind="p", digits=4, rests_on=("runs",))
+_unprinted = partial(_number, printed=False)
+_NAMES = Column("first", "first"), Column("second", "second")
 _DIFFERENCES = (
     *_NAMES,
-    _number("n_first", "runs of first", printed=False),
-    _number("n_second", "of second", printed=False),
-    _estimate("difference", "difference", "ticks", 1),
-    _text("expected", "first expected", printed=False),
-    _p("p_bootstrap", "one-tailed p"),
-    _p("p_bootstrap_holm", "one-tailed p, Holm"),
-    _p("p_permutation", "two-tailed p"),
-    _p("p_permutation_holm", "two-tailed p, Holm", printed=True),
-    _estimate("delta", "Cliff's δ", "", 2, printed=False),
-    _estimate("improvement", "P(first higher)", "", 2),
+    _unprinted("n_first", "runs of first"),
+    _unprinted("n_second", "of second"),
+    _number("difference", "difference", unit="ticks", digits=1),
+    Column("expected", "first expected", printed=False),
+    _p("p_bootstrap", "one-tailed p", printed=False),
+    _p("p_bootstrap_holm", "one-tailed p, Holm", printed=False),
+    _p("p_permutation", "two-tailed p", printed=False),
+    _p("p_permutation_holm", "two-tailed p, Holm"),
+    _unprinted("delta", "Cliff's δ", digits=2),
+    _number("improvement", "P(first higher)", digits=2),
 )
+_ENDS = {
+    "difference": ("low", "high"),
+    "delta": ("delta_low", "delta_high"),
+    "improvement": ("improvement_low", "improvement_high"),
+}
+"""Fields of a pair with the ends of their intervals, which :data:`_DIFFERENCES` show."""
 _COSTS = (
     *_NAMES,
-    _number("difference", "difference", "ticks", 1),
-    _number("trials", "trials", "×"),
-    _number("movement_ticks", "ticks", "×", printed=False),
-    _number("evaluations", "evaluations", "×"),
-    _number("solve_s", "solve time", "×"),
-    _text("told_more", "told more"),
-    _text("told_less", "told less"),
-    _number("sd_first", "SD of first", "ticks", 1, printed=False),
-    _number("sd_second", "of second", "ticks", 1, printed=False),
-    _number("runs_5", "runs for 5 %", "", 0, _OPTIMUM, printed=False),
-    _number("runs_2", "runs for 2 %", "", 0, _OPTIMUM, printed=False),
-    _number("runs_1", "runs for 1 %", "", 0, _OPTIMUM),
-    _number("smallest", "smallest found", "ticks", 1, printed=False),
-    (
-        Column("smallest_share", "of the optimum", "share", digits=1, rests_on=_OPTIMUM,
-               printed=False),
-        lambda row: finite(row.smallest_share),
+    _number("difference", "difference", unit="ticks", digits=1),
+    _number("trials", "trials", unit="×"),
+    _unprinted("movement_ticks", "ticks", unit="×"),
+    _number("evaluations", "evaluations", unit="×"),
+    _number("solve_s", "solve time", unit="×"),
+    Column("told_more", "told more"),
+    Column("told_less", "told less"),
+    _unprinted("sd_first", "SD of first", unit="ticks", digits=1),
+    _unprinted("sd_second", "of second", unit="ticks", digits=1),
+    *(
+        _number(
+            name,
+            f"runs for {100 * share:.0f} %",
+            digits=0,
+            rests_on=_OPTIMUM,
+            printed=share == min(SHARES),
+        )
+        for name, share in RUNS_FOR.items()
     ),
-)  # fmt: skip
+    _unprinted("smallest", "smallest found", unit="ticks", digits=1),
+    _unprinted("smallest_share", "of the optimum", kind="share", digits=1, rests_on=_OPTIMUM),
+)
 
 
 def _pairs(
-    study: Study, task: str, name: str, caption: str, cells: tuple[Cell, ...], note: str
+    study: Study, task: str, name: str, caption: str, columns: tuple[Column, ...], note: str
 ) -> DataTable | None:
     """Conditions, methods, variants; of each the best second first."""
     pairs = sorted(
         (row for row in study.pair_rows if row.task == task),
         key=lambda row: (_KINDS.index(row.kind), row.first, -_or_least(row.mean_second)),
     )
+    ends = _ENDS if columns is _DIFFERENCES else {}
     rows = [
         Row(
             f"{pair.first} - {pair.second}",
-            tuple(value(pair) for _, value in cells),
+            tuple(_value(pair, column.name, ends.get(column.name)) for column in columns),
             ((task, pair.first), (task, pair.second)),
         )
         for pair in pairs
     ]
-    failed = ", ".join(_failed(pairs))
-    notes = (
-        (note, f"Runs without a solution are left out: {escaped(failed)}.") if failed else (note,)
-    )
-    name = f"{name}-{table_ids(study)[task]}"
-    return table(name, caption, tuple(column for column, _ in cells), rows, notes)
+    failed = escaped(", ".join(_failed(pairs)))
+    notes = (note, f"Runs without a solution are left out: {failed}.") if failed else (note,)
+    return table(f"{name}-{table_ids(study)[task]}", caption, columns, rows, notes)
+
+
+def _value(pair: PairRow, name: str, ends: tuple[str, str] | None) -> Value:
+    """A field, with its interval where that has fields of its own; counts stay whole."""
+    value = getattr(pair, name)
+    if ends is not None:
+        return with_interval(value, *(getattr(pair, end) for end in ends))
+    if isinstance(value, str):
+        return value or None
+    return value if isinstance(value, int) else finite(value)
 
 
 def _failed(pairs: list[PairRow]) -> Iterator[str]:

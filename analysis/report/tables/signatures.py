@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row, Value
@@ -121,37 +121,37 @@ def _of_task(
     spots = _spots(rows, kind.id)
     own = {(row.label, spot_of(row)): row for row in rows}
     adjusted = holm_adjusted(row for row in own.values() if spot_of(row) in spots)
-    tested = {spot for label, spot in adjusted}
-    found, empty = [], _Reasons()
+    tested = {spot_of(row) for row in adjusted}
+    found, lacking = [], {}
     for label in labels_of(study, task):
-        values = [own.get((label, spot)) for spot in spots]
+        values = {spot: own.get((label, spot)) for spot in spots}
         whole = {row.signature: row.why_not for row in rows if row.label == label and not row.unit}
-        empty.note(label, spots, values, whole)
-        known = [row for row in values if row is not None and not math.isnan(row.value)]
-        if not known:
+        lacking[label] = [
+            row.why_not if row else whole.get(spot.signature.name, "not in every run's sequence")
+            for spot, row in values.items()
+            if row is None or math.isnan(row.value)
+        ]
+        if len(lacking[label]) == len(spots):
             continue
-        cells: list[Value] = [label, max(row.n for row in known)]
+        cells: list[Value] = [label, max(row.n for row in values.values() if row and known(row))]
         if kind.id == "hands":
             cells.append(counts(study.cells[task, label].good.hands))
-        for spot, row in zip(spots, values, strict=True):
-            cells.append(None if row is None else estimate_of(row))
-            if spot in tested:
-                cells.append(adjusted.get((label, spot)))
+        for spot, row in values.items():
+            cells += cells_of(row, adjusted, spot in tested)
         found.append(Row(label, tuple(cells), ((task, label),)))
     columns = [Column("method", "method"), runs_column()]
     if kind.id == "hands":
         columns.append(Column("hands", "hands", rests_on=("runs",)))
     for number, spot in enumerate(spots):
-        neutral = _neutral(row for (_, at), row in own.items() if at == spot)
-        columns.append(value_column(spot.signature, spot.name, spot.header + neutral, number < 2))
-        if spot in tested:
-            columns.append(p_column(spot.name, "p"))
+        header = spot.header + _neutral(row for (_, at), row in own.items() if at == spot)
+        columns.append(value_column(spot.signature, spot.name, header, number < 2))
+        columns += [p_column(spot.name, "p")] if spot in tested else []
     return table(
         f"{kind.id}-{table_ids(study)[task]}",
         f"{kind.title} on {escaped(task)}.",
         tuple(columns),
         found,
-        tuple(filter(None, (kind.note, *empty.lines()))),
+        tuple(filter(None, (kind.note, *_reasons(lacking, len(spots))))),
     )
 
 
@@ -181,39 +181,19 @@ def _neutral(rows: Iterable[SignatureRow]) -> str:
     return f", neutral {' or '.join(known)}" if known else ""
 
 
-class _Reasons:
-    """Why methods have no value in some or all columns of a table."""
-
-    def __init__(self) -> None:
-        self._some: dict[str, dict[str, None]] = {}
-        self._all: dict[str, list[str]] = {}
-
-    def note(
-        self,
-        label: str,
-        spots: Sequence[Spot],
-        values: Sequence[SignatureRow | None],
-        whole: dict[str, str],
-    ) -> None:
-        """Record a method's row; ``whole``: why it lacks signatures altogether."""
-        reasons = [
-            row.why_not if row else whole.get(spot.signature.name, "not in every run's sequence")
-            for spot, row in zip(spots, values, strict=True)
-            if row is None or math.isnan(row.value)
-        ]
-        if spots and len(reasons) == len(spots):
-            self._all.setdefault(reasons[0], []).append(label)
-            return
+def _reasons(lacking: Mapping[str, Sequence[str]], columns: int) -> list[str]:
+    """Why methods have no value in some or all columns, in inline markup."""
+    some: dict[str, dict[str, None]] = {}
+    every: dict[str, list[str]] = {}
+    for label, reasons in lacking.items():
+        if len(reasons) == columns > 0:
+            every.setdefault(reasons[0], []).append(label)
+            continue
         for why in reasons:
-            self._some.setdefault(why, {})[label] = None
-
-    def lines(self) -> list[str]:
-        """In inline markup; nothing where there are none."""
-        lines = [f"Empty: {why} ({', '.join(labels)})." for why, labels in self._some.items()]
-        lines += [
-            f"Without values: {', '.join(labels)} ({why})." for why, labels in self._all.items()
-        ]
-        return [escaped(line) for line in lines]
+            some.setdefault(why, {})[label] = None
+    lines = [f"Empty: {why} ({', '.join(labels)})." for why, labels in some.items()]
+    lines += [f"Without values: {', '.join(labels)} ({why})." for why, labels in every.items()]
+    return [escaped(line) for line in lines]
 
 
 def definitions_table() -> DataTable:
@@ -238,16 +218,23 @@ def labels_of(study: Study, task: str) -> list[str]:
     return [label for name, label in study.method_rows if name == task]
 
 
-def holm_adjusted(rows: Iterable[SignatureRow]) -> dict[tuple[str, Spot], float]:
-    """Holm-adjusted p by label and spot, of those that have one."""
+def known(row: SignatureRow) -> bool:
+    """Whether there is a value."""
+    return not math.isnan(row.value)
+
+
+def holm_adjusted(rows: Iterable[SignatureRow]) -> dict[SignatureRow, float]:
+    """Holm-adjusted p of those that have one."""
     tests = [row for row in rows if not math.isnan(row.p)]
-    adjusted = holm([row.p for row in tests])
-    return {(row.label, spot_of(row)): p for row, p in zip(tests, adjusted, strict=True)}
+    return dict(zip(tests, holm([row.p for row in tests]), strict=True))
 
 
-def estimate_of(row: SignatureRow) -> Value:
-    """The value with its interval."""
-    return with_interval(row.value, row.low, row.high)
+def cells_of(
+    row: SignatureRow | None, adjusted: Mapping[SignatureRow, float], tested: bool
+) -> list[Value]:
+    """The value with its interval, then its p where the column is ``tested``."""
+    value = with_interval(row.value, row.low, row.high) if row else None
+    return [value, adjusted.get(row) if row else None] if tested else [value]
 
 
 def identifier(*words: str) -> str:
@@ -263,18 +250,10 @@ def runs_column(*, printed: bool = False) -> Column:
 
 def value_column(signature: Signature, name: str, header: str, printed: bool) -> Column:
     """Values of a signature, with its unit and decimals."""
-    unit = "" if signature.unit == "1" or signature.table == "slopes" else signature.unit
-    unit = unit if unit in ("ticks", "bit", "rad", "pooled SD") else ""
-    kind, digits = ("share", 0) if signature.share else ("number", signature.digits)
-    return Column(
-        name,
-        header,
-        "share" if kind == "share" else "number",
-        unit,
-        digits,
-        rests_on=("runs",),
-        printed=printed,
-    )
+    kind: Literal["share", "number"] = "share" if signature.share else "number"
+    unit = signature.unit if signature.unit in ("ticks", "bit", "rad", "pooled SD") else ""
+    digits = 0 if signature.share else signature.digits
+    return Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
 
 
 def p_column(name: str, header: str, printed: bool = False) -> Column:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from analysis.comparisons.versions import SPENT, VersionComparison, VersionRow
 from analysis.report.document import Column, DataTable, Row, Value
@@ -10,9 +11,7 @@ from analysis.report.tables.common import finite, table, with_interval
 from analysis.statistics.equivalence import MARGIN
 from analysis.statistics.estimates import FEWEST
 
-_SPENDS = dict(
-    zip(SPENT, ("trials", "ticks", "kinematics", "Jacobians", "solve time"), strict=True)
-)
+_number = partial(Column, kind="number", rests_on=("runs",))
 
 
 def differing_table(found: VersionComparison) -> DataTable | None:
@@ -36,17 +35,17 @@ def versions_table(found: VersionComparison) -> DataTable | None:
         (
             Column("task", "task"),
             Column("method", "method"),
-            _number("mean_a", "A: mean", "ticks", 1),
+            _number("mean_a", "A: mean", unit="ticks", digits=1),
             _number("solved_a", "runs"),
-            _number("mean_b", "B: mean", "ticks", 1),
+            _number("mean_b", "B: mean", unit="ticks", digits=1),
             _number("solved_b", "runs"),
             _number("identical", "identical runs"),
             _number("shared", "of shared seeds"),
-            _number("difference", "B − A", "ticks", 1),
+            _number("difference", "B − A", unit="ticks", digits=1),
             Column("paired", "paired"),
-            Column("p_adjusted", "adjusted p", "p", digits=4, rests_on=("runs",)),
+            _number("p_adjusted", "adjusted p", kind="p", digits=4),
             Column("verdict", "verdict"),
-            *(_number(name, header, "×") for name, header in _SPENDS.items()),
+            *(_number(name, header, unit="×") for name, header in SPENT.items()),
             Column("remarks", "remarks"),
         ),
         [Row(f"{row.task} {row.label}", _values(row)) for row in found.rows],
@@ -68,10 +67,6 @@ def versions_table(found: VersionComparison) -> DataTable | None:
             "again.",
         ),
     )
-
-
-def _number(name: str, header: str, unit: str = "", digits: int | None = None) -> Column:
-    return Column(name, header, "number", unit, digits, rests_on=("runs",))
 
 
 def _values(row: VersionRow) -> tuple[Value, ...]:
