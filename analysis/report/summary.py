@@ -19,6 +19,7 @@ from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
 from analysis.report.tables.common import marked, mean_of, table
 from analysis.words import typographic
 from coartic.record import Environment
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -95,15 +96,18 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
         (True, "no independent tests, as they rest on reconstructed tasks †"),
     ):
         found = Counter(entry.verdict for entry in paper if entry.claim.fitted == fitted)
+        number = counted(found.total(), "claim")
         counts = ", ".join(f"{found[verdict]} {verdict}" for verdict in _VERDICTS)
-        items.append(f"[{found.total()} claims of the paper](#{claims}), {name}: {counts}.")
+        items.append(f"[{number} of the paper](#{claims}), {name}: {counts}.")
     refuted = [entry for entry in paper if entry.verdict == "not supported"]
     if refuted:
         names = ", ".join(f"[{e.claim.id}](#claim-{e.claim.id})" for e in refuted)
         items.append(f"Not supported here: {names}.")
     beyond = len(judged) - len(paper)
     if beyond:
-        items.append(f"[{beyond} comparisons](#{claims}) that the paper does not make: measured.")
+        items.append(
+            f"[{counted(beyond, 'comparison')}](#{claims}) that the paper does not make: measured."
+        )
     return Bullets(tuple(items))
 
 

@@ -23,6 +23,7 @@ from analysis.report.tables.common import (
 from analysis.words import true_minus
 from coartic.method import Information
 from coartic.record import SEARCH
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -50,13 +51,15 @@ def reading_of_methods(study: Study) -> tuple[str, ...]:
     for (task, label), row in study.method_rows.items():
         name = escaped(f"{task} x {label}")
         if row.beaten:
+            are = "is" if row.beaten == 1 else "are"
             impossible.append(
-                f"**{row.beaten} runs of {name} are better than the optimum: it is not one. "
-                "Report this.**"
+                f"**{counted(row.beaten, 'run')} of {name} {are} better than the optimum: it is "
+                "not one. Report this.**"
             )
         if row.corrections and TOLD[Information.REWARD_BY_TRIAL] not in row.told:
             corrected.append(
-                f"{name}: its solutions needed {row.corrections} corrective movements in all."
+                f"{name}: its solutions needed "
+                f"{counted(row.corrections, 'corrective movement')} in all."
             )
     return (*impossible, *READING_OF_METHODS, *corrected)
 
