@@ -39,7 +39,10 @@ CellKey = tuple[str, str]
 
 
 def load(folder: str | Path) -> Study:
-    """Read a results folder. Raises CoarticError as :func:`~.folder.load_results` does."""
+    """Read a results folder.
+
+    Raises CoarticError as :func:`analysis.results.folder.load_results` does.
+    """
     return Study(load_results(Path(folder)))
 
 

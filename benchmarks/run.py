@@ -38,6 +38,11 @@ class Selection:
     task_files: Sequence[str | Path] = ()
     method_files: Sequence[str | Path] = ()
 
+    def __post_init__(self) -> None:
+        for name, given in vars(self).items():
+            if isinstance(given, str | Path):
+                raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
+
 
 ALL_OF_IT = Selection()
 
@@ -49,7 +54,7 @@ class RunReport:
     folder: Path
     progress: Progress
     wall_s: float
-    """Seconds that the runs took, all together."""
+    """Seconds from the first run to the last."""
     records: Mapping[str, Record]
     """All records of the plan by run id, those that were there before among them."""
 

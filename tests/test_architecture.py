@@ -169,3 +169,18 @@ def test_nothing_needs_what_posix_alone_has(tmp_path):
     command = [sys.executable, "-c", WITHOUT_POSIX, tmp_path / "out", ",".join(PACKAGES)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_git_ignores_no_source():
+    """What git ignores is in no clone, and in no wheel."""
+    files = [
+        path
+        for package in (*PACKAGES, "tests", "docs")
+        for path in (ROOT / package).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    ]
+    done = subprocess.run(
+        ["git", "check-ignore", "--no-index", *files],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout == ""

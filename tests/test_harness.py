@@ -16,6 +16,7 @@ from analysis.study import Study
 from benchmarks.declaration import declared
 from benchmarks.executors import Local
 from benchmarks.registry import CLASSES, Entry, registry
+from benchmarks.run import Selection
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import (
@@ -644,3 +645,10 @@ def test_a_suite_can_move_one_goal(tmp_path):
             'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
             "move = { goal = 2, by = [[0, 9]] }",
         )
+
+
+def test_a_name_is_no_list_of_names():
+    for given in ({"tasks": "ascending"}, {"methods": "EC1"}, {"task_files": Path("a.toml")}):
+        (name,) = given
+        with pytest.raises(CoarticError, match=f"{name} is a list: write {name}=\\['"):
+            Selection(**given)

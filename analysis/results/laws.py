@@ -19,9 +19,8 @@ import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from coartic import PAPER, CoarticError, parse_task
-from coartic.inputs import read_bytes
-from coartic.inputs import problems_inline
 from coartic.codec import read_record
+from coartic.inputs import problems_inline, read_bytes
 from coartic.record import Record, RecordError, run_seed
 from coartic.tables import (
     BUILT_IN,

@@ -23,9 +23,9 @@ from pydantic import BaseModel, ConfigDict
 from analysis.results.folder import Results, load_results
 from analysis.results.laws import BASE
 from coartic import CoarticError, Task
-from coartic.tables import label_of
 from coartic.files import write_atomically
 from coartic.record import SEARCH
+from coartic.tables import label_of
 from coartic.text import one_line
 
 if TYPE_CHECKING:
@@ -227,7 +227,11 @@ def _best(
     bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
     bound = min(bounds, default=None)
     cells = [
-        [key for key, runs in searches.items() if value is not None and (runs[column] == value).any()]
+        [
+            key
+            for key, runs in searches.items()
+            if value is not None and (runs[column] == value).any()
+        ]
         for column, value in (("reward", best.reward), ("proven_bound", bound))
     ]
     reward, proof = ("searches of this folder" if own else stored for own in cells)

@@ -74,7 +74,7 @@ def main() -> None:
     except CoarticError as error:
         complain("error", str(error))
         sys.exit(2)
-    except BrokenPipeError:
+    except BrokenPipeError:  # whoever read, such as head, has enough: typer ends quietly
         raise
     except OSError as error:
         complain("error", str(error.strerror or error))
