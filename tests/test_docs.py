@@ -30,7 +30,7 @@ def test_links(page):
 
 def test_the_example_report():
     size = sum(path.stat().st_size for path in EXAMPLE.rglob("*") if path.is_file())
-    assert size < 5_000_000
+    assert size < 6_500_000
     page = (EXAMPLE / "report.md").read_text(encoding="utf-8")
     pictures = re.findall(r"\((figures/[^)]+)\)", page)
     assert len(pictures) >= 15

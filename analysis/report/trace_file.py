@@ -88,7 +88,7 @@ def trace_json(study: Study, document: Document, numbers: Iterable[Number]) -> s
         optima=tuple((task, arm, best) for (task, arm), best in study.optima.items()),
         tables=tuple(document.tables()),
     )
-    return json_text(content.model_dump())
+    return json_text({"format": content.format} | content.model_dump(exclude_defaults=True))
 
 
 def read_trace(home: Path) -> TraceFile:
