@@ -38,8 +38,8 @@ READING_OF_COST = (
     "(18/20 and ∞ with a horizon of 2000: 18 runs did, but not half of the 20 within the 2000 "
     "that all runs had). Other runs never reach what they missed. `targets.csv` of `coartic "
     "analyse` has all four spends.",
-    "**Areas**: from one average trial to the largest whole spend of a method that learns. "
-    "`areas.csv` has them in full, `anytime.csv` the curves.",
+    "**Areas**: from one average trial to the largest whole spend of a method that learns; "
+    "comparable within a column. `areas.csv` has them in full, `anytime.csv` the curves.",
     "**Pareto sets**: a method is on the front if none has a mean reward as high for as little "
     "spend, and one of them better. A method with a single run has nothing to resample. Counts "
     f"are exact; solve times within {100 * TIME_TOLERANCE:.0f} % of each other count as ties, "

@@ -160,8 +160,9 @@ def overall_table(study: Study) -> DataTable | None:
         rows,
         (
             "Score: interquartile mean of normalised rewards, 0 the initial solution, 1 the "
-            "optimum. Gap: mean share of the optimum. Within: share of runs whose gap is at most "
-            "so much. 95 % intervals by stratified bootstrap, about other runs on these tasks.",
+            "optimum with all joints free. Gap: mean share of the optimum. Within: share of runs "
+            "whose gap is at most so much. 95 % intervals by stratified "
+            "bootstrap, about other runs on these tasks.",
         ),
     )
 

@@ -72,6 +72,8 @@ def reading_of_pairs(study: Study) -> tuple[str, ...]:
         "A deterministic method has one run and no spread: its reward is taken as known, and all "
         "uncertainty is the learner's. A method with one run counts as deterministic where the "
         "learner has more.",
+        "Who is higher, lower or not told apart is said by the two-tailed test at 5 %, adjusted "
+        "by Holm over all rows of the task; each kind of test is adjusted for itself.",
         "A one-tailed p near 1 speaks for the contrary of what was expected. Tests are of "
         "independent samples; against a known reward the two-tailed one is by the signs of the "
         "differences to it, which takes them as symmetric. Pairs that are positively correlated "
