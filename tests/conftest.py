@@ -7,9 +7,17 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
+import benchmarks.executors
+import benchmarks.reproduce
 from analysis import load
 from tests.support import reports
-from tests.support.suites import run_and_write, traced_cells, with_environment
+from tests.support.suites import (
+    InProcess,
+    performed,
+    run_and_write,
+    traced_cells,
+    with_environment,
+)
 
 # Continuous integration tries the same examples every time; people, new ones.
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -26,6 +34,13 @@ def undrawn():
     """Reports without figures, which take long and have tests of their own."""
     with reports.undrawn():
         yield
+
+
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Runs without processes of their own, which take long and have tests of their own."""
+    monkeypatch.setattr(benchmarks.executors, "Local", InProcess)
+    monkeypatch.setattr(benchmarks.reproduce, "supervise", performed)
 
 
 @pytest.fixture(scope="session")

@@ -12,8 +12,6 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -57,12 +55,6 @@ for group, commands in (
         app.command(name=name, rich_help_panel=group)(command)
 
 
-@cache
-def _command() -> Callable[..., object]:
-    """All commands, put together once: those who call :func:`main` again need not wait for it."""
-    return typer.main.get_command(app)
-
-
 def main() -> None:
     """Run the command line; exit code 2 for what the user can put right."""
     for stream in (sys.stdout, sys.stderr):
@@ -78,7 +70,7 @@ def main() -> None:
     try:
         _check_arguments()
         _check_packages()
-        _command()(prog_name="coartic")
+        app(prog_name="coartic")
     except CoarticError as error:
         complain("error", str(error))
         sys.exit(2)

@@ -56,7 +56,7 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("attacks")
     (folder / "small.toml").write_text(SUITE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(benchmarks.executors, "Local", lambda jobs: InProcess())
+        patch.setattr(benchmarks.executors, "Local", InProcess)
         code, said = in_process(["run", folder / "small.toml", "--out", folder / "whole"])
     assert code == 0, said
     return folder / "whole"
