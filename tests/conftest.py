@@ -1,5 +1,6 @@
 """Shared by all tests."""
 
+import gc
 import os
 import signal
 
@@ -71,3 +72,4 @@ def pytest_collection_modifyitems(items):
     """The modules that take longest, then the others."""
     rank = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))
+    gc.freeze()  # what is imported stays: looking through it again and again takes long
