@@ -1,4 +1,4 @@
-"""Means and shares over runs with their intervals."""
+"""Means, shares, slopes over runs: values with their intervals and tests."""
 
 from __future__ import annotations
 
@@ -15,11 +15,18 @@ from analysis.statistics.estimates import CONFIDENCE
 
 
 class Interval(NamedTuple):
-    """An estimate with its interval at 95 %; NaN limits where there is none."""
+    """A value with its interval at 95 % and the p of its test; NaN where there is none."""
 
     value: float
-    low: float
-    high: float
+    low: float = math.nan
+    high: float = math.nan
+    p: float = math.nan
+
+
+def student(value: float, error: float, freedom: int, p: float = math.nan) -> Interval:
+    """A value with Student's interval, by its standard error and degrees of freedom."""
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * error
+    return Interval(value, value - half, value + half, p)
 
 
 def mean(values: ArrayLike) -> Interval:
@@ -30,16 +37,14 @@ def mean(values: ArrayLike) -> Interval:
     known = np.asarray(values, dtype=np.float64)
     centre = float(spread.mean(known))
     if len(known) < 2:
-        return Interval(centre, math.nan, math.nan)
-    error = spread.sd(known) / math.sqrt(len(known))
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(known) - 1)) * error
-    return Interval(centre, centre - half, centre + half)
+        return Interval(centre)
+    return student(centre, spread.sd(known) / math.sqrt(len(known)), len(known) - 1)
 
 
 def share(agrees: Sequence[bool]) -> Interval:
     """Share of runs with Wilson's interval (1927); without one for a single run."""
     n, count = len(agrees), sum(agrees)
     if n < 2:
-        return Interval(count / n, math.nan, math.nan)
+        return Interval(count / n)
     low, high = stats.binomtest(count, n).proportion_ci(CONFIDENCE, method="wilson")
     return Interval(count / n, float(low), float(high))
