@@ -13,11 +13,10 @@ from hypothesis.extra.numpy import arrays
 
 import benchmarks.executors
 from analysis.published import Summary
-from analysis.signatures import intervals
 from analysis.signatures.context import context_dependence, distance, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, synergy
-from analysis.statistics import spread
+from analysis.statistics import intervals, spread
 from analysis.statistics.equivalence import bootstrap_equivalence, difference
 from analysis.statistics.estimates import interquartile_mean
 from analysis.statistics.hypotheses import bootstrap_test, permutation_test, standard_error

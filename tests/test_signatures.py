@@ -15,7 +15,6 @@ from analysis.calibration import signatures as simulated
 from analysis.calibration.simulation import rate
 from analysis.citations import references
 from analysis.results.folder import Results
-from analysis.signatures import intervals
 from analysis.signatures.context import (
     context_dependence,
     context_pairs,
@@ -50,6 +49,7 @@ from analysis.signatures.subtasks import (
     sacrifices,
 )
 from analysis.signatures.trajectories import Trajectories
+from analysis.statistics import intervals
 from analysis.study import Study
 from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
 from coartic.rows import movement_rows

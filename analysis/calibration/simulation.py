@@ -12,7 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy import stats
 
-from analysis.signatures.intervals import Interval
+from analysis.statistics.intervals import Interval
 from coartic.robot import Array
 
 Draw = Callable[[np.random.Generator, int], Array]

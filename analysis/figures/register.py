@@ -21,6 +21,7 @@ from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_of
 from coartic import CoarticError
+from coartic.text import did_you_mean
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -109,13 +110,17 @@ class Figures(Mapping[str, Figure]):
     def plot(self, name: str) -> Plot:
         """A figure with its words and numbers, by its id; KeyError where there is none."""
         for entry in REGISTER:
-            if name.startswith(entry.name):
+            if str(name).startswith(entry.name):
                 for plot in self._of(entry):
                     if plot.id == name:
                         return plot
                 if entry.name in self._skipped:
-                    raise KeyError(f"no figure {name}: {self._skipped[entry.name]}")
-        raise KeyError(f"no figure {name}; there are {', '.join(self)}")
+                    raise KeyError(f"no figure {name!r}: {self._skipped[entry.name]}")
+        hint = did_you_mean(str(name), self) or f"; there are {', '.join(self)}"
+        raise KeyError(f"no figure {name!r}{hint}")
+
+    def __repr__(self) -> str:
+        return f"Figures by id, of {self._study!r}"
 
     def __getitem__(self, name: str) -> Figure:
         """The figure alone."""

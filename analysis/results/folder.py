@@ -12,6 +12,9 @@ from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
 from coartic.tables import Manifest, label_of
 
+CellKey = tuple[str, str]
+"""Name of a task, and label of a method: its name with its variant."""
+
 
 @dataclass(frozen=True)
 class CellRuns:

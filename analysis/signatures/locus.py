@@ -20,8 +20,8 @@ from scipy import stats
 from scipy.cluster.hierarchy import DisjointSet
 
 from analysis.signatures.context import KEPT
-from analysis.signatures.intervals import Interval, student
 from analysis.signatures.permutation import orders, p_values
+from analysis.statistics.intervals import Interval, student
 from analysis.statistics.spread import mean
 from coartic import Task
 from coartic.robot import Array
@@ -82,12 +82,12 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
     """One slope per joint, by least squares over the mean posture at each position.
 
     Length unit (base) or rad (joint) per length unit, -∞ to ∞; 0 no dependence, of which ``p``
-    is the two-sided test. ``configurations`` has shape ``(n, dof)``: postures at goal g, one row a run; ``positions``
-    ``(n,)`` those of the neighbouring goal in each run's task. Interval and test have
-    positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are run once
-    or often, and take what departs from the line as independent and of equal variance between
-    positions: curvature widens the interval. Joints that do not change have slope 0 and p 1.
-    Raises ValueError for fewer than three positions.
+    is the two-sided test. ``configurations`` has shape ``(n, dof)``: postures at goal g, one row
+    a run; ``positions`` ``(n,)`` those of the neighbouring goal in each run's task. Interval and
+    test have positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are
+    run once or often, and take what departs from the line as independent and of equal variance
+    between positions: curvature widens the interval. Joints that do not change have slope 0 and
+    p 1. Raises ValueError for fewer than three positions.
     """
     x, means = _by_position(configurations, positions)
     slopes = []

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
-from analysis.signatures.intervals import Interval, student
+from analysis.statistics.intervals import Interval, student
 from analysis.statistics.spread import mean, sd
 from coartic import Hand, Task
 from coartic.robot import Array

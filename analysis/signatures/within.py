@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.signatures import intervals
 from analysis.signatures.manifold import jacobian_of, synergy
 from analysis.signatures.other_arm import (
     preshaping,
@@ -36,6 +35,7 @@ from analysis.signatures.rows import (
 )
 from analysis.signatures.subtasks import excess, sacrifice_p, sacrifices
 from analysis.signatures.trajectories import Trajectories, postures
+from analysis.statistics import intervals
 from analysis.statistics.estimates import SEED
 from coartic.robot import Array
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from itertools import chain
 
 from analysis.comparisons.versions import SPENT, VersionComparison, VersionRow
 from analysis.report.document import Column, DataTable, Row, Value
@@ -48,7 +49,7 @@ def versions_table(found: VersionComparison) -> DataTable | None:
             *(_number(name, header, unit="×") for name, header in SPENT.items()),
             Column("remarks", "remarks"),
         ),
-        [Row(f"{row.task} {row.label}", _values(row)) for row in found.rows],
+        [Row(f"{row.a.task} {row.a.label}", _values(row)) for row in found.rows],
         (
             "B − A: difference of mean rewards (more is better) with its BCa interval, paired by "
             f"seed where at least {FEWEST} seeds are shared, of independent runs otherwise. p: "
@@ -71,19 +72,16 @@ def versions_table(found: VersionComparison) -> DataTable | None:
 
 def _values(row: VersionRow) -> tuple[Value, ...]:
     return (
-        row.task,
-        row.label,
-        finite(row.mean_a),
-        row.solved_a,
-        finite(row.mean_b),
-        row.solved_b,
+        row.a.task,
+        row.a.label,
+        *chain(*zip(map(finite, row.both("reward")), row.both("solved"), strict=True)),
         row.identical,
         row.shared,
         with_interval(row.difference, row.low, row.high),
         None if row.paired is None else "yes" if row.paired else "no",
         finite(row.p_adjusted),
         row.verdict,
-        *(_ratio(*row.spent(name)) for name in SPENT),
+        *(_ratio(*row.both(name)) for name in SPENT),
         row.remarks or None,
     )
 

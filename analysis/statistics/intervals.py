@@ -1,4 +1,4 @@
-"""Means, shares, slopes over runs: values with their intervals and tests."""
+"""Values with their intervals by closed formulas: of means and shares over runs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy import special, stats
 
 from analysis.statistics import spread
 from analysis.statistics.estimates import CONFIDENCE
@@ -23,9 +23,9 @@ class Interval(NamedTuple):
     p: float = math.nan
 
 
-def student(value: float, error: float, freedom: int, p: float = math.nan) -> Interval:
+def student(value: float, error: float, freedom: float, p: float = math.nan) -> Interval:
     """A value with Student's interval, by its standard error and degrees of freedom."""
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * error
+    half = float(special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
     return Interval(value, value - half, value + half, p)
 
 
@@ -44,7 +44,10 @@ def mean(values: ArrayLike) -> Interval:
 def share(agrees: Sequence[bool]) -> Interval:
     """Share of runs with Wilson's interval (1927); without one for a single run."""
     n, count = len(agrees), sum(agrees)
-    if n < 2:
-        return Interval(count / n)
-    low, high = stats.binomtest(count, n).proportion_ci(CONFIDENCE, method="wilson")
-    return Interval(count / n, float(low), float(high))
+    return wilson(count, n) if n > 1 else Interval(count / n)
+
+
+def wilson(count: int, total: int, confidence: float = CONFIDENCE) -> Interval:
+    """``count`` of ``total`` runs as a share, with Wilson's interval."""
+    low, high = stats.binomtest(count, total).proportion_ci(confidence, method="wilson")
+    return Interval(count / total, float(low), float(high))
