@@ -64,10 +64,10 @@ class Study:
         """The tasks as they were run, by name."""
         return self.results.tasks
 
-    @cached_property
+    @property
     def cells(self) -> dict[CellKey, CellRuns]:
         """Rows of the runs, in the order of the plan."""
-        return {(cell.task, cell.label): cell for cell in self.results.cells}
+        return self.results.cells
 
     @cached_property
     def run_ids(self) -> dict[CellKey, tuple[str, ...]]:

@@ -156,7 +156,7 @@ def _lead(results: Results) -> str:
 def _summary(study: Study) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
-    runs, labels = counted(len(results.runs), "run"), {cell.label for cell in results.cells}
+    runs, labels = counted(len(results.runs), "run"), {label for _, label in results.cells}
     facts = (
         f"{counted(len(results.tasks), 'task')}, {counted(len(labels), 'method')} with their "
         f"variants, {counted(len(results.cells), 'cell')}; "

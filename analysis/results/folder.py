@@ -53,21 +53,15 @@ class Results:
         return {name: parse_task(task, source) for name, task in content.items()}
 
     @cached_property
-    def cells(self) -> list[CellRuns]:
+    def cells(self) -> dict[CellKey, CellRuns]:
         """The cells with their runs, in the order of the plan."""
-        return [
-            CellRuns(
-                cell.task,
-                cell.method,
-                cell.variant,
-                self.runs[
-                    (self.runs.task == cell.task)
-                    & (self.runs.method == cell.method)
-                    & (self.runs.variant == cell.variant)
-                ],
-            )
-            for cell in self.manifest.specification.cells
-        ]
+        found, runs = {}, self.runs
+        for cell in self.manifest.specification.cells:
+            own = (runs.task == cell.task) & (runs.method == cell.method)
+            own &= runs.variant == cell.variant
+            names = cell.task, cell.method, cell.variant
+            found[cell.task, cell.label] = CellRuns(*names, runs[own])
+        return found
 
     def solutions(self) -> pd.DataFrame:
         """Movements of every run's solution."""
