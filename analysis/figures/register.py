@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -20,10 +20,8 @@ from analysis.figures.recruitment import recruitment
 from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_of
+from analysis.study import Study
 from coartic import CoarticError
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 Section = Literal[
     "tasks-drawn", "paper", "movements", "learning", "methods", "cost", "coarticulation"
