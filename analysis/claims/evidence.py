@@ -1,4 +1,4 @@
-"""Tables of evidence: raw values with the cells behind them."""
+"""What judges say: findings by tests, and tables of raw values with the cells behind them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,28 @@ from typing import Literal
 
 from analysis.claims.register import Finding
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.statistics.estimates import Inference
+from analysis.statistics.estimates import SEED, Inference, mean
+from analysis.statistics.hypotheses import bootstrap_test
+from analysis.words import interval
+from coartic.robot import Array
 
 Arm = Literal["free", "still"]
+
+
+def exceeds(values: Array, bound: Array | float) -> Inference:
+    """One-tailed bootstrap test that the mean is above a number, or above another sample's."""
+    return bootstrap_test(values, bound, seed=SEED)
+
+
+def shown(values: Array, style: str = ".1f") -> str:
+    """The mean with its BCa interval."""
+    return interval(mean(values, seed=SEED), style)
+
+
+def all_hold(tests: Sequence[Inference], parts: Sequence[str], before: str = "") -> Finding:
+    """What is seen where every test points as claimed; ``parts`` of a sentence say so."""
+    seen = all(test.estimate > 0 for test in tests)
+    return Finding(seen, before + "; ".join(parts), tuple(tests))
 
 
 def measured(
