@@ -7,13 +7,14 @@ import math
 from dataclasses import replace
 
 from analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
-from analysis.claims.evidence import Arm, by_optimum, estimate_of, measured, of_either_optimum
+from analysis.claims.evidence import by_optimum, estimate_of, measured, of_either_optimum
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import Summary, published_cell
 from analysis.report.document import Column, RestsOn, Row
+from analysis.results.optima import OtherArm
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import SEED, difference_of_means, mean
 from analysis.words import NONE, interval
@@ -70,7 +71,7 @@ def _to_the_optimum(data: Data) -> Finding:
     rows, shares = [], []
     for task, condition in CELLS:
         reward = mean(data.rewards(task, condition), seed=SEED)
-        arm: Arm = "free" if condition in ("EC2", "EC4") else "still"
+        arm: OtherArm = "free" if condition in ("EC2", "EC4") else "still"
         best = data.study.optima.get((task, arm))
         if best is None:
             raise MissingError(f"no optimum of {task} is known")

@@ -11,7 +11,6 @@ import pandas as pd
 from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     beyond,
     coarticulation,
-    conditions,
     general,
     one_armed,
     two_armed,

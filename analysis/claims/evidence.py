@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 from analysis.claims.register import Finding
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.results.optima import ARMS, OtherArm
 from analysis.statistics.estimates import SEED, Inference, mean
 from analysis.statistics.hypotheses import bootstrap_test
 from analysis.words import interval
 from coartic.robot import Array
-
-Arm = Literal["free", "still"]
 
 
 def exceeds(values: Array, bound: Array | float) -> Inference:
@@ -55,7 +53,6 @@ def estimate_of(found: Inference) -> Estimate:
 
 def of_either_optimum(*columns: Column) -> tuple[Column, ...]:
     """Columns for the optimum with the other arm free, then the same for that with it still."""
-    arms: tuple[Arm, ...] = ("free", "still")
     return tuple(
         replace(
             column,
@@ -63,12 +60,12 @@ def of_either_optimum(*columns: Column) -> tuple[Column, ...]:
             header=f"{column.header}, other arm {arm}",
             other_arm=arm,
         )
-        for arm in arms
+        for arm in ARMS
         for column in columns
     )
 
 
-def by_optimum(arm: Arm, *values: Value) -> tuple[Value, ...]:
+def by_optimum(arm: OtherArm, *values: Value) -> tuple[Value, ...]:
     """The values below :func:`of_either_optimum`; none for the other optimum."""
     none = (None,) * len(values)
     return (*values, *none) if arm == "free" else (*none, *values)

@@ -15,7 +15,7 @@ from scipy import stats
 from analysis.comparisons.paper import published_of
 from analysis.figures import style
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot, spoken
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import CONDITIONS, has, missing, rewards_of, solved
 from analysis.methods import LEARNER, short_name
 from analysis.published import Summary, published_cell, published_initial
@@ -58,23 +58,14 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         axes.set_title(style.heading(study.tasks[name]))
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
     style.letters(panels)
-    return Plot(
-        id="learned-reward",
-        title="Learned reward by condition",
-        caption=(
-            "Mean learned reward (−1 a control tick) as a bar that rises from the initial "
-            f"solution, with its {style.CONFIDENCE} BCa interval over runs; grey dots: runs. "
-            "Open diamonds: published mean with its 95 % interval where an SD is printed (of all "
-            "runs, pooled where the paper reports hand sequences apart). Brackets: one-tailed "
-            "bootstrap test that the mean is higher than what stands to the left "
-            f"({RESAMPLES} resamples, seed {SEED}), Holm-adjusted over the figure: "
-            "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
-            "Figure 8 of Shah, Barto & Fagg (2013)."
-            + style.dagger(study.tasks[name] for name in labels)
-        ),
-        alt=f"Bars of mean learned reward with intervals. {spoken(data, 'reward', 1)}.",
-        figure=figure,
-        data=data,
+    return worded(
+        "learned-reward",
+        figure,
+        data,
+        [study.tasks[name] for name in labels],
+        resamples=RESAMPLES,
+        seed=SEED,
+        means=spoken(data, "reward", 1),
     )
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.figures import style
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.figures.selection import CONDITIONS, missing, solved
 from analysis.methods import short_name
@@ -159,22 +159,10 @@ def configurations(
     totals = "; ".join(
         f"{s.task.label}, {s.name}, total {style.number(-s.execution.ticks)}" for s in shown
     )
-    return Plot(
-        id=id,
-        title="Configurations at each goal: " + ", ".join(t.label for t in tasks.values()),
-        caption=(
-            "Configuration when each goal was hit (black; joints of the chosen arm marked: "
-            "open squares left, closed circles right) and the one before (grey). Above each "
-            "panel goal, chosen hand and reward of the movement (−1 a control tick), at the "
-            f"row's end the total. {_TYPICAL if sequences == 1 else _BY_SEQUENCE}, unless "
-            "another was asked for; in brackets in how many of the method's runs the sequence "
-            f"was found: {named}. After {like} of Shah, Barto & Fagg (2013)."
-            f"{style.dagger(tasks.values())}"
-        ),
-        alt=f"Robot configurations at every goal. {totals}.",
-        figure=figure,
-        data=_data(shown),
-    )
+    labels = ", ".join(task.label for task in tasks.values())
+    of = {"tasks": labels, "which": _TYPICAL if sequences == 1 else _BY_SEQUENCE, "like": like}
+    of |= {"named": named, "totals": totals}
+    return worded("configurations", figure, _data(shown), tasks.values(), id=id, **of)
 
 
 def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | None = None) -> Plot:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures import style
 from analysis.figures.bars import stars
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import chosen, missing
 from analysis.methods import short_name
 from analysis.statistics.hypotheses import holm
@@ -62,22 +62,7 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         f"{short_name(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
         for row in data.to_dict("records")
     )
-    return Plot(
-        id="context",
-        title="Context dependence at the shared goal",
-        caption=(
-            "Difference between the mean configurations at the same goal before different "
-            "successors, divided into the part that leaves the hand in place (motor-equivalent) "
-            "and the part that moves it, each per root of the dimension of its space. A hit "
-            "confines the hand to the goal's disc, so the second part is bounded. Stars: "
-            "permutation test over runs, Holm-adjusted over the figure (*** p < 0.001, "
-            "** p < 0.01, * p < 0.05, n.s. not significant), of the motor-equivalent part; "
-            "methods that are run once have none."
-        ),
-        alt=f"Motor-equivalent and non-motor-equivalent part by method: {words}.",
-        figure=figure,
-        data=data,
-    )
+    return worded("context", figure, data, parts=words)
 
 
 def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from analysis.comparisons.progress import SPENDS
 from analysis.figures import style
-from analysis.figures.plot import Plot, spoken
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import chosen, missing
 from analysis.methods import short_name
 from analysis.study import Study
@@ -70,22 +70,14 @@ def _plot(
         _panel(axes, data[data.task == task], present, edge, optimum.reward if optimum else None)
     panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
     _legend(figure, data, present)
-    ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "mean")
-    return Plot(
+    return worded(
+        "frontier",
+        figure,
+        data,
+        tasks.values(),
         id=f"frontier-{spend.replace('_', '-')}",
-        title=f"Reward against {NAMES[spend]}",
-        caption=(
-            f"Best reward so far against {NAMES[spend]}: mean over runs with its "
-            f"{style.CONFIDENCE} bootstrap interval, pointwise, from where every run has "
-            "a solution. Single marks: methods that do not learn by trial, at the median spend of "
-            "a whole run, at the left edge where they spend nothing. Ringed: on the Pareto front "
-            "of mean reward and spend of all methods of the folder, shown here or not. Dotted: "
-            "optimum with all joints free. Rewards far below are cut off, marks there stand at "
-            f"the lower edge.{style.dagger(tasks.values())}"
-        ),
-        alt=f"Curves of reward against {NAMES[spend]}. Last means: {ends}.",
-        figure=figure,
-        data=data,
+        spend=NAMES[spend],
+        ends=spoken(data.groupby(["task", "method"], sort=False).tail(1), "mean"),
     )
 
 

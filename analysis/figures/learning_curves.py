@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from analysis.figures import style
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot, spoken
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import CONDITIONS, has, missing
 from analysis.methods import short_name
 from analysis.study import Study
@@ -55,20 +55,7 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
     handles += [style.entry("initial", **style.INITIAL), style.entry("optimum", **style.OPTIMUM)]
     style.legend(figure, handles, min(len(handles), 4))
     ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "best")
-    return Plot(
-        id="learning-curves",
-        title="Learning curves",
-        caption=(
-            "Best reward so far (thick; mean over runs, band: middle half of the runs) and "
-            "reward of the trials themselves (thin; mean over runs, averaged over the last "
-            f"{WINDOW} trials, fewer at the start; failed trials are left out). Dash-dotted: "
-            "initial solution; dotted: optimum with all joints free. Axes are cut below where "
-            f"trials fall far short of the initial solution.{style.dagger(shown.values())}"
-        ),
-        alt=f"Curves of reward against trial. Mean best reward at the end: {ends}.",
-        figure=figure,
-        data=data,
-    )
+    return worded("learning-curves", figure, data, shown.values(), window=WINDOW, ends=ends)
 
 
 def _default(study: Study, task: str) -> list[str]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from analysis.comparisons.overall import REACHED, by_task, normalised_scores
 from analysis.figures import style
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
 from analysis.methods import short_name
 from analysis.statistics.across_tasks import profile
@@ -71,23 +71,9 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     words = "; ".join(
         f"{_name(row['method'])}: {row['share']:.0%}" for row in ends.to_dict("records")
     )
-    return Plot(
-        id="profiles",
-        title="Profiles over all tasks",
-        caption=(
-            f"Tasks {names}, each counting the same. a: share of runs with a normalised score "
-            "above the threshold, 0 the initial solution, 1 the optimum with all joints free "
-            "(score profile, Agarwal et al. 2021). b: share of runs whose gap to that optimum is "
-            "at most the threshold (after the performance profiles of Dolan & Moré 2002, the "
-            f"optimum in the place of the best solver). Bands: {style.CONFIDENCE} intervals, "
-            f"pointwise, runs resampled within tasks (seed {SEED}). Learner: EC1 on tasks with "
-            "one hand, EC4 on those with two."
-            + (f" Not run on every task: {', '.join(absent)}." if absent else "")
-        ),
-        alt=f"Profiles over tasks. Share of runs within 5 % of the optimum: {words}.",
-        figure=_draw(data, everywhere),
-        data=data,
-    )
+    elsewhere = f" Not run on every task: {', '.join(absent)}." if absent else ""
+    figure = _draw(data, everywhere)
+    return worded("profiles", figure, data, tasks=names, seed=SEED, absent=elsewhere, shares=words)
 
 
 def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from analysis.figures import style
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import CONDITIONS, missing
 from analysis.methods import short_name
 from analysis.published import TRIALS, Summary
@@ -62,23 +62,8 @@ def published(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         for row in rows
         if row["runs"]
     )
-    return Plot(
-        id="published",
-        title="Published and ours",
-        caption=(
-            f"Our mean learned reward less the published one, with its {style.CONFIDENCE} "
-            "interval (Welch, from the printed mean, SD and runs; Student "
-            f"where no SD is printed). Grey: margin of equivalence, ±{100 * MARGIN:.0f} % of the "
-            "published reward. Filled circles: interval within the margin (equivalent); open "
-            "squares: it crosses it (undecided); diamonds: outside (different); crosses: no "
-            "verdict. ↳: runs with one hand sequence, number of our runs of all our runs in "
-            "brackets, then the published one; means pooled from several printed sequences are "
-            f"marked *.{style.dagger(shown.values())}"
-        ),
-        alt=f"Differences of mean reward to the published ones, with intervals. {words}.",
-        figure=figure,
-        data=data,
-    )
+    margin = f"{100 * MARGIN:.0f}"
+    return worded("published", figure, data, shown.values(), margin=margin, differences=words)
 
 
 def _rows(whole: PaperRow, sequences: Sequence[SequenceRow]) -> Iterator[SequenceRow]:

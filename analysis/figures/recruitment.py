@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from analysis.comparisons.paper import published_of
 from analysis.figures import style
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import chosen, has, missing, solved
 from analysis.methods import short_name
 from analysis.published import RUNS
@@ -54,18 +54,7 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
         for (task, label, source), rows in data.groupby(["task", "method", "source"], sort=False)
     )
-    return Plot(
-        id="recruitment",
-        title="Hand sequences",
-        caption=(
-            "Share of runs by hand sequence (L left, R right, goal by goal); the number is that "
-            f"of runs. Hatched: published. Rare sequences are grey."
-            f"{style.dagger(found.values())}"
-        ),
-        alt=f"Stacked bars of hand sequences. {words}.",
-        figure=figure,
-        data=data,
-    )
+    return worded("recruitment", figure, data, found.values(), shares=words)
 
 
 def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:

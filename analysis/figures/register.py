@@ -81,8 +81,7 @@ class Figures(Mapping[str, Figure]):
         if methods is not None:
             known_methods(study, methods)
         self._study, self._methods, self._most = study, methods, most_tasks
-        self._drawn: dict[str, list[Plot]] = {}
-        self._skipped: dict[str, str] = {}
+        self._drawn: dict[str, list[Plot] | CoarticError] = {}
 
     @property
     def plots(self) -> list[Plot]:
@@ -92,8 +91,8 @@ class Figures(Mapping[str, Figure]):
     @property
     def skipped(self) -> dict[str, str]:
         """Why there is none, by what would have been drawn."""
-        self.plots  # noqa: B018
-        return self._skipped
+        found = {entry.name: self._found(entry) for entry in REGISTER}
+        return {name: str(why) for name, why in found.items() if isinstance(why, CoarticError)}
 
     def of_section(self, section: str) -> list[Plot]:
         """Figures of one section of a report."""
@@ -108,11 +107,12 @@ class Figures(Mapping[str, Figure]):
         """A figure with its words and numbers, by its id; KeyError where there is none."""
         for entry in REGISTER:
             if name.startswith(entry.name):
-                for plot in self._of(entry):
+                found = self._found(entry)
+                if isinstance(found, CoarticError):
+                    raise KeyError(f"no figure {name}: {found}")
+                for plot in found:
                     if plot.id == name:
                         return plot
-                if entry.name in self._skipped:
-                    raise KeyError(f"no figure {name}: {self._skipped[entry.name]}")
         raise KeyError(f"no figure {name}; there are {', '.join(self)}")
 
     def __getitem__(self, name: str) -> Figure:
@@ -128,11 +128,16 @@ class Figures(Mapping[str, Figure]):
         return len(self.plots)
 
     def _of(self, entry: Entry) -> list[Plot]:
+        found = self._found(entry)
+        return [] if isinstance(found, CoarticError) else found
+
+    def _found(self, entry: Entry) -> list[Plot] | CoarticError:
+        """The figures of a row, drawn once, or why there are none."""
         if entry.name not in self._drawn:
             try:
                 self._drawn[entry.name] = self._draw(entry)
             except CoarticError as error:
-                self._drawn[entry.name], self._skipped[entry.name] = [], str(error)
+                self._drawn[entry.name] = error
         return self._drawn[entry.name]
 
     def _draw(self, entry: Entry) -> list[Plot]:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from analysis.figures import style
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import chosen, has, missing
 from analysis.methods import short_name
 from analysis.signatures.register import REGISTER
@@ -87,24 +87,10 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     columns = [name for name in SIGNATURES if name in known]
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
-    return Plot(
-        id=f"signatures-{slug}",
-        title=f"Signatures of coarticulation: {task.label}",
-        caption=(
-            f"{task.label}: signatures (docs/signatures.md), each the mean over its goals or "
-            "coordinates and over runs. Colour: the value standardised over the methods shown, "
-            f"signature by signature, purple low, orange high, from −{LIMIT:.0f} to "
-            f"+{LIMIT:.0f} SD; neither is good in itself. "
-            "First subtask and total: ticks more than in the initial solution. Hatched: does not "
-            f"apply, or there are too few runs.{style.dagger([task])}"
-        ),
-        alt=(
-            f"Matrix of {len(labels)} methods ({', '.join(map(short_name, labels))}) by "
-            f"{len(columns)} signatures on {task.label}; its numbers are in the table."
-        ),
-        figure=_matrix(shown, labels, columns),
-        data=shown,
-    )
+    of = {"task": task.label, "limit": LIMIT, "rows": len(labels), "columns": len(columns)}
+    of["methods"] = ", ".join(map(short_name, labels))
+    figure = _matrix(shown, labels, columns)
+    return worded("signatures", figure, shown, [task], id=f"signatures-{slug}", **of)
 
 
 def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -> Figure:

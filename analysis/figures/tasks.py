@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import style
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.study import Study
 from coartic import Task
@@ -55,18 +55,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         axes.set_axis_off()
     style.legend(figure, legend_entries(hand for task in tasks for hand in task.hands), 3)
     names = ", ".join(task.name for task in tasks)
-    return Plot(
-        id="tasks",
-        title="Tasks",
-        caption=(
-            "Start configuration and goals of each task. Open squares: left arm; closed "
-            "circles: right arm; open circles, to scale: goals, hit in the order of their "
-            "numbers. After Figure 4 of Shah, Barto & Fagg (2013)."
-        ),
-        alt=f"Schematics of the tasks {names}: robot in its start configuration, goals.",
-        figure=figure,
-        data=_data(tasks),
-    )
+    return worded("tasks", figure, _data(tasks), tasks=names)
 
 
 def _title(task: Task, name: str) -> str:
