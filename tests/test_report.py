@@ -93,7 +93,7 @@ def document():
 
 
 def test_documents_that_do_not_fit_are_refused():
-    with pytest.raises(ValueError, match="ids used twice: a"):
+    with pytest.raises(ValueError, match="a: ids are used once"):
         Document("t", (Section("a", "A"), Section("b", "B", sections=(Section("a", "C"),))))
     with pytest.raises(ValueError, match="no run ids"):
         Document("t", (Section("a", "A", (TABLE,)),), runs={LEARNER: ("aa-1",)})

@@ -14,7 +14,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
 
 RestsOn = Literal["runs", "optimum", "paper", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, the paper, words of
@@ -61,6 +63,8 @@ Value = float | int | str | Estimate | None
 @dataclass(frozen=True)
 class Column:
     """One column of a table."""
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
     name: str
     """Of the CSV column: a Python identifier, stable."""
@@ -220,7 +224,9 @@ class Document:
                 raise ValueError("id 'runs' is kept for the list of runs")
         twice = {name for name in ids if ids.count(name) > 1}
         if twice:
-            raise ValueError(f"ids used twice: {', '.join(sorted(twice))}")
+            raise ValueError(
+                f"{', '.join(sorted(twice))}: ids are used once, by one section, table or figure"
+            )
         for table in self.tables():
             for row in table.rows:
                 for cells in (row.cells, *row.cells_by_column.values()):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from analysis.markup import words
 from analysis.report.document import CellKey, DataTable, RestsOn
-from analysis.report.tables.methods import READING_OF_METHODS
+from analysis.report.tables.layout import LAYOUTS
 from analysis.report.text import heads, texts
 from analysis.report.trace_file import FILE, Source, TraceFile, read_trace
 from analysis.results.optima import SHIPPED
@@ -167,7 +167,7 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
         if "optimum" in column.rests_on and task in tasks and arm == column.other_arm
     ]
     # The tables of methods share what stands above them all.
-    above = READING_OF_METHODS if table.id.startswith("methods-") else ()
+    above = LAYOUTS["methods"].read() if table.id.startswith("methods-") else ()
     notes = dict.fromkeys(map(words, (*above, *table.notes)))
     own = row.cells if "runs" in column.rests_on or not column.rests_on else ()
     cells = [

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from analysis.comparisons.pairs import PairRow
 from analysis.markup import code, escaped
 from analysis.report.document import Block, Bullets, Document, Prose, Section
-from analysis.report.legends import with_legends
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.methods import overall_table
 from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
@@ -89,7 +88,7 @@ def _tasks(study: Study) -> Iterator[Section]:
     ids = table_ids(study)
     for task, rows in itertools.groupby(study.pair_rows, key=lambda row: row.task):
         tables = (pairwise_table(study, task), cost_table(study, task))
-        blocks = [with_legends(table) for table in tables if table is not None]
+        blocks = [table for table in tables if table is not None]
         said = Bullets(tuple(outcome(list(rows))))
         yield Section(f"on-{ids[task]}", marked(study, task), (said, *blocks))
 
@@ -111,7 +110,7 @@ def _across(study: Study) -> Iterator[Block]:
     yield Prose((text,))
     if table is None:
         return
-    yield with_legends(table)
+    yield table
     others = dict.fromkeys(study.scores.method[~study.scores.method.isin(study.overall.method)])
     left = escaped(", ".join(name for name in others if not name.startswith(SEARCH)))
     if left:

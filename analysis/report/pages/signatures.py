@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from analysis.report.document import Block, DataTable, Document, Prose, Section
+from analysis.report.document import Block, Document, Prose, Section
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
 from analysis.report.tables.signatures import definitions_table, signatures_tables
@@ -37,16 +37,15 @@ def signatures_document(study: Study) -> Document:
         found: list[Block] = [*signatures_tables(study, task)]
         blocks = found or [Prose((f"{NO_RUN.capitalize()}.",))]
         sections.append(Section(f"on-{slug}-signatures", marked(study, task), tuple(blocks)))
-    contexts = contexts_table(study)
-    between: list[tuple[str, str, list[DataTable]]] = [
-        ("between-contexts", "Between contexts", [contexts] if contexts else []),
+    for name, title, tables in (
+        ("between-contexts", "Between contexts", [contexts_table(study)]),
         ("locus-slopes", "Locus slopes", slopes_tables(study)),
         ("signatures-meaning", "What the signatures say", [definitions_table()]),
-    ]
-    sections += [Section(name, title, tuple(found)) for name, title, found in between if found]
+    ):
+        made = tuple(table for table in tables if table is not None)
+        sections += [Section(name, title, made)] if made else []
     tests: list[Block] = [Prose((TESTS,))]
     if any(task.reconstructed for task in study.tasks.values()):
         tests.append(Prose(("† Reconstructed task (docs/model.md).",)))
     sections.insert(0, Section("signatures-reading", "How to read the tables", tuple(tests)))
-    runs = {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()}
-    return Document("Signatures of coarticulation", tuple(sections), LEAD, runs)
+    return Document("Signatures of coarticulation", tuple(sections), LEAD, study.run_ids)
