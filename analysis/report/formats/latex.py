@@ -12,7 +12,9 @@ import re
 import textwrap
 import unicodedata
 from collections.abc import Sequence
-from string import Template
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from analysis.markup import inline
 from analysis.methods import short_name
@@ -79,67 +81,38 @@ def latex_table(table: DataTable) -> str:
     shown = [part for part in parts(table) if part.column.printed]
     broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
     width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
-    kinds = "".join(
-        rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
-        for part in shown
-    )
-    head = " & ".join(_head(part, table) for part in shown)
-    rows = "\n".join(
-        " & ".join(_cell(part, row.values[part.index]) for part in shown) + r" \\"
-        for row in table.rows
-    )
-    layout = _LONG if long else _FLOAT
-    begin, end = (
-        (r"\begin{tabularx}{\linewidth}", r"\end{tabularx}")
-        if broken
-        else (f"{_SCALED}\n\\begin{{tabular}}", r"\end{tabular}}")
-    )
-    return layout.substitute(
-        caption=f"\\caption{{{_spans(table.caption)}}}\n\\label{{tab:{table.id}}}",
-        begin=begin,
-        end=end,
-        kinds=f"{{@{{}}{kinds}@{{}}}}",
-        head=f"{head} \\\\\n\\midrule",
-        rows=rows,
-        notes="".join(
-            f"\\par\\smallskip\\noindent\\parbox{{\\linewidth}}{{{_spans(note)}}}\n"
-            for note in table.notes
+    return _template().render(
+        id=table.id,
+        caption=_spans(table.caption),
+        kinds="".join(
+            rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
+            for part in shown
         ),
+        head=" & ".join(_head(part, table) for part in shown),
+        rows=[
+            " & ".join(_cell(part, row.values[part.index]) for part in shown) for row in table.rows
+        ],
+        notes=map(_spans, table.notes),
+        broken=broken,
+        long=long,
     )
 
 
-_SCALED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
-_FLOAT = Template(r"""\begin{table}[htbp]
-\centering
-\footnotesize
-\setlength{\tabcolsep}{3pt}
-$caption
-$begin$kinds
-\toprule
-$head
-$rows
-\bottomrule
-$end
-$notes\end{table}
-""")
-_LONG = Template(r"""\begingroup
-\scriptsize
-\setlength{\tabcolsep}{3pt}
-\setlength{\LTcapwidth}{\linewidth}
-\begin{longtable}$kinds
-$caption \\
-\toprule
-$head
-\endfirsthead
-\toprule
-$head
-\endhead
-\bottomrule
-\endfoot
-$rows
-\end{longtable}
-$notes\endgroup
-""")
+@cache
+def _template() -> Template:
+    return Environment(
+        loader=PackageLoader("analysis.report", "formats"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+        # Braces and per cent signs are LaTeX's own.
+        block_start_string="<%",
+        block_end_string="%>",
+        comment_start_string="<#",
+        comment_end_string="#>",
+        variable_start_string="<<",
+        variable_end_string=">>",
+    ).get_template("table.tex.jinja")
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
