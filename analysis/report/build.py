@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -140,8 +139,10 @@ def write(report: Report, study: Study, folder: Path) -> None:
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study, report.document, report.numbers),
     }
-    render = partial(rendered, endings=report.formats)
-    write_report(report.document, report.plots, folder, extra, render=render)
+    figures: dict[str, bytes] = {}
+    for plot in report.plots:
+        figures |= rendered(plot, endings=report.formats)
+    write_report(report.document, figures, folder, extra)
 
 
 def _title(results: Results) -> str:

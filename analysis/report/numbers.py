@@ -14,15 +14,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.methods import LEARNER
+from analysis.report.document import CellKey
 from coartic.text import one_line
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
 PREFIX = "coartic"
-Cell = tuple[str, str]
-"""Task and label."""
-
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 
 
@@ -42,7 +40,7 @@ class Number:
     n: int | None = None
     how: str = ""
     """How value and interval were obtained."""
-    cells: tuple[Cell, ...] = ()
+    cells: tuple[CellKey, ...] = ()
     """What it was computed from; none for what the paper prints and for shipped optima."""
     of: str = ""
     """What the meaning is said of, such as a method on a task."""

@@ -7,27 +7,12 @@ from typing import TYPE_CHECKING
 from analysis.report.document import Block, Document, Prose, Section
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
+from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.signatures import definitions_table, signatures_tables
 from analysis.signatures.rows import NO_RUN
 
 if TYPE_CHECKING:
     from analysis.study import Study
-
-LEAD = (
-    "Means over runs with Student's 95 % interval, shares of runs with Wilson's, slopes with the "
-    "regression's. A number alone is that of a single run, or of a quantity without an interval; "
-    "no spread says that these runs do not differ, not that others would not. Methods by mean "
-    "reward, best first. How tests and intervals hold: docs/signatures.md; all signatures, by "
-    "goal, hand and joint: `signatures.csv`."
-)
-TESTS = (
-    "p-values are two-sided for ΔV z and slopes, of permutation tests for contexts and norms of "
-    "slopes, one-sided for the sacrifice (in the mean over runs, the first subtask takes longer "
-    "by more than one tick and the whole takes less than by the corrective process with the same "
-    "hands). They are adjusted by Holm's method over all tests of their own table, in the table "
-    "of contexts over those of the same goal, hand and tasks, of slopes norms apart from joints. "
-    "Over several tables nothing is adjusted."
-)
 
 
 def signatures_document(study: Study) -> Document:
@@ -44,8 +29,9 @@ def signatures_document(study: Study) -> Document:
     ):
         made = tuple(table for table in tables if table is not None)
         sections += [Section(name, title, made)] if made else []
-    tests: list[Block] = [Prose((TESTS,))]
+    lead, tested = LAYOUTS["main-signatures"].read()
+    tests: list[Block] = [Prose((tested,))]
     if any(task.reconstructed for task in study.tasks.values()):
         tests.append(Prose(("† Reconstructed task (docs/model.md).",)))
     sections.insert(0, Section("signatures-reading", "How to read the tables", tuple(tests)))
-    return Document("Signatures of coarticulation", tuple(sections), LEAD, study.run_ids)
+    return Document("Signatures of coarticulation", tuple(sections), lead, study.run_ids)

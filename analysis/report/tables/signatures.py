@@ -16,25 +16,16 @@ from analysis.report.document import Column, DataTable, Row, Value
 from analysis.report.tables.common import counts, table_ids
 from analysis.report.tables.layout import LAYOUTS, with_interval
 from analysis.signatures.register import REGISTER
-from analysis.signatures.rows import Shown, Signature, SignatureRow
+from analysis.signatures.rows import Signature, SignatureRow
 from analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-
-_ALWAYS = ("main-signatures", "other-arm")
-"""Tables that are never left out for shortness."""
-_SHOWS: dict[str, Shown] = {
-    "main-signatures": "main-signatures",
-    "further-goals": "main-signatures",
-    "hands": "hands",
-    "other-arm": "other-arm",
-    "travel": "travel",
-    "synergy": "synergy",
-    "variance": "variance",
-}
-"""The tables of one task by name, and what signatures name as their table that it shows."""
+_MAIN, _FURTHER = "main-signatures", "further-goals"
+"""Tables of the same signatures: at the first goal or none, and at the others."""
+_KINDS = (_MAIN, _FURTHER, "hands", "other-arm", "travel", "synergy", "variance")
+_SHORT = (_MAIN, "other-arm")
 
 
 class Spot(NamedTuple):
@@ -68,7 +59,7 @@ def signatures_tables(study: Study, task: str, *, short: bool = False) -> list[D
     rows = [row for row in study.signature_rows if row.task == task]
     kinds = [
         kind
-        for kind in (_ALWAYS if short else _SHOWS)
+        for kind in (_SHORT if short else _KINDS)
         if kind != "hands" or len(study.tasks[task].hands) > 1
     ]
     return [made for kind in kinds if (made := _of_task(study, task, kind, rows)) is not None]
@@ -78,7 +69,8 @@ def _of_task(
     study: Study, task: str, kind: str, every: Sequence[SignatureRow]
 ) -> DataTable | None:
     """Methods by signatures and places; None where no method has a value."""
-    rows = [row for row in every if REGISTER[row.signature].table == _SHOWS[kind]]
+    shown = _MAIN if kind == _FURTHER else kind
+    rows = [row for row in every if REGISTER[row.signature].table == shown]
     spots = _spots(rows, kind)
     own = {(row.label, spot_of(row)): row for row in rows}
     adjusted = holm_adjusted(row for row in own.values() if spot_of(row) in spots)
@@ -114,8 +106,8 @@ def _spots(rows: Sequence[SignatureRow], kind: str) -> list[Spot]:
     """The columns of a table, in the order of the register; of variance goal by goal."""
     order = list(REGISTER)
     found = {spot_of(row) for row in rows if row.unit}
-    if kind in ("main-signatures", "further-goals"):
-        found = {spot for spot in found if ((spot.goal or 1) > 1) == (kind == "further-goals")}
+    if kind in (_MAIN, _FURTHER):
+        found = {spot for spot in found if ((spot.goal or 1) > 1) == (kind == _FURTHER)}
 
     def place(spot: Spot) -> tuple[int, int, int, str]:
         first = spot.goal or 0 if kind == "variance" else 0
