@@ -32,7 +32,7 @@ from analysis.report.document import (
 from analysis.report.formats.csv import runs_csv, table_csv
 from analysis.report.formats.html import MOST_ROWS, html
 from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
-from analysis.report.formats.latex import PACKAGES, latex_table, latex_tables, latex_text
+from analysis.report.formats.latex import PACKAGES, latex_table, latex_text
 from analysis.report.formats.markdown import markdown
 from analysis.report.formats.terminal import terminal_table
 from analysis.report.legends import with_legends
@@ -40,7 +40,6 @@ from analysis.report.summary import without_variants
 from analysis.report.text import number_text, parts
 from analysis.report.write import write_report
 from analysis.words import typographic
-from coartic import CoarticError
 from coartic.files import LISTING
 from tests.support.reports import Page
 
@@ -391,7 +390,7 @@ def test_every_character_of_ours_has_an_escape():
 
 
 def test_latex_columns_are_as_wide_as_their_numbers():
-    text = latex_tables(document())["methods-shelf"]
+    text = latex_table(next(t for t in document().tables() if t.id == "methods-shelf"))
     assert (
         r"\begin{tabularx}{\linewidth}{@{}lS[table-format=-3.1]S[table-format=1.1]r"
         r"S[table-format=1.1]S[table-format=7.0]S[table-format=1.3]"

@@ -107,6 +107,11 @@ class Row:
     link: str = ""
     """Address within the page that the row's name leads to."""
 
+    @property
+    def all_cells(self) -> set[CellKey]:
+        """What any of its values was computed from."""
+        return {*self.cells}.union(*self.cells_by_column.values())
+
 
 @dataclass(frozen=True)
 class DataTable:
@@ -229,13 +234,12 @@ class Document:
             )
         for table in self.tables():
             for row in table.rows:
-                for cells in (row.cells, *row.cells_by_column.values()):
-                    unknown = [cell for cell in cells if cell not in self.runs]
-                    if unknown:
-                        raise ValueError(
-                            f"table {table.id}, row {row.key!r}: the document has no run ids "
-                            f"of {unknown}"
-                        )
+                unknown = row.all_cells - self.runs.keys()
+                if unknown:
+                    raise ValueError(
+                        f"table {table.id}, row {row.key!r}: the document has no run ids of "
+                        f"{sorted(unknown)}"
+                    )
 
     def walk(self) -> Iterator[Section]:
         """All sections and subsections, in order."""

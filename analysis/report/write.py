@@ -9,7 +9,7 @@ from pathlib import Path
 from analysis.report.document import Document
 from analysis.report.formats.csv import runs_csv, table_csv
 from analysis.report.formats.html import html
-from analysis.report.formats.latex import latex_inputs, latex_tables
+from analysis.report.formats.latex import latex_inputs, latex_table
 from analysis.report.formats.markdown import markdown
 from coartic import CoarticError
 from coartic.files import check_folder, publish
@@ -60,6 +60,7 @@ def _texts(document: Document) -> dict[str, str]:
         "tables.tex": latex_inputs(document),
         "tables/runs.csv": runs_csv(document),
     }
-    texts |= {f"tables/{table.id}.csv": table_csv(table) for table in document.tables()}
-    texts |= {f"tables/{name}.tex": text for name, text in latex_tables(document).items()}
+    for table in document.tables():
+        texts[f"tables/{table.id}.csv"] = table_csv(table)
+        texts[f"tables/{table.id}.tex"] = latex_table(table)
     return texts

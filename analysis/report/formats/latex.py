@@ -14,11 +14,12 @@ import unicodedata
 from collections.abc import Sequence
 from functools import cache
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 
 from analysis.markup import inline
 from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
+from analysis.report.formats.templates import LATEX, template
 from analysis.report.text import Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
@@ -61,11 +62,6 @@ _LABELS = {"method", "first", "second"}  # columns of methods with their variant
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
 
-def latex_tables(document: Document) -> dict[str, str]:
-    """Every table by id, with label ``tab:ID``: a ``table`` float, or a ``longtable``."""
-    return {table.id: latex_table(table) for table in document.tables()}
-
-
 def latex_inputs(document: Document) -> str:
     """A file that inputs all tables from ``tables/``."""
     inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
@@ -77,11 +73,14 @@ def latex_inputs(document: Document) -> str:
 
 
 def latex_table(table: DataTable) -> str:
-    """One table: numbers in S columns as wide as they need, text and intervals beside them."""
+    """A ``table`` float, or a ``longtable``, with label ``tab:ID``.
+
+    Numbers are in S columns as wide as they need, text and intervals beside them.
+    """
     shown = [part for part in parts(table) if part.column.printed]
     broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
     width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
-    return _template().render(
+    return _layout().render(
         id=table.id,
         caption=_spans(table.caption),
         kinds="".join(
@@ -99,20 +98,8 @@ def latex_table(table: DataTable) -> str:
 
 
 @cache
-def _template() -> Template:
-    return Environment(
-        loader=PackageLoader("analysis.report", "formats"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        keep_trailing_newline=True,
-        # Braces and per cent signs are LaTeX's own.
-        block_start_string="<%",
-        block_end_string="%>",
-        comment_start_string="<#",
-        comment_end_string="#>",
-        variable_start_string="<<",
-        variable_end_string=">>",
-    ).get_template("table.tex.jinja")
+def _layout() -> Template:
+    return template("table.tex.jinja", **LATEX)
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:

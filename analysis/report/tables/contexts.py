@@ -13,12 +13,11 @@ from analysis.report.tables.common import table_ids
 from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.signatures import (
     cells_of,
+    columns_of,
     holm_adjusted,
     identifier,
     known,
     labels_of,
-    p_column,
-    value_column,
 )
 from analysis.signatures.locus import families
 from analysis.signatures.register import CONTEXTS, FAMILIES, REGISTER
@@ -59,11 +58,10 @@ def contexts_table(study: Study) -> DataTable | None:
 
 def _columns_of_contexts(tested: set[str]) -> Iterator[Column]:
     for signature in CONTEXTS:
-        name = identifier(signature.name)
-        yield value_column(signature, name, signature.heading, True)
-        if signature.name in tested:
-            printed = signature.name == "context dependence"
-            yield p_column(name, f"p of {signature.heading}", printed)
+        name, heading = signature.name, signature.heading
+        p = f"p of {heading}" if name in tested else ""
+        printed = name == "context dependence"
+        yield from columns_of(signature, identifier(name), heading, p, p_printed=printed)
     yield Column(
         "lead_at_most", "at most", "number", "ticks", 0, rests_on=("runs",), printed=False
     )
@@ -96,10 +94,10 @@ def _slopes_at(
                 what = row.place.joint or "norm"
                 values = (label, what, row.n, *cells_of(row, adjusted, True))
                 found.append(Row(f"{label}, {what}", values, cells))
-    slope = value_column(REGISTER["locus slope"], "slope", "slope", True)
+    columns = columns_of(REGISTER["locus slope"], "slope", "slope", "p", p_printed=True)
     return (
         LAYOUTS["slopes"]
-        .plus((slope, p_column("slope", "p", True)))
+        .plus(columns)
         .table(
             found,
             *(table_ids(study)[task], str(place.goal), "of", str(place.moving), place.hand),

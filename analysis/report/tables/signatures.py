@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from analysis.markup import escaped
@@ -92,11 +92,11 @@ def _of_task(
         for spot, row in values.items():
             cells += cells_of(row, adjusted, spot in tested)
         found.append(Row(label, tuple(cells), ((task, label),)))
-    columns = []
+    columns: list[Column] = []
     for number, spot in enumerate(spots):
         header = spot.header + _neutral(row for (_, at), row in own.items() if at == spot)
-        columns.append(value_column(spot.signature, spot.name, header, number < 2))
-        columns += [p_column(spot.name, "p")] if spot in tested else []
+        p = "p" if spot in tested else ""
+        columns += columns_of(spot.signature, spot.name, header, p, printed=number < 2)
     reasons = _reasons(lacking, len(spots))
     name = table_ids(study)[task]
     return LAYOUTS[kind].plus(columns).table(found, name, notes=reasons, task=escaped(task))
@@ -182,14 +182,19 @@ def identifier(*words: str) -> str:
     return re.sub(r"\W+", "_", text.strip())
 
 
-def value_column(signature: Signature, name: str, header: str, printed: bool) -> Column:
-    """Values of a signature, with its unit and decimals."""
+def columns_of(
+    signature: Signature,
+    name: str,
+    header: str,
+    p: str = "",
+    *,
+    printed: bool = True,
+    p_printed: bool = False,
+) -> Iterator[Column]:
+    """Values of a signature, then their p-values where those have a header."""
     kind: Literal["share", "number"] = "share" if signature.share else "number"
     unit = signature.unit if signature.unit in ("ticks", "bit", "rad", "pooled SD") else ""
     digits = 0 if signature.share else signature.digits
-    return Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
-
-
-def p_column(name: str, header: str, printed: bool = False) -> Column:
-    """p-values beside the values of a column."""
-    return Column(f"{name}_p", header, "p", digits=3, rests_on=("runs",), printed=printed)
+    yield Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
+    if p:
+        yield Column(f"{name}_p", p, "p", digits=3, rests_on=("runs",), printed=p_printed)
