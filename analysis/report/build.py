@@ -295,8 +295,7 @@ def _section(
 
 
 def _tables(*found: DataTable | None, folded: bool = False) -> list[Block]:
-    made = (table for table in found if table is not None)
-    return [replace(table, folded=folded or table.folded) for table in made]
+    return [replace(table, folded=folded or table.folded) for table in filter(None, found)]
 
 
 def _figure(plot: Plot) -> FigureBlock:

@@ -72,9 +72,8 @@ def _made(study: Study) -> str:
 def _noted(tables: Iterable[DataTable | None], said: set[str]) -> tuple[Block, ...]:
     """The tables that there are, each with the notes that were not ``said`` before."""
     found: list[Block] = []
-    for table in tables:
-        if table is not None:
-            fresh = tuple(note for note in table.notes if note not in said)
-            found.append(replace(table, notes=fresh))
-            said.update(fresh)
+    for table in filter(None, tables):
+        fresh = tuple(note for note in table.notes if note not in said)
+        found.append(replace(table, notes=fresh))
+        said.update(fresh)
     return tuple(found)

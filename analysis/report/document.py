@@ -21,6 +21,8 @@ from pydantic import ConfigDict
 RestsOn = Literal["runs", "optimum", "paper", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, the paper, words of
 ours, or a simulation that needs no runs."""
+OtherArm = Literal["free", "still"]
+"""Whose optimum: with all joints free, or with the arm that is not chosen kept still."""
 CellKey = tuple[str, str]
 """Name of a task and label of a method with its variant, as the keys of a Study."""
 
@@ -81,7 +83,7 @@ class Column:
     """Header of the intervals, where values have them."""
     rests_on: tuple[RestsOn, ...] = ()
     """What its values were computed from; of numbers there is always something."""
-    other_arm: Literal["free", "still"] = "free"
+    other_arm: OtherArm = "free"
     """Of the optimum that it rests on, if it does."""
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has

@@ -59,6 +59,7 @@ PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _LABELS = {"method", "first", "second"}  # columns of methods with their variants
+_COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
 
@@ -156,12 +157,8 @@ def _spans(text: str) -> str:
     pieces = []
     for span in inline(text):
         words = latex_text(span.text)
-        if span.style == "emphasis":
-            words = f"\\emph{{{words}}}"
-        elif span.style == "strong":
-            words = f"\\textbf{{{words}}}"
-        elif span.style == "code":
-            words = f"\\texttt{{{words}}}"
+        if span.style in _COMMANDS:
+            words = f"\\{_COMMANDS[span.style]}{{{words}}}"
         elif span.address.startswith(("http://", "https://")):
             words = f"{words} (\\texttt{{{latex_text(span.address)}}})"
         pieces.append(words)

@@ -90,10 +90,9 @@ def _least_p(row: PairRow) -> float:
 def _tasks(study: Study) -> Iterator[Section]:
     ids = table_ids(study)
     for task, rows in itertools.groupby(study.pair_rows, key=lambda row: row.task):
-        tables = (pairwise_table(study, task), cost_table(study, task))
-        blocks = [table for table in tables if table is not None]
+        tables = filter(None, (pairwise_table(study, task), cost_table(study, task)))
         said = Bullets(tuple(outcome(list(rows))))
-        yield Section(f"on-{ids[task]}", marked(study, task), (said, *blocks))
+        yield Section(f"on-{ids[task]}", marked(study, task), (said, *tables))
 
 
 def _across(study: Study) -> Iterator[Block]:

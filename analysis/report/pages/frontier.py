@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -36,13 +37,9 @@ def _on(study: Study, task: str, slug: str) -> Section:
 
 def cost_tables(study: Study, task: str) -> Iterator[DataTable]:
     """Targets of each optimum, areas and Pareto sets of a task, as far as there are any."""
-    tables: list[DataTable | None] = [
-        targets_table(study, task, spend, arm)
-        for spend in TARGET_SPENDS
-        for arm in other_arms(study, task)
-    ]
-    tables += [areas_table(study, task), pareto_table(study, task)]
-    yield from (table for table in tables if table is not None)
+    places = itertools.product(TARGET_SPENDS, other_arms(study, task))
+    targets = (targets_table(study, task, *place) for place in places)
+    return filter(None, (*targets, areas_table(study, task), pareto_table(study, task)))
 
 
 def optima_known(study: Study, task: str) -> Prose:

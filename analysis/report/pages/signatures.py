@@ -27,7 +27,7 @@ def signatures_document(study: Study) -> Document:
         ("locus-slopes", "Locus slopes", slopes_tables(study)),
         ("signatures-meaning", "What the signatures say", [definitions_table()]),
     ):
-        made = tuple(table for table in tables if table is not None)
+        made = tuple(filter(None, tables))
         sections += [Section(name, title, made)] if made else []
     lead, tested = LAYOUTS["main-signatures"].read()
     tests: list[Block] = [Prose((tested,))]

@@ -73,8 +73,8 @@ def slopes_tables(study: Study) -> list[DataTable]:
     for row in study.signature_rows:
         if REGISTER[row.signature] in FAMILIES and known(row):
             found[row.task, replace(row.place, joint="")].append(row)
-    made = [_slopes_at(study, task, place, rows) for (task, place), rows in found.items()]
-    return [table for table in made if table is not None]
+    made = (_slopes_at(study, task, place, rows) for (task, place), rows in found.items())
+    return list(filter(None, made))
 
 
 def _slopes_at(

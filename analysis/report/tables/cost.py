@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -14,7 +14,7 @@ from analysis.comparisons.pareto import TIME_TOLERANCE
 from analysis.comparisons.progress import LABELS, SPENDS
 from analysis.comparisons.targets import Target
 from analysis.markup import escaped
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.report.document import Column, DataTable, Estimate, OtherArm, Row, Value
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.layout import LAYOUTS, finite, with_interval
 from analysis.words import typographic
@@ -23,7 +23,6 @@ from coartic.record import SEARCH
 if TYPE_CHECKING:
     from analysis.study import Study
 
-OtherArm = Literal["free", "still"]
 TARGET_SPENDS = ("trials", "forward_kinematics")
 """Spends whose targets have tables; ``targets.csv`` has all."""
 SOMETIMES = 0.05

@@ -20,7 +20,6 @@ from coartic.text import counted
 if TYPE_CHECKING:
     from analysis.study import Study
 
-
 _METHODS, _OVERALL = LAYOUTS["methods"], LAYOUTS["across-tasks"]
 _WHOLE = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solver_iterations")
 """Medians that are shown whole."""

@@ -22,18 +22,7 @@ from analysis.words import typographic
 if TYPE_CHECKING:
     from analysis.study import Study
 
-
 _CELLS, _SEQUENCES = LAYOUTS["published-and-ours"], LAYOUTS["by-hand-sequence"]
-_PAPER = (
-    "Published: Shah, Barto & Fagg (2013), mean ± SD, rounded as there. *derived*: pooled from "
-    "what is printed by hand sequence; *runs assumed*: no number of runs stands beside it, "
-    f"{RUNS} is that of every experiment. The difference, ours less published, has Welch's "
-    "interval from the printed mean, SD and runs; where no SD is printed the printed mean is "
-    "taken as exact. "
-    "Each interval is for its row alone. Rewards are not normally distributed, as the paper says "
-    "of its own: the intervals are approximate, most of all where runs settle on several hand "
-    "sequences."
-)
 
 
 def beside_paper(study: Study) -> tuple[DataTable | None, ...]:
@@ -47,11 +36,12 @@ def published_table(study: Study) -> DataTable | None:
     derived = dict.fromkeys(
         row.cell.task for row in rows if (published_initial(row.cell.task) or ("", 0, False))[2]
     )
-    said = f"Published initial rewards of {', '.join(derived)} are derived from other printed "
+    names = ", ".join(derived)
+    said = f"Published initial rewards of {names} are derived from other printed numbers."
     return _CELLS.table(
         (_published_row(study, row) for row in rows),
-        notes=(f"{said}numbers.",) if derived else (),
-        of_paper=_PAPER,
+        notes=(said,) if derived else (),
+        of_paper=_of_paper(),
         margin=MARGIN,
         trials=TRIALS,
     )
@@ -60,7 +50,12 @@ def published_table(study: Study) -> DataTable | None:
 def sequences_table(study: Study) -> DataTable | None:
     """Learned rewards of the paper's cells by hand sequence, published and ours."""
     rows = (_sequence_row(study, row) for row in sequence_rows(study))
-    return _SEQUENCES.table(rows, of_paper=_PAPER)
+    return _SEQUENCES.table(rows, of_paper=_of_paper())
+
+
+def _of_paper() -> str:
+    """What both tables say of published rewards."""
+    return " ".join(_CELLS.read(runs=RUNS))
 
 
 def exhaustive_table(study: Study) -> DataTable | None:

@@ -62,7 +62,7 @@ def signatures_tables(study: Study, task: str, *, short: bool = False) -> list[D
         for kind in (_SHORT if short else _KINDS)
         if kind != "hands" or len(study.tasks[task].hands) > 1
     ]
-    return [made for kind in kinds if (made := _of_task(study, task, kind, rows)) is not None]
+    return list(filter(None, (_of_task(study, task, kind, rows) for kind in kinds)))
 
 
 def _of_task(
