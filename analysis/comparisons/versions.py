@@ -18,7 +18,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.comparisons.methods import MethodRow
-from analysis.comparisons.progress import LABELS
 from analysis.comparisons.surroundings import Differing, codes, differing_tasks, surroundings
 from analysis.results.folder import CellRuns
 from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
@@ -28,9 +27,8 @@ from analysis.study import Study, load
 from coartic import CoarticError
 from coartic.robot import Array
 
-_COUNTED = ("trials", "movement_ticks", "forward_kinematics", "jacobians")
-SPENT = {name: LABELS[name] for name in _COUNTED} | {"solve_s": "solve time"}  # as a ratio
-"""Spends whose medians are compared, in words."""
+SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
+"""Spends whose medians are compared."""
 VERDICTS = {
     "identical": "identical in every run",
     "equivalent": "not identical, equivalent",
