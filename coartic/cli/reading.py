@@ -138,7 +138,7 @@ def cite(
     from analysis.citations import MethodSource, bibliography
     from analysis.results.folder import load_results
     from benchmarks.registry import CLASSES
-    from coartic.tables import BUILT_IN
+    from coartic.record import BUILT_IN
 
     if style != "bibtex":
         raise CoarticError(f"--format {style}: the one format is bibtex")
