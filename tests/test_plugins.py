@@ -10,14 +10,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from benchmarks import executors, worker
+from benchmarks import executors
 from benchmarks import registry as registry_module
-from benchmarks.declaration import MethodFileError, brief
 from benchmarks.registry import registry
 from benchmarks.suites import Cell, run_specs
 from coartic import CoarticError, load_task
 from tests.support.commands import call
-from tests.support.suites import InProcess
+from tests.support.suites import InProcess, ask_here
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "tests" / "example_plugin"
@@ -34,15 +33,7 @@ def coartic(monkeypatch, capsys):
 @pytest.fixture
 def in_process(monkeypatch):
     """Methods are asked and perform their runs here, for tests of what they say and leave."""
-
-    def ask(foreign, **question):
-        try:
-            return worker.answer({**question, "foreign": foreign.model_dump(mode="json")})
-        except Exception as error:
-            said = str(error) if isinstance(error, CoarticError) else brief(error)
-            raise MethodFileError(said) from None
-
-    monkeypatch.setattr(registry_module, "_ask", ask)
+    monkeypatch.setattr(registry_module, "_ask", ask_here)
     monkeypatch.setattr(executors, "Local", lambda jobs: InProcess())
 
 
