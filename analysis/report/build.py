@@ -123,9 +123,12 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
     return (section for section in sections if section.blocks or section.sections)
 
 
-def write(report: Report, study: Study, folder: Path) -> None:
+def write(
+    report: Report, study: Study, folder: Path, *, begin: Callable[[], object] = lambda: None
+) -> None:
     """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
 
+    ``begin`` is called when all is made and nothing written.
     Raises CoarticError where it cannot be written, or something is in the way.
     """
     check_report_folder(folder, study.results.folder)
@@ -136,7 +139,7 @@ def write(report: Report, study: Study, folder: Path) -> None:
         FILE: trace_json(study, report.document, report.numbers),
     }
     render = partial(rendered, endings=report.formats)
-    write_report(report.document, report.plots, folder, extra, render=render)
+    write_report(report.document, report.plots, folder, extra, render=render, begin=begin)
 
 
 def _title(results: Results) -> str:

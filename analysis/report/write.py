@@ -13,10 +13,9 @@ from analysis.report.formats.html import html
 from analysis.report.formats.latex import latex_inputs, latex_tables
 from analysis.report.formats.markdown import markdown
 from coartic import CoarticError
-from coartic.files import check_folder, publish
+from coartic.files import REPORT, check_folder, publish
 
 Plot = TypeVar("Plot")
-_OWNER = "report"
 
 
 def check_report_folder(folder: Path, results: Path) -> None:
@@ -28,7 +27,7 @@ def check_report_folder(folder: Path, results: Path) -> None:
         raise CoarticError(
             f"{folder} holds the results themselves; a report has a folder of its own"
         )
-    check_folder(folder, owner=_OWNER, alone=True)
+    check_folder(folder, owner=REPORT, alone=True)
 
 
 def write_report(
@@ -38,14 +37,16 @@ def write_report(
     extra: Mapping[str, str] | None = None,
     *,
     render: Callable[[Plot], Mapping[str, bytes]],
+    begin: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a report into ``folder``, in the place of an earlier one.
 
     ``report.html`` stands alone; ``report.md`` links to ``figures/`` with what ``render`` makes
     of each plot: contents by file name, at least ``ID.svg``; ``tables/`` holds CSV and LaTeX,
-    ``tables.tex`` inputs the latter; ``extra`` are further text files by name. The same
-    document gives the same bytes. Raises ValueError where a figure of the document is not among
-    the plots, CoarticError as :func:`coartic.files.publish` for a folder that is a report's alone.
+    ``tables.tex`` inputs the latter; ``extra`` are further text files by name; ``begin`` is called
+    when all is made and nothing written. The same document gives the same bytes. Raises
+    ValueError where a figure of the document is not among the plots, CoarticError as
+    :func:`coartic.files.publish` for a folder that is a report's alone.
     """
     figures = {f"figures/{name}": data for plot in plots for name, data in render(plot).items()}
     lost = [f.id for f in document.figures() if f"figures/{f.id}.svg" not in figures]
@@ -53,7 +54,8 @@ def write_report(
         raise ValueError(f"figures without a plot: {', '.join(lost)}")
     texts = {**_texts(document), **(extra or {})}
     files = figures | {name: text.encode() for name, text in texts.items()}
-    publish(folder, files, owner=_OWNER, alone=True)
+    begin()
+    publish(folder, files, owner=REPORT, alone=True)
 
 
 def _texts(document: Document) -> dict[str, str]:
