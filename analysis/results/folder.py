@@ -30,7 +30,7 @@ class CellRuns:
         """The method with its variant."""
         return label_of(self.method, self.variant)
 
-    @property
+    @cached_property
     def good(self) -> pd.DataFrame:
         """The runs that have a solution."""
         return self.runs[self.runs["status"] == "ok"]
