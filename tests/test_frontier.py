@@ -207,7 +207,7 @@ def test_areas_in_closed_form(tmp_path):
     assert frame.area.between(0, 1).all()
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(st.lists(st.integers(-1200, BEST), min_size=2, max_size=12))
 def test_areas_are_integrals(tmp_path_factory, rewards):
     results = study([run("m", [float(r) for r in rewards])], tmp_path_factory.mktemp("area"))
@@ -275,7 +275,7 @@ def test_targets_of_the_restricted_optimum(tmp_path):
     assert not len(of(frame, "moving", other_arm="still"))
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(trial_rewards, st.sampled_from(SPENDS))
 def test_nearer_targets_take_longer(tmp_path_factory, rewards, spend):
     rewards = [BEST + 10 * value for value in rewards]
