@@ -39,6 +39,8 @@ from coartic.task import INITIAL_POLICIES, Task, parse_task
 from coartic.text import LONGEST_REASON, Line, printable
 
 RECORD_FORMAT: Literal[2] = 2
+BUILT_IN = "built in"
+"""Origin of this project's methods."""
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
 _OUTCOME = ("status", "solution", "initial", "replay", "bound", "rewards")

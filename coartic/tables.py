@@ -30,9 +30,6 @@ from coartic.text import Line
 
 FORMAT: Literal[5] = 5  # of manifest and tables; raised when one of them changes its meaning
 
-BUILT_IN = "built in"
-"""Origin of this project's methods."""
-
 RUNS = pa.schema(
     [
         ("run_id", pa.string()),

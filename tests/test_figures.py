@@ -107,12 +107,25 @@ def test_each_is_drawn_when_it_is_asked_for(study, monkeypatch):
     first = figures["learned-reward"]
     assert figures["learned-reward"] is first
     assert drawn == ["learned-reward"]
-    with pytest.raises(KeyError, match=f"no figure published: .*{TRIALS} trials"):
+    with pytest.raises(KeyError, match=f"no figure 'published': .*{TRIALS} trials"):
         figures["published"]
     assert "nothing" not in figures
     assert drawn[:2] == ["learned-reward", "published"]
     assert sorted(drawn) == sorted(row.name for row in REGISTER)
     assert list(figures) == [plot.id for plot in figures.plots]
+
+
+def test_an_unknown_name_gets_an_answer(study):
+    with pytest.raises(KeyError, match="no figure 'learned'; did you mean 'learned-reward'"):
+        study.figures["learned"]
+    with pytest.raises(KeyError, match="no figure 0; there are"):
+        study.figures[0]
+    assert 0 not in study.figures
+    assert repr(study.figures).startswith("Figures by id, of Study of ")
+    with pytest.raises(KeyError, match="no table 'claim'; did you mean 'claims'"):
+        study.tables["claim"]
+    with pytest.raises(KeyError, match="no table 0; `list"):
+        study.tables[0]
 
 
 def test_every_figure_has_its_row_and_its_section(figures):

@@ -7,14 +7,15 @@ import pandas as pd
 
 from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
+from benchmarks.declaration import MethodFileError, brief
 from benchmarks.harness import perform_missing
 from benchmarks.registry import registry
 from benchmarks.run import plan_cells
 from benchmarks.sandbox import failure
 from benchmarks.specification import Limits
 from benchmarks.suites import Cell, load_suite, run_specs, select_cells
-from benchmarks.worker import perform
-from coartic import load_task
+from benchmarks.worker import answer, perform
+from coartic import CoarticError, load_task
 from coartic.tables import TIMINGS
 
 ROOT = Path(__file__).parents[2]
@@ -24,6 +25,15 @@ KNOWN = registry()
 
 
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
+
+
+def ask_here(foreign, **question):
+    """As :mod:`benchmarks.registry` asks a method that is not built in, without a process."""
+    try:
+        return answer({**question, "foreign": foreign.model_dump(mode="json")})
+    except Exception as error:
+        said = str(error) if isinstance(error, CoarticError) else brief(error)
+        raise MethodFileError(said) from None
 
 
 def performed(job):
