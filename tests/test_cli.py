@@ -295,6 +295,11 @@ def test_list(monkeypatch, capsys):
     assert code == 0
     for name in ("ascending", "two-armed-2", "dual-process/EC4", "paper"):
         assert name in text
+    monkeypatch.setenv("COLUMNS", "80")
+    narrow = call(monkeypatch, capsys, "list")[1].splitlines()
+    assert max(map(len, map(str.rstrip, narrow))) <= 80
+    assert "dual-process/EC4" in narrow
+    assert "    told: corrective process, reward by trial" in map(str.rstrip, narrow)
 
 
 def test_draw(monkeypatch, capsys, tmp_path):

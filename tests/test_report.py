@@ -326,7 +326,7 @@ def test_markdown():
 
 def printed(table, width):
     console = Console(width=width, file=io.StringIO(), emoji=False)
-    console.print(terminal_table(table, width))
+    console.print(terminal_table(table, width, "see a page"))
     return console.file.getvalue()
 
 
@@ -338,12 +338,15 @@ def test_a_terminal_has_the_columns_that_fit():
     assert "[optimum]" in wide
     assert "*none*" in wide
     assert NASTY[:20] in wide
-    assert "more column" not in wide
+    assert "No room" not in wide
     for width in (100, 60):
         lines = printed(TABLE, width).splitlines()
         assert max(map(len, lines)) <= width
         assert any("dual-process/EC4" in line for line in lines)  # never broken
-    assert "(1 more column, for which there is no room here)" in printed(TABLE, 120)
+    said = " ".join(" ".join(lines).split())
+    assert "No room here for ΔV; runs & more; p; remark (see a page)." in said
+    leading = tuple(replace(c, leading=c.name == "p") for c in TABLE.columns)
+    assert "<0.001" in printed(replace(TABLE, columns=leading), 80)
 
 
 def test_csv_reads_back_as_the_raw_values():

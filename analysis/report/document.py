@@ -82,6 +82,8 @@ class Column:
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has
     first what paper has."""
+    leading: bool = False
+    """Whether it is what the table is for: a terminal has it before all but the first two."""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():

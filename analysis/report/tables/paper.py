@@ -31,12 +31,14 @@ _PUBLISHED_RUNS = _of_paper("published_runs", "published runs", "number")
 _PUBLISHED_AS = _of_paper("published_as", "published as")
 _OURS = Column("ours", "ours", "number", "ticks", 1, rests_on=("runs",))
 _RUNS = _of_runs("runs", "runs", "number")
-_DIFFERENCE = Column("difference", "difference", "number", "ticks", 1, rests_on=("runs", "paper"))
+_DIFFERENCE = Column(
+    "difference", "difference", "number", "ticks", 1, rests_on=("runs", "paper"), leading=True
+)
 _CELLS = (
     Column("task", "task"),
     Column("method", "method"),
     *(_PUBLISHED, _PUBLISHED_RUNS, _PUBLISHED_AS, _OURS, _RUNS, _DIFFERENCE),
-    Column("verdict", "verdict", rests_on=("runs", "paper")),
+    Column("verdict", "verdict", rests_on=("runs", "paper"), leading=True),
     _of_paper("margin", "margin", "number", "ticks", 1),
     _of_paper("margin_of_gain", "of the gain", "share", "", 0),
     _of_runs("initial", "initial", "number", "ticks", 0),
