@@ -15,8 +15,8 @@ from analysis.claims.register import Judged, Verdict
 from analysis.comparisons.paper import paper_rows
 from analysis.methods import LEARNER
 from analysis.published import published_cell
-from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.report.tables.common import marked, mean_of, table
+from analysis.report.document import Bullets, Column, DataTable, Row
+from analysis.report.tables.common import estimate_as_printed, marked, mean_of, table
 from analysis.words import typographic
 from coartic.record import Environment
 from coartic.text import counted
@@ -56,19 +56,20 @@ def tasks_table(study: Study) -> DataTable | None:
             float(initial.iloc[0]) if len(initial) else None,
             condition,
             replace(learned, sd=None),
-            Estimate(printed.mean, printed.sd) if printed else None,
+            estimate_as_printed(printed),
             best.reward if best else None,
             ("proven" if best.proven else "best known") if best else None,
             (best.reward - learned.value) / -best.reward if best and best.reward else None,
         )
         searches = dict.fromkeys(("optimum", "proof"), best.cells) if best else {}
-        rows.append(Row(name, values, ((name, label),), searches))
+        made = Row(name, values, ((name, label),), searches)
+        rows.append(replace(made, rests_on={"published": (printed.source,)}) if printed else made)
     return table(
         "tasks-in-short",
         "The learner's best condition on every task.",
         (
             Column("task", "task"),
-            Column("initial", "initial", "number", "ticks", 0, rests_on=("runs",)),
+            Column("initial", "initial", "number", "ticks", 0, rests_on=("simulation",)),
             Column("condition", "condition"),
             Column("learned", "learned", "number", "ticks", 1, rests_on=("runs",)),
             Column("published", "published", "number", "ticks", 1, rests_on=("paper",)),
@@ -116,11 +117,13 @@ def unlike_printed(study: Study) -> list[str]:
     found = []
     for row in paper_rows(study):
         if row.verdict == "different" and row.paper.summary is not None:
-            ours, printed = (
-                typographic(f"{mean:.1f}") for mean in (row.rewards.mean(), row.paper.summary.mean)
-            )
+            summary = row.paper.summary
+            decimals = 1 if summary.digits is None else summary.digits[0]
+            ours = typographic(f"{row.rewards.mean():.1f}")
+            printed = typographic(f"{summary.mean:.{decimals}f}")
             name = f"{row.cell.task} {row.cell.label.removeprefix(LEARNER)}"
-            found.append(f"{name}: learned reward {ours}, published {printed}")
+            how = "derived from print" if summary.derived else "printed"
+            found.append(f"{name}: learned reward {ours}, {how} {printed}")
     return found
 
 

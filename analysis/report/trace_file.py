@@ -65,6 +65,7 @@ class TraceFile(BaseModel):
         named = [number.cells for number in self.numbers]
         named += [best.cells for *_, best in self.optima]
         named += [cells for row in rows for cells in (row.cells, *row.cells_by_column.values())]
+        named += [table.unshown for table in self.tables]
         known = {(source.task, source.label) for source in self.sources}
         if not {cell for cells in named for cell in cells} <= known:
             raise ValueError("it names cells that it does not have")

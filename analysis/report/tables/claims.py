@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from analysis.claims.register import FITTED, RULES
@@ -34,15 +35,17 @@ def claims_table(study: Study) -> DataTable | None:
     ]
     tested = sum(not math.isnan(entry.p) for entry in study.judged)
     contraries = sum(not math.isnan(entry.contrary_p) for entry in study.judged)
+    family = "all claims that could be tested, over which Holm adjusts"
+    adjusted = partial(Column, rests_on=("runs",), family=family)
     return table(
         "claims",
         "What the paper says of its model, and what it does not compare.",
         (
             Column("claim", "claim"),
             Column("statement", "statement", rests_on=("text",), printed=False),
-            Column("verdict", "verdict", rests_on=("runs",)),
-            Column("adjusted_p", "adjusted p", "p", digits=4, rests_on=("runs",)),
-            Column("adjusted_contrary_p", "of the contrary", "p", digits=4, rests_on=("runs",)),
+            adjusted("verdict", "verdict"),
+            adjusted("adjusted_p", "adjusted p", "p", digits=4),
+            adjusted("adjusted_contrary_p", "of the contrary", "p", digits=4),
             Column("place", "place in the paper", rests_on=("paper",), printed=False),
         ),
         rows,

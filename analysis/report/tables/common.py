@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from analysis.published import Summary
 from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
@@ -53,6 +54,13 @@ def with_interval(value: float, low: float, high: float) -> Value:
     """A value with its interval where it has one; None for NaN."""
     ends = () if math.isnan(low) else (low, high)
     return None if math.isnan(value) else Estimate(value, None, *ends)
+
+
+def estimate_as_printed(published: Summary | None) -> Estimate | None:
+    """Mean with SD and the digits of the paper."""
+    if published is None:
+        return None
+    return Estimate(published.mean, published.sd, digits=published.digits)
 
 
 def finite(value: float) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -35,7 +36,7 @@ READING_OF_COST = (
     "**Targets**: of runs that their budget of trials stopped nobody knows when they would have "
     "come near. They are censored, all at the horizon, the least spend at which one of them "
     "ended: what was reached behind it counts among the runs that came near, not in the median "
-    "(18/20 and ∞ with a horizon of 2000: 18 runs did, but not half of the 20 within the 2000 "
+    "(18/20 and >2000 with a horizon of 2000: 18 runs did, but not half of the 20 within the 2000 "
     "that all runs had). Other runs never reach what they missed. `targets.csv` of `coartic "
     "analyse` has all four spends.",
     "**Areas**: from one average trial to the largest whole spend of a method that learns; "
@@ -119,7 +120,11 @@ def _median(target: Target) -> Value:
     if not target.reached:
         return None
     bounded = target.runs > 1 and math.isfinite(target.low)
-    return Estimate(target.median, None, target.low, target.high) if bounded else target.median
+    if not bounded and math.isfinite(target.median):
+        return target.median
+    low, high = (target.low, target.high) if bounded else (None, None)
+    beyond = target.horizon if math.isfinite(target.horizon) else None
+    return Estimate(target.median, low=low, high=high, beyond=beyond)
 
 
 def _nearness(targets: list[Target]) -> tuple[float, ...]:
@@ -153,6 +158,7 @@ def areas_table(study: Study, task: str) -> DataTable | None:
             f"over {LABELS[spend]}" + ("" if arm == "free" else ", arm still"),
             digits=3,
             other_arm=arm,
+            family="all methods of the table, as the largest spend of one that learns is the end",
             printed=arm == "free" and spend in spends[:2],
         )
         for arm, spend in places
@@ -185,12 +191,18 @@ def pareto_table(study: Study, task: str) -> DataTable | None:
     ]
     for place, (spend, label) in enumerate(LABELS.items()):
         share = partial(_number, kind="share", digits=0)
+        every = "all methods compared on the task"
         heads += [
             _number(spend, label, printed=place < 3),
-            share(f"{spend}_front", "on front", printed=place < 3),
-            share(f"{spend}_told", "of those told no more", printed=False),
+            share(f"{spend}_front", "on front", printed=place < 3, family=every),
+            share(
+                f"{spend}_told",
+                "of those told no more",
+                printed=False,
+                family=f"{every}, of which those count that are told no more",
+            ),
         ]
-    return table(
+    made = table(
         f"pareto-{table_ids(study)[task]}",
         f"Pareto sets of reward and spend on {escaped(task)}.",
         tuple(heads),
@@ -201,6 +213,9 @@ def pareto_table(study: Study, task: str) -> DataTable | None:
             "than it is. Methods on none (in at most 5 % of resamples) are left out.",
         ),
     )
+    named = {str(row.key) for row in rows}
+    unshown = ((task, str(method)) for method in frame.method.unique() if method not in named)
+    return made and replace(made, unshown=tuple(unshown))
 
 
 def _on_fronts(rows: pd.DataFrame) -> Iterator[Value]:

@@ -114,6 +114,7 @@ def _pairing(study: Study) -> str:
 
 _number = partial(Column, kind="number", rests_on=("runs",))
 _p = partial(Column, kind="p", digits=4, rests_on=("runs",))
+_holm = partial(_p, family="all rows of the table, over which Holm adjusts")
 _unprinted = partial(_number, printed=False)
 _NAMES = Column("first", "first"), Column("second", "second")
 _DIFFERENCES = (
@@ -123,9 +124,9 @@ _DIFFERENCES = (
     _number("difference", "difference", unit="ticks", digits=1),
     Column("expected", "first expected", printed=False),
     _p("p_bootstrap", "one-tailed p", printed=False),
-    _p("p_bootstrap_holm", "one-tailed p, Holm", printed=False),
+    _holm("p_bootstrap_holm", "one-tailed p, Holm", printed=False),
     _p("p_permutation", "two-tailed p", printed=False),
-    _p("p_permutation_holm", "two-tailed p, Holm"),
+    _holm("p_permutation_holm", "two-tailed p, Holm"),
     _unprinted("delta", "Cliff's δ", digits=2),
     _number("improvement", "P(first higher)", digits=2),
 )

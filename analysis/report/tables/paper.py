@@ -15,8 +15,16 @@ from analysis.published import (
     published_exhaustive,
     published_initial,
 )
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.report.tables.common import counts, marked, mean_of, row_of, table, with_interval
+from analysis.report.document import Column, DataTable, RestsOn, Row, Value
+from analysis.report.tables.common import (
+    counts,
+    estimate_as_printed,
+    marked,
+    mean_of,
+    row_of,
+    table,
+    with_interval,
+)
 from analysis.statistics.equivalence import MARGIN
 from analysis.words import typographic
 
@@ -39,9 +47,9 @@ _CELLS = (
     Column("method", "method"),
     *(_PUBLISHED, _PUBLISHED_RUNS, _PUBLISHED_AS, _OURS, _RUNS, _DIFFERENCE),
     Column("verdict", "verdict", rests_on=("runs", "paper"), leading=True),
-    _of_paper("margin", "margin", "number", "ticks", 1),
-    _of_paper("margin_of_gain", "of the gain", "share", "", 0),
-    _of_runs("initial", "initial", "number", "ticks", 0),
+    _of_paper("margin", "margin", "number", "ticks", 1, rests_on=("ours", "paper")),
+    _of_paper("margin_of_gain", "of the gain", "share", "", 0, rests_on=("ours", "paper")),
+    _of_paper("initial", "initial", "number", "ticks", 0, rests_on=("simulation",)),
     _of_paper("published_initial", "initial, published", "number", "ticks", 0),
     _of_runs("hands", "hands: runs"),
     _of_paper("published_hands", "hands, published"),
@@ -58,9 +66,10 @@ _SEQUENCES = (
     _DIFFERENCE,
 )
 _PAPER = (
-    "Published: Shah, Barto & Fagg (2013), mean ± SD, rounded as there. *derived*: pooled from "
-    "what is printed by hand sequence; *runs assumed*: no number of runs stands beside it, "
-    f"{RUNS} is that of every experiment. The difference, ours less published, has Welch's "
+    "Published: Shah, Barto & Fagg (2013), mean ± SD, with the digits printed there. *derived*: "
+    "pooled from what is printed by hand sequence; *runs assumed*: no number of runs stands "
+    f"beside it, {RUNS} is that of every experiment, and that they are all of them is our "
+    "assumption. The difference, ours less published, has Welch's "
     "interval from the printed mean, SD and runs; where no SD is printed the printed mean is "
     "taken as exact. "
     "Each interval is for its row alone. Rewards are not normally distributed, as the paper says "
@@ -85,9 +94,9 @@ def published_table(study: Study) -> DataTable | None:
         "Ours: mean ± SD with its BCa interval; learned reward of a run is the best of its noisy "
         "trials, as in the paper as we read it, −1 for every control tick.",
         f"*Equivalent*: the interval of the difference lies within {MARGIN:.0%} of the published "
-        "reward, the margin; *different*: outside; *undecided*: neither. Of the gain: the margin "
-        "as a share of what learning gained in the paper. Runs with another number of trials "
-        f"than the paper's {TRIALS} are not comparable and get no verdict.",
+        "reward, the margin, which is ours; *different*: outside; *undecided*: neither. Of the "
+        "gain: the margin as a share of what learning gained in the paper. Runs with another "
+        f"number of trials than the paper's {TRIALS} are not comparable and get no verdict.",
     ]
     if derived:
         notes.append(
@@ -110,7 +119,11 @@ def sequences_table(study: Study) -> DataTable | None:
         "Learned reward by hand sequence, where the paper or our runs tell several apart.",
         _SEQUENCES,
         [_sequence_row(study, row) for row in sequence_rows(study)],
-        (_PAPER,),
+        (
+            _PAPER,
+            "The rows of a cell add up to all its runs that have a solution, ours and those of "
+            "the paper; where it prints no hand sequences, its runs are left out.",
+        ),
     )
 
 
@@ -152,48 +165,66 @@ def _published_row(study: Study, row: PaperRow) -> Row:
     cell, summary = row.cell, row.paper.summary
     initial = cell.good.initial_reward.dropna()
     published_hands = [f"{s.hands} {s.runs or ''}".strip() for s in row.paper.sequences]
-    return row_of(
+    printed_initial = published_initial(cell.task) or (None, None, False)
+    made = row_of(
         _CELLS,
         f"{cell.task} {cell.label}",
         row,
         ((cell.task, cell.label),),
         published_runs=summary.runs if summary else None,
+        published_as=_published_as(summary, row.paper),
         initial=float(initial.iloc[0]) if len(initial) else None,
-        published_initial=(published_initial(cell.task) or (None, None))[1],
+        published_initial=printed_initial[1],
         hands=counts(cell.good.hands),
         published_hands=", ".join(published_hands) or None,
-        **_beside(study, row, summary, row.paper),
+        **_beside(study, row, summary),
     )
+    derived: dict[str, tuple[RestsOn, ...]] = (
+        {"published_initial": ("derived",)} if printed_initial[2] else {}
+    )
+    return replace(made, rests_on=_sources(summary) | derived)
 
 
 def _sequence_row(study: Study, row: SequenceRow) -> Row:
     key = row.cell.task, row.cell.label
-    own = _beside(study, row, row.published)
-    return row_of(_SEQUENCES, " ".join((*key, row.hands)), row, (key,), **own)
+    summary, none = row.published, row.published_runs == 0
+    made = row_of(
+        _SEQUENCES,
+        " ".join((*key, row.hands)),
+        row,
+        (key,),
+        published_runs=summary.runs if summary else row.published_runs,
+        published_as="no run" if none else _published_as(summary),
+        **_beside(study, row, summary),
+    )
+    derived: dict[str, tuple[RestsOn, ...]] = {"published_runs": ("derived",)} if none else {}
+    return replace(made, rests_on=_sources(summary) | derived)
+
+
+def _sources(published: Summary | None) -> dict[str, tuple[RestsOn, ...]]:
+    if published is None:
+        return {}
+    return {"published": (published.source,), "published_runs": (published.source_of_runs,)}
 
 
 def _beside(
-    study: Study,
-    row: PaperRow | SequenceRow,
-    published: Summary | None,
-    cell: PublishedCell | None = None,
+    study: Study, row: PaperRow | SequenceRow, published: Summary | None
 ) -> dict[str, Value]:
     """What both tables have: published, ours, and the difference."""
     apart = row.difference
     return {
         "task": marked(study, row.cell.task),
         "method": row.cell.label,
-        "published": Estimate(published.mean, published.sd) if published else None,
-        "published_as": _published_as(published, cell),
+        "published": estimate_as_printed(published),
         "ours": mean_of(row.rewards),
         "runs": len(row.rewards),
         "difference": with_interval(apart.estimate, apart.low, apart.high) if apart else None,
     }
 
 
-def _published_as(summary: Summary | None, cell: PublishedCell | None) -> str | None:
+def _published_as(summary: Summary | None, cell: PublishedCell | None = None) -> str:
     if summary is None:
-        return ", ".join(filter(None, ("not printed", cell.remark))) if cell else None
+        return f"not printed, {cell.remark}" if cell and cell.remark else "not printed"
     if summary.derived:
         return "derived"
     return "printed" if summary.runs_printed else "printed, runs assumed"

@@ -141,7 +141,8 @@ def _of_task(
         found.append(Row(label, tuple(cells), ((task, label),)))
     columns = [Column("method", "method"), runs_column()]
     if kind.id == "hands":
-        columns.append(Column("hands", "hands", rests_on=("runs",)))
+        how = "Hand sequences of the solutions, with their number of runs."
+        columns.append(Column("hands", "hands", rests_on=("runs",), how=how))
     for number, spot in enumerate(spots):
         header = spot.header + _neutral(row for (_, at), row in own.items() if at == spot)
         columns.append(value_column(spot.signature, spot.name, header, number < 2))
@@ -151,7 +152,7 @@ def _of_task(
         f"{kind.title} on {escaped(task)}.",
         tuple(columns),
         found,
-        tuple(filter(None, (kind.note, *_reasons(lacking, len(spots))))),
+        tuple(filter(None, (kind.note, *reasons_for(lacking, len(spots))))),
     )
 
 
@@ -181,8 +182,8 @@ def _neutral(rows: Iterable[SignatureRow]) -> str:
     return f", neutral {' or '.join(known)}" if known else ""
 
 
-def _reasons(lacking: Mapping[str, Sequence[str]], columns: int) -> list[str]:
-    """Why methods have no value in some or all columns, in inline markup."""
+def reasons_for(lacking: Mapping[str, Sequence[str]], columns: int = 0) -> list[str]:
+    """Why methods have no value in some, or all, of the columns, in inline markup."""
     some: dict[str, dict[str, None]] = {}
     every: dict[str, list[str]] = {}
     for label, reasons in lacking.items():
@@ -245,7 +246,8 @@ def identifier(*words: str) -> str:
 
 def runs_column(*, printed: bool = False) -> Column:
     """Runs that went into a row."""
-    return Column("runs", "runs", "number", rests_on=("runs",), printed=printed)
+    how = "Runs that went into the row's values; the most, where they differ."
+    return Column("runs", "runs", "number", rests_on=("runs",), how=how, printed=printed)
 
 
 def value_column(signature: Signature, name: str, header: str, printed: bool) -> Column:
@@ -253,9 +255,19 @@ def value_column(signature: Signature, name: str, header: str, printed: bool) ->
     kind: Literal["share", "number"] = "share" if signature.share else "number"
     unit = signature.unit if signature.unit in ("ticks", "bit", "rad", "pooled SD") else ""
     digits = 0 if signature.share else signature.digits
-    return Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
+    how = f"{signature.name[:1].upper()}{signature.name[1:]}: {signature.meaning}."
+    return Column(name, header, kind, unit, digits, rests_on=("runs",), how=how, printed=printed)
 
 
 def p_column(name: str, header: str, printed: bool = False) -> Column:
-    """p-values beside the values of a column."""
-    return Column(f"{name}_p", header, "p", digits=3, rests_on=("runs",), printed=printed)
+    """p-values beside the values of a column, of the tests that docs/signatures.md describes."""
+    return Column(
+        f"{name}_p",
+        header,
+        "p",
+        digits=3,
+        rests_on=("runs",),
+        how="Adjusted by Holm's method; the tests are those of docs/signatures.md.",
+        family="all rows with p-values that are adjusted together",
+        printed=printed,
+    )
