@@ -41,7 +41,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     for words in ("| −303 | 2.9 | 20 |", "| −319 | −319 |", "*Reconstructed.*", "LRLR −533"):
         assert words in page
     assert "*Trials.* The paper's runs have 10000 trials" in page  # here 60
-    assert "−303.0 ± 2.9" in text
+    assert "−303 ± 2.9" in text
     assert "14 runs: 0 were there, 14 done in" in text
     assert "0 failed" in text
     assert "14 of 14 runs, 0 failed" in error  # plain lines without a terminal
