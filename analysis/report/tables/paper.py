@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from analysis.published import (
     RUNS,
     TRIALS,
-    PublishedCell,
     Summary,
     published_exhaustive,
     published_initial,
@@ -162,69 +163,63 @@ def exhaustive_table(study: Study) -> DataTable | None:
 
 
 def _published_row(study: Study, row: PaperRow) -> Row:
-    cell, summary = row.cell, row.paper.summary
+    cell, remark = row.cell, row.paper.remark
     initial = cell.good.initial_reward.dropna()
     published_hands = [f"{s.hands} {s.runs or ''}".strip() for s in row.paper.sequences]
     printed_initial = published_initial(cell.task) or (None, None, False)
-    made = row_of(
+    return _beside(
+        study,
         _CELLS,
-        f"{cell.task} {cell.label}",
         row,
-        ((cell.task, cell.label),),
-        published_runs=summary.runs if summary else None,
-        published_as=_published_as(summary, row.paper),
+        row.paper.summary,
+        {"published_initial": ("derived",)} if printed_initial[2] else {},
+        published_as=", ".join(filter(None, (_published_as(row.paper.summary), remark))),
         initial=float(initial.iloc[0]) if len(initial) else None,
         published_initial=printed_initial[1],
         hands=counts(cell.good.hands),
         published_hands=", ".join(published_hands) or None,
-        **_beside(study, row, summary),
     )
-    derived: dict[str, tuple[RestsOn, ...]] = (
-        {"published_initial": ("derived",)} if printed_initial[2] else {}
-    )
-    return replace(made, rests_on=_sources(summary) | derived)
 
 
 def _sequence_row(study: Study, row: SequenceRow) -> Row:
-    key = row.cell.task, row.cell.label
-    summary, none = row.published, row.published_runs == 0
-    made = row_of(
-        _SEQUENCES,
-        " ".join((*key, row.hands)),
-        row,
-        (key,),
-        published_runs=summary.runs if summary else row.published_runs,
-        published_as="no run" if none else _published_as(summary),
-        **_beside(study, row, summary),
-    )
-    derived: dict[str, tuple[RestsOn, ...]] = {"published_runs": ("derived",)} if none else {}
-    return replace(made, rests_on=_sources(summary) | derived)
-
-
-def _sources(published: Summary | None) -> dict[str, tuple[RestsOn, ...]]:
-    if published is None:
-        return {}
-    return {"published": (published.source,), "published_runs": (published.source_of_runs,)}
+    if row.published_runs != 0:
+        return _beside(study, _SEQUENCES, row, row.published)
+    none: dict[str, Value] = {"published_runs": 0, "published_as": "no run"}
+    return _beside(study, _SEQUENCES, row, None, {"published_runs": ("derived",)}, **none)
 
 
 def _beside(
-    study: Study, row: PaperRow | SequenceRow, published: Summary | None
-) -> dict[str, Value]:
-    """What both tables have: published, ours, and the difference."""
-    apart = row.difference
-    return {
-        "task": marked(study, row.cell.task),
-        "method": row.cell.label,
+    study: Study,
+    columns: tuple[Column, ...],
+    row: PaperRow | SequenceRow,
+    published: Summary | None,
+    rests_on: Mapping[str, tuple[RestsOn, ...]] = MappingProxyType({}),
+    **own: Value,
+) -> Row:
+    """A row of either table: published, ours, the difference, and what is the table's own."""
+    cell, apart = row.cell, row.difference
+    both: dict[str, Value] = {
+        "task": marked(study, cell.task),
+        "method": cell.label,
         "published": estimate_as_printed(published),
+        "published_runs": published.runs if published else None,
+        "published_as": _published_as(published),
         "ours": mean_of(row.rewards),
         "runs": len(row.rewards),
         "difference": with_interval(apart.estimate, apart.low, apart.high) if apart else None,
     }
+    name = (cell.task, cell.label, *([row.hands] if isinstance(row, SequenceRow) else []))
+    made = row_of(columns, " ".join(name), row, ((cell.task, cell.label),), **both | own)
+    sources = dict(rests_on)
+    if published is not None:
+        sources["published"] = (published.source,)
+        sources["published_runs"] = (published.source_of_runs,)
+    return replace(made, rests_on=sources)
 
 
-def _published_as(summary: Summary | None, cell: PublishedCell | None = None) -> str:
+def _published_as(summary: Summary | None) -> str:
     if summary is None:
-        return f"not printed, {cell.remark}" if cell and cell.remark else "not printed"
+        return "not printed"
     if summary.derived:
         return "derived"
     return "printed" if summary.runs_printed else "printed, runs assumed"
