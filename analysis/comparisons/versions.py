@@ -27,14 +27,8 @@ from coartic import CoarticError
 from coartic.robot import Array
 from coartic.tables import label_of
 
-SPENT = {
-    "trials": "trials",
-    "movement_ticks": "ticks",
-    "forward_kinematics": "kinematics",
-    "jacobians": "Jacobians",
-    "solve_s": "solve time",
-}
-"""Spends whose medians are compared, in words."""
+SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
+"""Spends whose medians are compared."""
 VERDICTS = {
     "identical": "identical in every run",
     "equivalent": "not identical, equivalent",

@@ -14,12 +14,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
 
 RestsOn = Literal["runs", "optimum", "paper", "derived", "ours", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, what the paper prints,
 what follows from that, a choice or an assumption of ours, words of ours, or a simulation that
 needs no runs."""
+OtherArm = Literal["free", "still"]
+"""Whose optimum: with all joints free, or with the arm that is not chosen kept still."""
 CellKey = tuple[str, str]
 """Name of a task and label of a method with its variant, as the keys of a Study."""
 
@@ -67,6 +71,8 @@ Value = float | int | str | Estimate | None
 class Column:
     """One column of a table."""
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
     name: str
     """Of the CSV column: a Python identifier, stable."""
     header: str
@@ -86,7 +92,7 @@ class Column:
     """How its values were obtained, where the table's notes do not say it, in inline markup."""
     family: str = ""
     """Of which rows each value depends on all, not on its own alone, in words."""
-    other_arm: Literal["free", "still"] = "free"
+    other_arm: OtherArm = "free"
     """Of the optimum that it rests on, if it does."""
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has
@@ -117,6 +123,11 @@ class Row:
     """Rows of one name are a family; by default all rows of a table."""
     link: str = ""
     """Address within the page that the row's name leads to."""
+
+    @property
+    def all_cells(self) -> set[CellKey]:
+        """What any of its values was computed from."""
+        return {*self.cells}.union(*self.cells_by_column.values())
 
 
 @dataclass(frozen=True)
@@ -237,16 +248,17 @@ class Document:
                 raise ValueError("id 'runs' is kept for the list of runs")
         twice = {name for name in ids if ids.count(name) > 1}
         if twice:
-            raise ValueError(f"ids used twice: {', '.join(sorted(twice))}")
+            raise ValueError(
+                f"{', '.join(sorted(twice))}: ids are used once, by one section, table or figure"
+            )
         for table in self.tables():
             for row in table.rows:
-                for cells in (row.cells, *row.cells_by_column.values(), table.unshown):
-                    unknown = [cell for cell in cells if cell not in self.runs]
-                    if unknown:
-                        raise ValueError(
-                            f"table {table.id}, row {row.key!r}: the document has no run ids "
-                            f"of {unknown}"
-                        )
+                unknown = (row.all_cells | {*table.unshown}) - self.runs.keys()
+                if unknown:
+                    raise ValueError(
+                        f"table {table.id}, row {row.key!r}: the document has no run ids of "
+                        f"{sorted(unknown)}"
+                    )
 
     def walk(self) -> Iterator[Section]:
         """All sections and subsections, in order."""

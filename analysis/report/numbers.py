@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.methods import LEARNER
-from analysis.report.document import RestsOn
+from analysis.report.document import CellKey, RestsOn
+from analysis.report.formats.templates import LATEX, template
 from analysis.results.optima import SHIPPED
 from coartic.text import one_line
 
@@ -32,9 +33,6 @@ ORIGINS: dict[RestsOn, str] = {
     "text": "text",
 }
 """What a value is that no runs are behind; the first that it rests on says it."""
-Cell = tuple[str, str]
-"""Task and label."""
-
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 
 
@@ -56,7 +54,7 @@ class Number:
     n: int | None = None
     how: str = ""
     """How value and interval were obtained."""
-    cells: tuple[Cell, ...] = ()
+    cells: tuple[CellKey, ...] = ()
     """What it was computed from; none for what the paper prints and for shipped optima."""
     of: str = ""
     """What the meaning is said of, such as a method on a task."""
@@ -132,29 +130,8 @@ def macro_names(study: Study) -> Names:
 
 def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
     """The macros as a LaTeX file. Numbers go through ``\\coarticnum``, which may be redefined."""
-    lines = [
-        *map(_comment, about),
-        "% Intervals are at 95 %; `coartic trace MACRO` says how they were made, of which runs.",
-        "% Redefine \\coarticnum to print numbers your way, with siunitx for example:",
-        "%   \\newcommand{\\coarticnum}[1]{\\num{#1}}   before \\input",
-        f"\\providecommand{{\\{PREFIX}num}}[1]{{\\ensuremath{{#1}}}}",
-    ]
-    of = ""
-    for number in numbers:
-        unit = f", {number.unit}" if number.unit else ""
-        how = f"; {number.how}" if number.how and math.isnan(number.low) else ""
-        if number.of != of:
-            of = number.of
-            lines.append(_comment(f"{of}:"))
-        lines.append(_comment(f"{number.meaning}{unit}{how}"))
-        for suffix, text in number.companions():
-            content = number.full(_tex, "$n$") if suffix == "Full" else _tex(text)
-            lines.append(f"\\newcommand{{\\{number.macro}{suffix}}}{{{content}}}")
-    return "\n".join(lines) + "\n"
-
-
-def _comment(text: str) -> str:
-    return f"% {one_line(text)}"
+    layout = template("numbers.tex.jinja", one_line, **LATEX)
+    return layout.render(numbers=numbers, about=about, shown=_tex, prefix=PREFIX)
 
 
 def _tex(number: str) -> str:
