@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.citations import ANALYSIS, PAPER, MethodSource, bibliography, software
+from analysis.citations import PAPER, MethodSource, behind_analysis, bibliography, software
 from analysis.methods import METHODS, KnownMethod
 from analysis.references import parse, references
 from analysis.results.laws import read_manifest
@@ -21,6 +21,7 @@ from tests.support.suites import BROKEN, run_and_write
 
 ROOT = Path(__file__).parent.parent
 BIB = references()
+ANALYSIS = behind_analysis()
 GOOD = """@article{a2000,
   author = {A, B.},
   title = {C},

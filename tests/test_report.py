@@ -14,6 +14,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from rich.console import Console
 
 from analysis.markup import Span, inline
@@ -37,6 +38,7 @@ from analysis.report.formats.markdown import markdown
 from analysis.report.formats.terminal import terminal_table
 from analysis.report.legends import with_legends
 from analysis.report.summary import without_variants
+from analysis.report.tables.layout import LAYOUTS, Layout
 from analysis.report.text import number_text, parts, texts
 from analysis.report.write import write_report
 from analysis.words import typographic
@@ -539,3 +541,16 @@ def test_a_report_that_fails_leaves_the_one_before(tmp_path):
     }
     assert after == before
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_a_layout_has_the_columns_that_it_speaks_of():
+    layout = LAYOUTS["across-tasks"]
+    with pytest.raises(ValueError, match="table across-tasks has no columns gain"):
+        layout.row("a", method="a", gain=1.0)
+    fields = dict(layout) | {"intervals": {"gain": ""}}
+    with pytest.raises(ValidationError, match="intervals of no columns: gain"):
+        Layout.model_validate(fields)
+    with pytest.raises(ValidationError, match="colour"):
+        Layout.model_validate(
+            dict(layout) | {"columns": [{"name": "a", "header": "a", "colour": 1}]}
+        )

@@ -127,9 +127,12 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
     return (section for section in sections if section.blocks or section.sections)
 
 
-def write(report: Report, study: Study, folder: Path) -> None:
+def write(
+    report: Report, study: Study, folder: Path, *, begin: Callable[[], object] = lambda: None
+) -> None:
     """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
 
+    ``begin`` is called when all is made and nothing written.
     Raises CoarticError where it cannot be written, or something is in the way.
     """
     check_report_folder(folder, study.results.folder)
@@ -142,7 +145,7 @@ def write(report: Report, study: Study, folder: Path) -> None:
     figures: dict[str, bytes] = {}
     for plot in report.plots:
         figures |= rendered(plot, endings=report.formats)
-    write_report(report.document, figures, folder, extra)
+    write_report(report.document, figures, folder, extra, begin=begin)
 
 
 def _title(results: Results) -> str:
@@ -162,7 +165,7 @@ def _lead(results: Results) -> str:
 def _summary(study: Study) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
-    runs, labels = counted(len(results.runs), "run"), {cell.label for cell in results.cells}
+    runs, labels = counted(len(results.runs), "run"), {label for _, label in results.cells}
     facts = (
         f"{counted(len(results.tasks), 'task')}, {counted(len(labels), 'method')} with their "
         f"variants, {counted(len(results.cells), 'cell')}; "

@@ -18,12 +18,12 @@ from typing import ClassVar, Literal
 
 from pydantic import ConfigDict
 
+from analysis.results.optima import OtherArm
+
 RestsOn = Literal["runs", "optimum", "paper", "derived", "ours", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, what the paper prints,
 what follows from that, a choice or an assumption of ours, words of ours, or a simulation that
 needs no runs."""
-OtherArm = Literal["free", "still"]
-"""Whose optimum: with all joints free, or with the arm that is not chosen kept still."""
 CellKey = tuple[str, str]
 """Name of a task and label of a method with its variant, as the keys of a Study."""
 

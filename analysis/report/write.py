@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from analysis.report.document import Document
@@ -12,9 +12,7 @@ from analysis.report.formats.html import html
 from analysis.report.formats.latex import latex_inputs, latex_table
 from analysis.report.formats.markdown import markdown
 from coartic import CoarticError
-from coartic.files import check_folder, publish
-
-_OWNER = "report"
+from coartic.files import REPORT, check_folder, publish
 
 
 def check_report_folder(folder: Path, results: Path) -> None:
@@ -26,7 +24,7 @@ def check_report_folder(folder: Path, results: Path) -> None:
         raise CoarticError(
             f"{folder} holds the results themselves; a report has a folder of its own"
         )
-    check_folder(folder, owner=_OWNER, alone=True)
+    check_folder(folder, owner=REPORT, alone=True)
 
 
 def write_report(
@@ -34,13 +32,16 @@ def write_report(
     figures: Mapping[str, bytes],
     folder: Path,
     extra: Mapping[str, str] | None = None,
+    *,
+    begin: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a report into ``folder``, in the place of an earlier one.
 
     ``report.html`` stands alone; ``report.md`` links to ``figures/`` with ``figures``: contents
     by file name, at least ``ID.svg`` of each; ``tables/`` holds CSV and LaTeX, ``tables.tex``
-    inputs the latter; ``extra`` are further text files by name. The same document gives the same
-    bytes. Raises ValueError where a figure of the document is not among them, CoarticError as
+    inputs the latter; ``extra`` are further text files by name; ``begin`` is called when all is
+    made and nothing written. The same document gives the same bytes. Raises ValueError where a
+    figure of the document is not among the files, CoarticError as
     :func:`coartic.files.publish` for a folder that is a report's alone.
     """
     lost = [f.id for f in document.figures() if f"{f.id}.svg" not in figures]
@@ -49,7 +50,8 @@ def write_report(
     texts = {**_texts(document), **(extra or {})}
     files = {f"figures/{name}": data for name, data in figures.items()}
     files |= {name: text.encode() for name, text in texts.items()}
-    publish(folder, files, owner=_OWNER, alone=True)
+    begin()
+    publish(folder, files, owner=REPORT, alone=True)
 
 
 def _texts(document: Document) -> dict[str, str]:

@@ -15,9 +15,10 @@ from analysis.comparisons.pareto import TIME_TOLERANCE
 from analysis.comparisons.progress import LABELS, SPENDS
 from analysis.comparisons.targets import Target
 from analysis.markup import escaped
-from analysis.report.document import Column, DataTable, Estimate, OtherArm, Row, Value
+from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from analysis.results.optima import OtherArm
 from analysis.words import typographic
 from coartic.record import SEARCH
 

@@ -6,9 +6,9 @@ import math
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
 from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
 from analysis.report.legends import with_legends
@@ -27,16 +27,29 @@ class Layout(BaseModel):
     intervals: dict[str, str] = {}
     columns: tuple[Column, ...]
 
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        unknown = self.intervals.keys() - {column.name for column in self.columns}
+        if unknown:
+            raise ValueError(f"intervals of no columns: {', '.join(sorted(unknown))}")
+        return self
+
     def plus(self, columns: Iterable[Column]) -> Layout:
         """With further columns, which depend on what there is to be shown."""
         return self.model_copy(update={"columns": (*self.columns, *columns)})
 
     def read(self, **facts: Any) -> tuple[str, ...]:
-        """What stands above the tables, in inline markup as ``facts`` are."""
+        """What is said once of the tables, in inline markup as ``facts`` are."""
         return tuple(text.format(**facts) for text in self.reading)
 
     def row(self, key: str, of: Any = None, cells: Iterable[CellKey] = (), **own: Value) -> Row:
-        """Values by the columns' names: its ``own``, the others are fields of ``of``."""
+        """Values by the columns' names: its ``own``, the others are fields of ``of``.
+
+        Raises ValueError for a value of its own that no column shows.
+        """
+        unknown = own.keys() - {column.name for column in self.columns}
+        if unknown:
+            raise ValueError(f"table {self.name} has no columns {', '.join(sorted(unknown))}")
         values = (own[c.name] if c.name in own else self._field(of, c.name) for c in self.columns)
         return Row(key, tuple(values), tuple(cells))
 

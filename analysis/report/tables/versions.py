@@ -7,7 +7,7 @@ from typing import Any
 
 from analysis.comparisons.versions import SPENT, VersionComparison, VersionRow
 from analysis.report.document import DataTable, Row
-from analysis.report.tables.layout import LAYOUTS
+from analysis.report.tables.layout import LAYOUTS, finite
 from analysis.statistics.equivalence import MARGIN
 from analysis.statistics.estimates import FEWEST
 
@@ -29,13 +29,20 @@ def versions_table(found: VersionComparison) -> DataTable | None:
 
 
 def _row(row: VersionRow) -> Row:
-    ratios: dict[str, Any] = {name: _ratio(*row.spent(name)) for name in SPENT}
+    (mean_a, mean_b), (solved_a, solved_b) = row.both("reward"), row.both("solved")
+    own: dict[str, Any] = {name: _ratio(*row.both(name)) for name in SPENT} | {
+        "mean_a": finite(mean_a),
+        "mean_b": finite(mean_b),
+        "solved_a": solved_a,
+        "solved_b": solved_b,
+    }
     return _CELLS.row(
-        f"{row.task} {row.label}",
+        f"{row.a.task} {row.a.label}",
         row,
-        method=row.label,
+        task=row.a.task,
+        method=row.a.label,
         paired=None if row.paired is None else "yes" if row.paired else "no",
-        **ratios,
+        **own,
     )
 
 
