@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import tomllib
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 RUNS = 20  # runs of every experiment (printed, section *Initial Solution and Learning*)
 TRIALS = 10_000  # trials of every run (printed there too)
@@ -22,7 +23,19 @@ class Summary:
     derived: bool = False
     """Computed from other printed numbers rather than printed itself."""
     runs_printed: bool = True
-    """Whether the number of runs stands beside it; else it is the paper's general 20."""
+    """Whether the number of runs stands beside it; else we take it as the paper's general 20."""
+    digits: tuple[int, int] | None = None
+    """Decimals of mean and SD as they are printed; None for what is derived."""
+
+    @property
+    def source(self) -> Literal["paper", "derived"]:
+        """What mean and SD rest on."""
+        return "derived" if self.derived else "paper"
+
+    @property
+    def source_of_runs(self) -> Literal["paper", "derived", "ours"]:
+        """What the number of runs rests on."""
+        return self.source if self.runs_printed else "ours"
 
 
 @dataclass(frozen=True)
@@ -65,16 +78,14 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
     sequences = tuple(
         SequenceResult(
             item["hands"],
-            Summary(
-                item["reward"], item.get("sd"), item.get("runs", RUNS), runs_printed="runs" in item
-            ),
+            _summary(item, item.get("runs", RUNS), runs_printed="runs" in item),
             item.get("runs"),
         )
         for item in entry.get("sequences", ())
     )
     remark = f"higher than {entry['better_than']}" if "better_than" in entry else ""
     if "reward" in entry:
-        return PublishedCell(Summary(entry["reward"], entry.get("sd"), RUNS), sequences, remark)
+        return PublishedCell(_summary(entry, RUNS), sequences, remark)
     known = [sequence.summary for sequence in sequences]
     return PublishedCell(pooled(known), sequences, remark)
 
@@ -96,9 +107,24 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-_PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
+_PUBLISHED = tomllib.loads(
+    Path(__file__).with_name("published.toml").read_text("utf-8"), parse_float=Decimal
+)
 
 
 def _printed(task: str, what: str) -> dict[str, Any] | None:
     entry: dict[str, Any] | None = _PUBLISHED.get(task, {}).get(what)
     return entry
+
+
+def _summary(entry: dict[str, Any], runs: int, *, runs_printed: bool = True) -> Summary:
+    mean, sd = entry["reward"], entry.get("sd")
+    known = None if sd is None else float(sd)
+    digits = _decimals(mean), _decimals(sd)
+    whole = mean if isinstance(mean, int) else float(mean)
+    return Summary(whole, known, runs, runs_printed=runs_printed, digits=digits)
+
+
+def _decimals(printed: Decimal | int | None) -> int:
+    exponent = printed.as_tuple().exponent if isinstance(printed, Decimal) else 0
+    return -int(exponent)
