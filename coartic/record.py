@@ -21,7 +21,7 @@ from coartic.errors import CoarticError
 from coartic.learning import METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
-from coartic.scores import Solved, solved
+from coartic.scores import PlainMovement, Solved, solved
 from coartic.solution import Movement
 from coartic.stored import (
     Amount,
@@ -143,7 +143,11 @@ class Record(Plain):
     @property
     def task(self) -> Task:
         """The task as it was run. Raises TaskError where it cannot be one."""
-        return _parsed(json.dumps(self.specification.task))
+        return _parsed(self._task_text)
+
+    @property
+    def _task_text(self) -> str:
+        return json.dumps(self.specification.task)
 
     @property
     def model(self) -> MotionModel:
@@ -185,7 +189,7 @@ class Record(Plain):
             if stored is None:
                 continue
             try:
-                again = solved(self.task, [row.movement() for row in stored.movements], self.model)
+                again = _executed(self._task_text, stored.movements, self.model)
             except (CoarticError, ValueError, TypeError) as error:
                 raise RecordError(
                     f"run {self.run_id}: its {name} cannot be executed: {error}"
@@ -268,6 +272,12 @@ def _trials(record: Record) -> tuple[list[int], int]:
 @lru_cache(maxsize=512)
 def _parsed(text: str) -> Task:
     return parse_task(json.loads(text), "a record")
+
+
+@lru_cache(maxsize=512)
+def _executed(task: str, movements: tuple[PlainMovement, ...], model: MotionModel) -> Solved:
+    """Once for runs that begin alike, and for a folder that is read again."""
+    return solved(_parsed(task), [row.movement() for row in movements], model)
 
 
 def run_seed(root: int, task: str, run: int) -> int:

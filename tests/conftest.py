@@ -1,5 +1,6 @@
 """Shared by all tests."""
 
+import gc
 import os
 import signal
 
@@ -7,9 +8,17 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
+import benchmarks.executors
+import benchmarks.reproduce
 from analysis import load
 from tests.support import reports
-from tests.support.suites import run_and_write, traced_cells, with_environment
+from tests.support.suites import (
+    InProcess,
+    performed,
+    run_and_write,
+    traced_cells,
+    with_environment,
+)
 
 # Continuous integration tries the same examples every time; people, new ones.
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -26,6 +35,13 @@ def undrawn():
     """Reports without figures, which take long and have tests of their own."""
     with reports.undrawn():
         yield
+
+
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Runs without processes of their own, which take long and have tests of their own."""
+    monkeypatch.setattr(benchmarks.executors, "Local", InProcess)
+    monkeypatch.setattr(benchmarks.reproduce, "supervise", performed)
 
 
 @pytest.fixture(scope="session")
@@ -56,3 +72,4 @@ def pytest_collection_modifyitems(items):
     """The modules that take longest, then the others."""
     rank = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))
+    gc.freeze()  # what is imported stays: looking through it again and again takes long

@@ -163,13 +163,13 @@ def test_intervals_are_those_of_the_percentile_bootstrap(tmp_path):
     last = rng.integers(-600, -470, size=20).astype(float)
     rows = [run("m", [-700.0, value], number=i) for i, value in enumerate(last)]
     results = study([*rows, run("other", [-500.0])], tmp_path)
-    frame = anytime_curves(results, seed=3)
+    frame = anytime_curves(results)
     found = of(frame, "m").iloc[-1]
     expected = bootstrap(
         (last,), np.mean, method="percentile", n_resamples=20_000, rng=rng
     ).confidence_interval
     assert (found.low, found.high) == pytest.approx(tuple(expected), abs=0.1 * last.std())
-    alone = anytime_curves(study(rows, tmp_path), seed=3)
+    alone = anytime_curves(study(rows, tmp_path))
     pd.testing.assert_frame_equal(alone, frame[frame.method == "m"])
     assert of(frame, "other")[["low", "high"]].isna().all(axis=None)
 

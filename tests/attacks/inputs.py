@@ -27,7 +27,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 SECONDS = 5.0
 """CPU time within which an input is answered."""
@@ -866,6 +866,11 @@ def _here() -> None:
     for module in _COMMANDS_IMPORT:
         with contextlib.suppress(ImportError):  # of another version
             importlib.import_module(module)
+    line: Any = importlib.import_module("coartic.cli")
+    if hasattr(line, "app"):  # put together once, not for every case
+        from typer.main import get_command
+
+        line.app = get_command(line.app)
     gc.collect()
     gc.freeze()  # or every fork copies what it looks through
     here = Path.cwd()
