@@ -23,7 +23,7 @@ from analysis.statistics import estimates as statistics
 from analysis.study import Study
 from benchmarks.suites import Cell
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
-from tests.support.reports import compiled, document_of, report_of
+from tests.support.reports import compiled, document_of, report_of, without_figures
 from tests.support.suites import KNOWN, run_and_write, with_environment
 
 
@@ -67,7 +67,8 @@ SIGNATURES = {
 
 @pytest.fixture(scope="module")
 def home(study):
-    return report_of(study, study.results.folder / "report")
+    with without_figures():
+        return report_of(study, study.results.folder / "report")
 
 
 def test_tables_are_legible(home, tmp_path):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self
 
@@ -93,7 +94,7 @@ def trace_json(study: Study, document: Document, numbers: Iterable[Number]) -> s
 def read_trace(home: Path) -> TraceFile:
     """The trace of the report in ``home``. Raises CoarticError where there is none to be read."""
     try:
-        return TraceFile.model_validate_json((home / FILE).read_bytes())
+        return _parsed((home / FILE).read_bytes())
     except OSError as error:
         raise CoarticError(f"{home / FILE} cannot be read: {error}") from None
     except ValidationError as error:
@@ -103,6 +104,12 @@ def read_trace(home: Path) -> TraceFile:
             f"{home / FILE} is damaged, or of another version ({place}: {first['msg']}); make the "
             f"report again with `{shell_line('coartic', 'report', home.parent)}`"
         ) from None
+
+
+@lru_cache(maxsize=4)
+def _parsed(data: bytes) -> TraceFile:
+    """Once for all the numbers of a report that are asked for."""
+    return TraceFile.model_validate_json(data)
 
 
 def _sources(study: Study, document: Document, asked: tuple[str, ...]) -> Iterator[Source]:

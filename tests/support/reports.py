@@ -40,15 +40,22 @@ def undrawn():
         yield
 
 
-def document_of(study):
-    """The document of a report that has no figures at all."""
+@contextmanager
+def without_figures():
+    """Reports that have no figures at all."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(register, "REGISTER", ())
+        yield
+
+
+def document_of(study):
+    """The document of a report without figures."""
+    with without_figures():
         return build(study).document
 
 
 def report_of(study, folder):
-    """A report without figures, written into a folder."""
+    """A report with empty figures, written into a folder."""
     with undrawn():
         write(build(study), study, folder)
     return folder
