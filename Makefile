@@ -21,8 +21,10 @@ benchmark: $(READY)
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
 	@echo "Look at $(OUT)/comparison/report/report.html, and at $(OUT)/paper/comparison.md."
+# Bytecode is kept, even where the environment says no: each worker, and each process that a
+# test starts, would compile all sources anew.
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 check: $(READY)
 	$(BIN)/ruff format --check .

@@ -9,19 +9,16 @@ from importlib import resources
 from typing import Any
 
 from analysis.methods import METHODS
-from analysis.signatures.register import REGISTER
 from analysis.words import slugs
 from coartic import CoarticError, __version__
 from coartic.text import one_line
 
 PAPER = "shah2013"
-ANALYSIS: tuple[str, ...] = (
+_STATISTICS = (
     *("efron1993", "davison1997", "cliff1993", "agarwal2021", "newcombe2006", "holm1979"),
     *("chung2013", "schuirmann1987", "dolan2002", "kaplan1958", "brookmeyer1982"),
     *("clopper1934", "cohen1988"),
-    *dict.fromkeys(key for signature in REGISTER.values() for key in signature.sources),
 )
-"""Keys of the works behind signatures and statistics."""
 
 _ENTRY = re.compile(r"@([a-z]+)\{([a-z0-9-]+),\n((?:  [a-z]+ = \{.+\},\n)+)\}")
 _FIELD = re.compile(r"  ([a-z]+) = \{(.+)\},\n")
@@ -126,6 +123,14 @@ def software(environment: Mapping[str, Any] | None = None) -> Reference:
     )
 
 
+def behind_analysis() -> tuple[str, ...]:
+    """Keys of the works behind signatures and statistics."""
+    from analysis.signatures.register import REGISTER  # with all that measures them
+
+    sources = dict.fromkeys(key for signature in REGISTER.values() for key in signature.sources)
+    return (*_STATISTICS, *sources)
+
+
 def bibliography(
     methods: list[MethodSource],
     *,
@@ -150,7 +155,7 @@ def bibliography(
         for key in (*row.works, *row.solvers):
             reasons.setdefault(key, []).append(method.id)
     if analysis:
-        for key in ANALYSIS:
+        for key in behind_analysis():
             reasons.setdefault(key, []).append("the analysis")
     known["coartic"] = software(environment)
     entries = [

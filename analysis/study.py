@@ -1,7 +1,8 @@
 """The one entrance to a results folder: its tables, and all that is computed of them, each once.
 
 ``load("results/all")`` reads a folder; everything else is a property, computed when it is first
-asked for. What computes it takes the study itself, or plain numbers (:mod:`analysis.statistics`).
+asked for. Most are functions of the study, whose docstrings say what they hold: ``optima`` is
+``optima(study)`` of :mod:`analysis.results.optima`, kept.
 """
 
 from __future__ import annotations
@@ -10,32 +11,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import pandas as pd
 
-from analysis.claims import Judged, judge, register_table
+from analysis.claims import judge, register_table
 from analysis.comparisons.anytime import anytime_curves
 from analysis.comparisons.areas import areas
-from analysis.comparisons.methods import MethodRow, method_rows
+from analysis.comparisons.methods import method_rows
 from analysis.comparisons.overall import combined, normalised_scores, over_tasks, profiles
-from analysis.comparisons.pairs import PairRow, compared, pairs_table
+from analysis.comparisons.pairs import compared, pairs_table
 from analysis.comparisons.pareto import pareto_sets
-from analysis.comparisons.progress import BestSoFar, best_so_far
+from analysis.comparisons.progress import best_so_far
 from analysis.comparisons.targets import targets
-from analysis.results.folder import CellRuns, Results, load_results
-from analysis.results.optima import Optimum, optima
-from analysis.signatures.rows import SignatureRow
+from analysis.results.folder import CellKey, CellRuns, Results, load_results
+from analysis.results.optima import optima
 from analysis.signatures.study_rows import signature_rows, signatures_table
-from analysis.signatures.trajectories import Trajectories, all_trajectories
+from analysis.signatures.trajectories import all_trajectories
 from coartic import Task
-from coartic.text import counted
+from coartic.text import counted, did_you_mean
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-CellKey = tuple[str, str]
-"""Name of a task, and label of a method: its name with its variant."""
 
 
 def load(folder: str | Path) -> Study:
@@ -67,45 +64,36 @@ class Study:
         """The tasks as they were run, by name."""
         return self.results.tasks
 
-    @cached_property
+    @property
     def cells(self) -> dict[CellKey, CellRuns]:
         """Rows of the runs, in the order of the plan."""
-        return {(cell.task, cell.label): cell for cell in self.results.cells}
+        return self.results.cells
 
     @cached_property
     def run_ids(self) -> dict[CellKey, tuple[str, ...]]:
         """Ids of the runs of every cell."""
         return {key: tuple(map(str, cell.runs.run_id)) for key, cell in self.cells.items()}
 
-    @cached_property
-    def trajectories(self) -> dict[CellKey, Trajectories]:
-        """Solutions tick by tick."""
-        return all_trajectories(self)
-
-    @cached_property
-    def optima(self) -> dict[tuple[str, str], Optimum]:
-        """Best known solutions by task and other arm (``free``, ``still``)."""
-        return optima(self)
-
-    @cached_property
-    def method_rows(self) -> dict[CellKey, MethodRow]:
-        """Every method on every task: the optimum's searches, then the best mean first."""
-        return {(row.task, row.label): row for row in method_rows(self)}
+    trajectories = cached_property(all_trajectories)
+    optima = cached_property(optima)
+    method_rows = cached_property(method_rows)
+    pair_rows = cached_property(compared)
+    best_so_far = cached_property(best_so_far)
+    anytime = cached_property(anytime_curves)
+    targets = cached_property(targets)
+    areas = cached_property(areas)
+    pareto = cached_property(pareto_sets)
+    signature_rows = cached_property(signature_rows)
+    judged = cached_property(judge)
 
     @cached_property
     def methods(self) -> pd.DataFrame:
-        """The same as ``methods.csv`` has them: a column per field."""
+        """``method_rows`` as ``methods.csv`` has them: a column per field."""
         return pd.DataFrame(list(self.method_rows.values()))
 
     @cached_property
-    def pair_rows(self) -> tuple[PairRow, ...]:
-        """Methods against each other, one a pair."""
-        return compared(self)
-
-    @cached_property
     def pairs(self) -> pd.DataFrame:
-        """The same as a table, its columns the fields of
-        :class:`~analysis.comparisons.pairs.PairRow`."""
+        """``pair_rows`` as ``comparisons.csv`` has them: a column per field."""
         return pairs_table(self.pair_rows)
 
     @cached_property
@@ -115,57 +103,22 @@ class Study:
 
     @cached_property
     def overall(self) -> pd.DataFrame:
-        """:func:`analysis.comparisons.overall.over_tasks`: methods over all tasks."""
+        """Methods over all tasks (:func:`~analysis.comparisons.overall.over_tasks`)."""
         return over_tasks(self.scores)
 
     @cached_property
     def profiles(self) -> pd.DataFrame:
-        """:func:`analysis.comparisons.overall.profiles`."""
+        """Shares of runs by threshold (:func:`~analysis.comparisons.overall.profiles`)."""
         return profiles(self.scores)
 
     @cached_property
-    def best_so_far(self) -> Mapping[str, BestSoFar]:
-        """Best reward so far of every run, by run id."""
-        return best_so_far(self)
-
-    @cached_property
-    def anytime(self) -> pd.DataFrame:
-        """Mean best reward so far over what is spent."""
-        return anytime_curves(self)
-
-    @cached_property
-    def targets(self) -> pd.DataFrame:
-        """What it takes to come near the optimum, of both other arms."""
-        return targets(self)
-
-    @cached_property
-    def areas(self) -> pd.DataFrame:
-        """Area under the anytime curves, of both other arms."""
-        return areas(self)
-
-    @cached_property
-    def pareto(self) -> pd.DataFrame:
-        """Methods on the front of reward and spend, a bootstrap."""
-        return pareto_sets(self)
-
-    @cached_property
-    def signature_rows(self) -> list[SignatureRow]:
-        """Every value of every signature."""
-        return signature_rows(self)
-
-    @cached_property
     def signatures(self) -> pd.DataFrame:
-        """The same, one row a value, with the place in columns (docs/signatures.md)."""
+        """``signature_rows`` as a table, with the place in columns (docs/signatures.md)."""
         return signatures_table(self.signature_rows)
 
     @cached_property
-    def judged(self) -> list[Judged]:
-        """The claims of the paper, each with its verdict."""
-        return judge(self)
-
-    @cached_property
     def claims(self) -> pd.DataFrame:
-        """The same, one row a claim."""
+        """``judged`` as ``claims.csv`` has it, one row a claim."""
         return register_table(self.judged)
 
     @cached_property
@@ -180,4 +133,13 @@ class Study:
         """The report's tables by id, with the columns of their CSV files."""
         from analysis.report.build import report_tables
 
-        return report_tables(self)
+        return Tables(report_tables(self))
+
+
+class Tables(dict[str, pd.DataFrame]):
+    """Tables by id."""
+
+    def __missing__(self, name: object) -> NoReturn:
+        """Raise KeyError, which names the table that may have been meant."""
+        hint = did_you_mean(str(name), self) or "; `list(study.tables)` names them"
+        raise KeyError(f"no table {name!r}{hint}")

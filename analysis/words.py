@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analysis.statistics.estimates import Inference
+if TYPE_CHECKING:
+    from analysis.statistics.estimates import Inference
 
 NONE = "–"
 """Shown where there is no value."""

@@ -35,7 +35,7 @@ from benchmarks.declaration import (
     reason_against,
 )
 from benchmarks.sandbox import Failure, Sandbox
-from coartic import CoarticError, Task, tables
+from coartic import CoarticError, Task, record
 from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import problems_inline, read_text
 from coartic.learning import METHOD_PREFIX
@@ -149,7 +149,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
 @cache
 def _built_in() -> dict[str, Entry]:
     return {
-        name: Entry(declared(method), tables.BUILT_IN, built_in_code(method.__module__))
+        name: Entry(declared(method), record.BUILT_IN, built_in_code(method.__module__))
         for name, method in CLASSES.items()
     }
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 
 from benchmarks.store import Store
-from coartic.files import check_folder, publish
+from coartic.files import check_folder, check_no_report, publish
 from coartic.record import Record
 from coartic.tables import TABLES, Manifest, parquet_options, tables_of
 
@@ -20,9 +20,11 @@ DERIVED = (*(f"{name}.parquet" for name in TABLES), "manifest.json")
 
 
 def check_results_folder(folder: Path) -> None:
-    """Raises CoarticError where something in a folder is in the way of its tables."""
+    """Raises CoarticError where something in a folder is in the way of its tables, and for a
+    report's folder."""
     names = (*DERIVED, *PAGES)
     check_folder(folder, owner=OWNER, alone=False, names=names, derived=DERIVED)
+    check_no_report(folder)
 
 
 def write_tables(store: Store, manifest: Manifest) -> dict[str, Record]:

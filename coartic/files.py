@@ -33,6 +33,8 @@ except ImportError:  # Windows, where nobody removes or replaces a file that is 
 LISTING = ".coartic-files.json"
 """What commands wrote into its folder: command -> {path -> SHA-256 of what was written}, while
 files are being replaced with that of the old and of the new."""
+REPORT = "report"
+"""The command whose folders hold nothing else."""
 _LEFTOVER = re.compile(r"\.coartic-[0-9a-f]{32}\.part")
 _LOCK = f".coartic-{'0' * 32}.part"  # left behind by a killed command, it is a leftover, too
 _LARGEST_LISTING = 16 * 2**20  # bytes
@@ -158,6 +160,15 @@ def check_folder(
             with _locked(folder):
                 listed = _read_listing(folder).get(owner, {})
                 _survey(folder, dict.fromkeys(names, ""), listed, owner, alone, derived)
+
+
+def check_no_report(folder: Path) -> None:
+    """Raises CoarticError for a folder that a report was written into: it holds nothing else."""
+    with _errors(folder):
+        if REPORT in _read_listing(folder):
+            raise CoarticError(
+                f"{folder} holds a report, and nothing else is written there; name another folder"
+            )
 
 
 def write_outputs(files: Mapping[Path, bytes], *, replace: bool) -> None:

@@ -21,7 +21,7 @@ from coartic.errors import CoarticError
 from coartic.learning import METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
-from coartic.scores import Solved, solved
+from coartic.scores import PlainMovement, Solved, solved
 from coartic.solution import Movement
 from coartic.stored import (
     Amount,
@@ -39,6 +39,8 @@ from coartic.task import INITIAL_POLICIES, Task, parse_task
 from coartic.text import LONGEST_REASON, Line, printable
 
 RECORD_FORMAT: Literal[2] = 2
+BUILT_IN = "built in"
+"""Origin of this project's methods."""
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
 _OUTCOME = ("status", "solution", "initial", "replay", "bound", "rewards")
@@ -141,7 +143,11 @@ class Record(Plain):
     @property
     def task(self) -> Task:
         """The task as it was run. Raises TaskError where it cannot be one."""
-        return _parsed(json.dumps(self.specification.task))
+        return _parsed(self._task_text)
+
+    @property
+    def _task_text(self) -> str:
+        return json.dumps(self.specification.task)
 
     @property
     def model(self) -> MotionModel:
@@ -183,7 +189,7 @@ class Record(Plain):
             if stored is None:
                 continue
             try:
-                again = solved(self.task, [row.movement() for row in stored.movements], self.model)
+                again = _executed(self._task_text, stored.movements, self.model)
             except (CoarticError, ValueError, TypeError) as error:
                 raise RecordError(
                     f"run {self.run_id}: its {name} cannot be executed: {error}"
@@ -266,6 +272,12 @@ def _trials(record: Record) -> tuple[list[int], int]:
 @lru_cache(maxsize=512)
 def _parsed(text: str) -> Task:
     return parse_task(json.loads(text), "a record")
+
+
+@lru_cache(maxsize=512)
+def _executed(task: str, movements: tuple[PlainMovement, ...], model: MotionModel) -> Solved:
+    """Once for runs that begin alike, and for a folder that is read again."""
+    return solved(_parsed(task), [row.movement() for row in movements], model)
 
 
 def run_seed(root: int, task: str, run: int) -> int:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -24,13 +25,10 @@ from coartic.method import Information, Meter
 from coartic.record import Environment, Record
 from coartic.scores import PlainMovement
 from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
-from coartic.task import Task, parse_task
+from coartic.task import parse_task
 from coartic.text import Line
 
 FORMAT: Literal[5] = 5  # of manifest and tables; raised when one of them changes its meaning
-
-BUILT_IN = "built in"
-"""Origin of this project's methods."""
 
 RUNS = pa.schema(
     [
@@ -208,7 +206,7 @@ def tables_of(manifest: Manifest, records: Mapping[str, Record]) -> dict[str, pa
     plan = manifest.specification
     rows = [(cell, records[run_id]) for cell in plan.cells for run_id in cell.run_ids]
     distinct = [records[run_id] for run_id in plan.run_ids]
-    tasks = [parse_task(task, "manifest") for task in plan.tasks.values()]
+    sequences = [row for task in plan.tasks.values() for row in _sequence_rows(json.dumps(task))]
     return {
         "runs": pa.Table.from_pylist(
             [_run_row(plan.suite, cell, record) for cell, record in rows], schema=RUNS
@@ -216,7 +214,7 @@ def tables_of(manifest: Manifest, records: Mapping[str, Record]) -> dict[str, pa
         "solutions": _joint_table(_solution_rows(distinct), SOLUTIONS),
         "paths": _joint_table(_path_rows(distinct), PATHS),
         "learning": _learning_table(distinct),
-        "sequences": pa.Table.from_pylist(_sequence_rows(tasks), schema=SEQUENCES),
+        "sequences": pa.Table.from_pylist(sequences, schema=SEQUENCES),
     }
 
 
@@ -285,9 +283,10 @@ def _solution_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
             "hand": row.hand,
             "kind": row.kind,
             "ticks": row.ticks,
-            **dict(zip(record.task.robot.joint_names, row.target or (), strict=True)),
+            **dict(zip(joints, row.target or (), strict=True)),
         }
         for record in records
+        for joints in [record.task.robot.joint_names]
         for order, row in enumerate(_movements(record))
     ]
 
@@ -298,9 +297,10 @@ def _path_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
             "run_id": record.run_id,
             "order": order,
             "waypoint": index,
-            **dict(zip(record.task.robot.joint_names, point, strict=True)),
+            **dict(zip(joints, point, strict=True)),
         }
         for record in records
+        for joints in [record.task.robot.joint_names]
         for order, row in enumerate(_movements(record))
         for index, point in enumerate(row.waypoints or ())
     ]
@@ -345,21 +345,15 @@ def _learning_table(records: Sequence[Record]) -> pa.Table:
     )
 
 
-def _sequence_rows(tasks: Sequence[Task]) -> list[dict[str, Any]]:
-    """The corrective process alone, one row per task and hand sequence, best first."""
-    rows: list[dict[str, Any]] = []
-    for task in tasks:
-        try:
-            trials = ranked_sequences(task, hand_sequences(task))
-        except NotApplicableError:
-            continue  # more sequences than anyone would list
-        rows.extend(
-            {
-                "task": task.name,
-                "hands": hands,
-                "reward": execution.reward,
-                "reason": execution.reason,
-            }
-            for hands, execution in trials
-        )
-    return rows
+@lru_cache(maxsize=64)
+def _sequence_rows(content: str) -> Sequence[dict[str, Any]]:
+    """The corrective process alone on a task, one row per hand sequence, best first."""
+    task = parse_task(json.loads(content), "manifest")
+    try:
+        trials = ranked_sequences(task, hand_sequences(task))
+    except NotApplicableError:
+        return ()  # more sequences than anyone would list
+    return [
+        {"task": task.name, "hands": hands, "reward": execution.reward, "reason": execution.reason}
+        for hands, execution in trials
+    ]

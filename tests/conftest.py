@@ -1,5 +1,6 @@
 """Shared by all tests."""
 
+import gc
 import os
 import signal
 
@@ -7,33 +8,66 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from analysis import load
-from tests.support import reports
-from tests.support.suites import run_and_write, traced_cells, with_environment
+# What the fixtures need is imported in them: the process that hands out the tests to
+# workers reads this file, too, and runs none.
 
-# Continuous integration tries the same examples every time; people, new ones.
-settings.register_profile("ci", derandomize=True, deadline=None)
-settings.register_profile("people", deadline=None)
-settings.load_profile("ci" if os.environ.get("CI") else "people")
+# The same examples every time: a run that fails says something of the code, not of its luck.
+# Others are tried with --hypothesis-profile=new.
+settings.register_profile("same", derandomize=True, max_examples=50, deadline=None)
+settings.register_profile("new", deadline=None)
+settings.load_profile("same")
 
 # Tests that interrupt themselves or others do so in the background as well.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory):
+    """The temporary folder of all workers of the session."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kernels(shared):
+    """Compiled by the first worker, where they are not yet, while the others wait."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        from coartic.learning import warm_up
+
+        with FileLock(shared / "kernels.lock"):
+            warm_up()
+
+
 @pytest.fixture
 def undrawn():
     """Reports without figures, which take long and have tests of their own."""
+    from tests.support import reports
+
     with reports.undrawn():
         yield
 
 
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Runs without processes of their own, which take long and have tests of their own."""
+    import benchmarks.executors
+    import benchmarks.reproduce
+    from tests.support.suites import InProcess, performed
+
+    monkeypatch.setattr(benchmarks.executors, "Local", InProcess)
+    monkeypatch.setattr(benchmarks.reproduce, "supervise", performed)
+
+
 @pytest.fixture(scope="session")
-def traced(tmp_path_factory):
-    """A results folder that nobody writes into: the paper's cells beside other methods."""
-    shared = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:  # the first worker makes it for all
-        shared = shared.parent
+def traced(shared):
+    """A results folder that nobody writes into: the paper's cells beside other methods.
+
+    The first worker makes it for all.
+    """
+    from analysis import load
+    from tests.support.suites import run_and_write, traced_cells, with_environment
+
     folder = shared / "traced" / "results"
     with FileLock(shared / "traced.lock"):
         if not (shared / "traced.made").exists():
@@ -56,3 +90,4 @@ def pytest_collection_modifyitems(items):
     """The modules that take longest, then the others."""
     rank = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))
+    gc.freeze()  # what is imported stays: looking through it again and again takes long

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from analysis.citations import (
-    ANALYSIS,
     PAPER,
     MethodSource,
+    behind_analysis,
     bibliography,
     parse,
     references,
@@ -27,6 +27,7 @@ from tests.support.suites import BROKEN, run_and_write
 
 ROOT = Path(__file__).parent.parent
 BIB = references()
+ANALYSIS = behind_analysis()
 GOOD = """@article{a2000,
   author = {A, B.},
   title = {C},

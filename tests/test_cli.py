@@ -1,6 +1,8 @@
 """The command line as a user meets it."""
 
+import io
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -9,11 +11,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks import executors
+from analysis.report import analyses
+from benchmarks import conformance, executors
+from benchmarks.conformance import Law
 from benchmarks.store import Store
 from coartic import __version__
 from coartic.files import LISTING
 from coartic.record import run_seed
+from tests.support import commands
 from tests.support.commands import call
 from tests.support.suites import BROKEN, ROOT, InProcess
 
@@ -49,6 +54,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     assert manifest["environment"]["packages"]["numba"]
     assert manifest["environment"]["command"][1:3] == ["run", "paper"]
     # The same command again has nothing to do and changes no table.
+    monkeypatch.setattr(executors, "Local", InProcess)
     tables = {path: path.read_bytes() for path in out.glob("*.parquet")}
     code, text, error = call(monkeypatch, capsys, *command)
     assert code == 0
@@ -67,7 +73,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     assert len(pd.read_parquet(out / "runs.parquet")) == 21
 
 
-def test_run_own_task(monkeypatch, capsys, tmp_path):
+def test_run_own_task(monkeypatch, capsys, tmp_path, in_this_process):
     (tmp_path / "mine.toml").write_text(GOOD, encoding="utf-8")
     code, text, _ = call(
         monkeypatch, capsys, "run", "paper", "--task-file", tmp_path / "mine.toml",
@@ -83,12 +89,10 @@ def test_run_own_task(monkeypatch, capsys, tmp_path):
 
 def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
     asked = []
-    real = executors.Local
 
-    class Watched(real):
+    class Watched(InProcess):
         def __init__(self, jobs):
             asked.append(jobs)
-            super().__init__(1)
 
     monkeypatch.setattr(executors, "Local", Watched)
     command = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -110,7 +114,7 @@ def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
     assert list(second.seed) == [run_seed(5, "ascending", run) for run in (0, 1)]
 
 
-def test_the_commit_is_recorded(monkeypatch, capsys, tmp_path):
+def test_the_commit_is_recorded(monkeypatch, capsys, tmp_path, in_this_process):
     git = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
     head = subprocess.run(git, capture_output=True, text=True)
     call(
@@ -125,7 +129,7 @@ def test_the_commit_is_recorded(monkeypatch, capsys, tmp_path):
         assert commit is None
 
 
-def test_a_run_writes_over_nothing_of_the_users(monkeypatch, capsys, tmp_path):
+def test_a_run_writes_over_nothing_of_the_users(monkeypatch, capsys, tmp_path, in_this_process):
     command = (
         "run",
         "paper",
@@ -154,7 +158,7 @@ def test_a_run_writes_over_nothing_of_the_users(monkeypatch, capsys, tmp_path):
 def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):
     code, text, _ = call(
         monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--methods", "test/dies",
-        "--method-file", BROKEN, "--runs", 2, "--out", tmp_path / "out",
+        "--method-file", BROKEN, "--runs", 2, "--jobs", 1, "--out", tmp_path / "out",
     )  # fmt: skip
     assert code == 1
     assert "ascending: 2 runs are crashed (the worker process ended" in text
@@ -212,7 +216,7 @@ def test_in_the_background_ctrl_c_stays_ignored(monkeypatch, capsys, tmp_path):
     assert "2 done in" in text
 
 
-def test_trial_budget(monkeypatch, capsys, tmp_path):
+def test_trial_budget(monkeypatch, capsys, tmp_path, in_this_process):
     code, _, _ = call(
         monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 1,
         "--trial-budget", 12, "--out", tmp_path / "out",
@@ -222,16 +226,29 @@ def test_trial_budget(monkeypatch, capsys, tmp_path):
 
 
 def test_check(monkeypatch, capsys):
-    code, text, _ = call(monkeypatch, capsys, "check", "corrective-alone/given")
+    """Of a task file, and what is said of a law that does not hold."""
+    shipped = ROOT / "coartic" / "tasks" / "1-ascending.toml"
+    code, text, _ = call(monkeypatch, capsys, "check", shipped)
     assert code == 0
-    assert "8 of 8 laws hold" in text
+    assert re.search(r"(\d) of \1 laws hold", text)
     assert "FAIL" not in text
+    asked = []
+
+    def check_method(entry):
+        asked.append(entry.declared.name)
+        return [Law("limits", True, "kept"), Law("information", False, "it used 'Jacobian'")]
+
+    monkeypatch.setattr(conformance, "check_method", check_method)
     code, text, _ = call(monkeypatch, capsys, "check", "test/peeks", "--method-file", BROKEN)
     assert code == 1
-    assert "FAIL  information: on ascending: the method used 'Jacobian'" in text
+    assert asked == ["test/peeks"]
+    assert text.splitlines() == [
+        "pass  limits: kept", "FAIL  information: it used 'Jacobian'", "",
+        "test/peeks: 1 of 2 laws hold.",
+    ]  # fmt: skip
 
 
-def test_show_and_reproduce(monkeypatch, capsys, tmp_path):
+def test_show_and_reproduce(monkeypatch, capsys, tmp_path, in_this_process):
     call(
         monkeypatch, capsys, "run", "paper", "--tasks", "ascending", "--runs", 2,
         "--trials", 50, "--out", tmp_path / "out",
@@ -273,7 +290,7 @@ def test_show_and_reproduce(monkeypatch, capsys, tmp_path):
     assert "the beginning is enough" in error
 
 
-def test_short_names_of_conditions(monkeypatch, capsys, tmp_path):
+def test_short_names_of_conditions(monkeypatch, capsys, tmp_path, in_this_process):
     code, _, _ = call(
         monkeypatch, capsys, "run", "paper", "--methods", "EC4", "--tasks", "two-armed-2",
         "--runs", 1, "--trials", 3, "--out", tmp_path / "out",
@@ -282,12 +299,13 @@ def test_short_names_of_conditions(monkeypatch, capsys, tmp_path):
     assert list(pd.read_parquet(tmp_path / "out" / "runs.parquet").method) == ["dual-process/EC4"]
 
 
-def test_a_terminal_without_the_signs(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "coartic", "list"],
-        capture_output=True, check=True, env={"PYTHONIOENCODING": "ascii"}, cwd=ROOT,
-    )  # fmt: skip
-    assert b"ascending" in done.stdout
+def test_a_terminal_without_the_signs(monkeypatch, capsys):
+    shown = io.BytesIO()
+    with io.TextIOWrapper(shown, encoding="ascii", write_through=True) as terminal:
+        monkeypatch.setattr(sys, "stdout", terminal)
+        assert call(monkeypatch, capsys, "list")[0] == 0
+        assert b"ascending" in shown.getvalue()
+        assert b"?" in shown.getvalue()
 
 
 def test_list(monkeypatch, capsys):
@@ -299,8 +317,9 @@ def test_list(monkeypatch, capsys):
 
 def test_draw(monkeypatch, capsys, tmp_path):
     (tmp_path / "mine.toml").write_text(GOOD, encoding="utf-8")
-    for name in ("all.png", "all.svg", "all.pdf"):
-        assert call(monkeypatch, capsys, "draw", "--out", tmp_path / name)[0] == 0
+    one = ("draw", "--tasks", "ascending")
+    for name in ("one.png", "one.svg", "one.pdf"):
+        assert call(monkeypatch, capsys, *one, "--out", tmp_path / name)[0] == 0
         assert (tmp_path / name).stat().st_size > 5000
     own = tmp_path / "own.svg"
     code, text, _ = call(
@@ -309,12 +328,11 @@ def test_draw(monkeypatch, capsys, tmp_path):
     assert code == 0
     assert text.startswith("mine drawn in")
     before = own.read_bytes()
-    code, _, error = call(monkeypatch, capsys, "draw", "--tasks", "ascending", "--out", own)
+    code, _, error = call(monkeypatch, capsys, *one, "--out", own)
     assert (code, own.read_bytes()) == (2, before)
     assert f"{own} is there already; add --replace to write over it" in error
-    replace = ("draw", "--tasks", "ascending", "--out", own, "--replace")
-    assert call(monkeypatch, capsys, *replace)[0] == 0
-    assert own.read_bytes() != before
+    assert call(monkeypatch, capsys, *one, "--out", own, "--replace")[0] == 0
+    assert own.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
 
 
 def test_titles_are_text_not_formulas(monkeypatch, capsys, tmp_path):
@@ -341,7 +359,7 @@ def test_entry_points():
         assert done.stdout == f"coartic {__version__}\n"
 
 
-def test_analyse(monkeypatch, capsys, tmp_path):
+def test_analyse(monkeypatch, capsys, tmp_path, in_this_process):
     out = tmp_path / "results"
     chosen = ("--tasks", "ascending,two-armed-2", "--runs", 3, "--trials", 40)
     assert call(monkeypatch, capsys, "run", "paper", "--out", out, *chosen)[0] == 0
@@ -355,9 +373,10 @@ def test_analyse(monkeypatch, capsys, tmp_path):
         "dual-process (EC1, EC3)",
         "dual-process (EC1, EC4)",
     }
-    assert call(monkeypatch, capsys, "analyse", out)[0] == 0
+    assert call(monkeypatch, capsys, "analyse", out)[0] == 0  # over what it wrote itself
     assert written == {name: (out / name).read_bytes() for name in names}
     (out / "claims.md").write_text("annotated")
+    monkeypatch.setattr(analyses, "analyse", lambda study: written)
     (out / LISTING).rename(tmp_path / "listing")  # as in a folder of an older version
     code, _, error = call(monkeypatch, capsys, "analyse", out)
     assert code == 2
@@ -399,6 +418,7 @@ def test_completion_is_offered_where_the_shell_is_not_known(monkeypatch, capsys)
     code, text, _ = call(monkeypatch, capsys, "--show-completion")
     assert code in (0, 1)  # by the shell around the tests
     monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    monkeypatch.setattr(commands, "ready", lambda: commands.APP)  # it looks when put together
     code, text, error = call(monkeypatch, capsys, "--show-completion", "zsh")
     assert (code, error) == (0, "")
     assert "_COARTIC_COMPLETE=complete_zsh" in text

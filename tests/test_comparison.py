@@ -15,7 +15,7 @@ from analysis.published import (
 )
 from analysis.report.comparison import comparison_document, notes_of
 from analysis.report.formats.markdown import markdown
-from analysis.report.tables import published_table, sequences_table
+from analysis.report.tables.paper import published_table, sequences_table
 from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import load_suite, select_cells

@@ -430,7 +430,10 @@ SIGN = "alert(1)</script>"  # of EVIL: it must be seen as what it is
 
 
 def test_comparison_page(hostile, monkeypatch):
-    rows = [replace(row, beaten=1, corrections=2, told="G") for row in method_rows(Study(hostile))]
+    rows = [
+        replace(row, beaten=1, corrections=2, told="G")
+        for row in method_rows(Study(hostile)).values()
+    ]
     monkeypatch.setattr("analysis.study.method_rows", lambda study: rows)
     page = to_markdown(comparison_document(Study(hostile)), tables="")
     assert page.count("is better than the optimum") == len(rows)

@@ -163,13 +163,13 @@ def test_intervals_are_those_of_the_percentile_bootstrap(tmp_path):
     last = rng.integers(-600, -470, size=20).astype(float)
     rows = [run("m", [-700.0, value], number=i) for i, value in enumerate(last)]
     results = study([*rows, run("other", [-500.0])], tmp_path)
-    frame = anytime_curves(results, seed=3)
+    frame = anytime_curves(results)
     found = of(frame, "m").iloc[-1]
     expected = bootstrap(
         (last,), np.mean, method="percentile", n_resamples=20_000, rng=rng
     ).confidence_interval
     assert (found.low, found.high) == pytest.approx(tuple(expected), abs=0.1 * last.std())
-    alone = anytime_curves(study(rows, tmp_path), seed=3)
+    alone = anytime_curves(study(rows, tmp_path))
     pd.testing.assert_frame_equal(alone, frame[frame.method == "m"])
     assert of(frame, "other")[["low", "high"]].isna().all(axis=None)
 
@@ -207,7 +207,7 @@ def test_areas_in_closed_form(tmp_path):
     assert frame.area.between(0, 1).all()
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(st.lists(st.integers(-1200, BEST), min_size=2, max_size=12))
 def test_areas_are_integrals(tmp_path_factory, rewards):
     results = study([run("m", [float(r) for r in rewards])], tmp_path_factory.mktemp("area"))
@@ -275,7 +275,7 @@ def test_targets_of_the_restricted_optimum(tmp_path):
     assert not len(of(frame, "moving", other_arm="still"))
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(trial_rewards, st.sampled_from(SPENDS))
 def test_nearer_targets_take_longer(tmp_path_factory, rewards, spend):
     rewards = [BEST + 10 * value for value in rewards]

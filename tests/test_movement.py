@@ -103,10 +103,10 @@ def random_movement(rng, robot, hand):
 @pytest.mark.parametrize("robot", [ROBOT, UNEVEN], ids=["paper", "uneven"])
 @pytest.mark.parametrize("stop_on_arrival", [True, False])
 def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
-    """Thousands of random movements of all kinds."""
+    """Random movements of all kinds."""
     rng = np.random.default_rng(6)
     hits = 0
-    for index in range(1000):
+    for index in range(400):
         hand = HANDS[index % 2]
         q, target, goal = random_movement(rng, robot, hand)
         arguments = (robot, q, target, hand, goal, 0.1)
@@ -114,7 +114,7 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
         slow = reference.move(*arguments, stop_on_arrival=stop_on_arrival)
         assert_same(fast, slow)
         hits += fast.hit
-    assert 200 < hits < 900  # both outcomes are well represented
+    assert 80 < hits < 360  # both outcomes are well represented
 
 
 @pytest.mark.parametrize(("robot", "count"), [(ROBOT, 40_000), (UNEVEN, 10_000)])
@@ -128,7 +128,7 @@ def test_equals_every_step_a_hundred_thousand_times(robot, count, hand):
         assert_equals_every_step(robot, q, target, hand, goal, 0.1, stops, models[model])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100)
 @given(
     q=configurations(ROBOT),
     target=configurations(ROBOT),
@@ -164,7 +164,7 @@ def test_equals_the_loop_for_any_movement(
 
 
 @given(step=st.sampled_from([0.003, 0.01, 0.07]), tolerance=st.sampled_from([0.001, 0.01, 0.1]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_equals_the_loop_under_other_constants(step, tolerance):
     model = MotionModel(step=step, arrival_tolerance=tolerance)
     rng = np.random.default_rng(7)
@@ -178,7 +178,7 @@ def test_grazing_a_goal():
     """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)
     outcomes = set()
-    for _ in range(5000):
+    for _ in range(2000):
         q = rng.uniform(-2, 2, 10)
         target = q + rng.normal(size=10) * 0.3
         middle = q + rng.uniform(0.2, 0.8) * (target - q)

@@ -64,7 +64,7 @@ def test_closed_form_is_the_damped_pseudoinverse_and_a_projection(q, rate, prefe
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_without_active_limits_the_cascade_is_the_closed_form(solver):
     cascade = cascade_for(ROBOT.dof, solver)
-    for problem in problems(25, 1):
+    for problem in problems(10, 1):
         exact = damped_projection(*problem)
         assert np.abs(exact).max() < LIMIT
         np.testing.assert_allclose(cascade.solve(*problem), exact, atol=1e-7)
@@ -138,14 +138,14 @@ def test_a_failed_solve_is_an_outcome(monkeypatch):
 def test_solutions_keep_the_rules(method, task, hands):
     """Steps within m, locks kept, every goal hit without correction, hands as given."""
     task = load_task(task)
-    result, execution, session = solve(method, task, hands=hands, period=5)
+    result, execution, session = solve(method, task, hands=hands, period=10)
     assert execution.completed
     assert execution.corrections == 0
     assert execution.hands == hands
     q = task.q0
     for movement, at_hit in zip(result.solution, execution.configurations, strict=True):
         steps = np.diff(np.vstack([q, movement.waypoints]), axis=0)
-        assert np.linalg.norm(steps, axis=1).max() <= 5 * PAPER.step * (1 + 1e-9)
+        assert np.linalg.norm(steps, axis=1).max() <= 10 * PAPER.step * (1 + 1e-9)
         q = at_hit
         if task.locked_base:
             assert (movement.waypoints[:, 1] == task.q0[1]).all()
@@ -155,7 +155,7 @@ def test_solutions_keep_the_rules(method, task, hands):
 
 def test_the_least_rates_move_no_joint_of_the_other_arm():
     task = load_task("two-armed-2")
-    result, _, _ = solve(NullspaceQP, task, hands="RRRR", period=5)
+    result, _, _ = solve(NullspaceQP, task, hands="RRRR", period=10)
     for movement in result.solution:
         joints = movement.waypoints[:, ROBOT.joints("left")]
         np.testing.assert_allclose(joints, np.tile(task.q0[2:6], (len(joints), 1)), atol=1e-12)
@@ -165,7 +165,7 @@ def test_preshaping_moves_the_other_arm_towards_its_goal():
     task = load_task("two-armed-2")
     misses = []
     for method in (NullspaceQP, Preshaping):
-        _, execution, _ = solve(method, task, hands="RLRR", period=5)
+        _, execution, _ = solve(method, task, hands="RLRR", period=10)
         hand = ROBOT.forward_kinematics(execution.configurations[0], "left")
         misses.append(np.hypot(*(hand - task.goal_array[1])))
     assert misses[1] < 0.7 * misses[0]
@@ -184,7 +184,7 @@ def test_a_goal_behind_a_straight_arm_is_reached():
     task = tiny_task(goals=[[2.5, 0.1], [3.0, 1.0]], initial_hands="RR")
     for locked in (("x", "y"), ("x",)):
         task = task.model_copy(update={"locked_base": locked})
-        _, execution, _ = solve(NextGoal, task, hands="RR", period=2)
+        _, execution, _ = solve(NextGoal, task, hands="RR", period=5)
         assert execution.completed
         assert execution.corrections == 0
 
@@ -197,7 +197,7 @@ def test_a_goal_at_the_end_of_the_reach_is_reached(direction):
         initial_hands="R",
         start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.5, 1.0, -1.0, 1.0]},
     ).model_copy(update={"locked_base": ("x", "y")})
-    _, execution, _ = solve(NullspaceQP, task, hands="R")
+    _, execution, _ = solve(NullspaceQP, task, hands="R", period=5)
     assert execution.completed
     assert execution.corrections == 0
 
@@ -215,18 +215,19 @@ def test_an_unreachable_goal_is_infeasible(hands):
 @pytest.mark.parametrize("method", [NextGoal, Preshaping])
 def test_every_sequence_keeps_the_best(method):
     task = tiny_task(
-        goals=[[4.0, 1.5], [-3.0, 2.0], [-3.5, 3.0]],
-        initial_hands="RLL",
+        goals=[[4.0, 1.5], [-3.0, 2.0]],
+        initial_hands="RL",
         start={"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4},
     )
     given_hands = {
         hands: solve(method, task, hands=hands, period=20)[1].reward
-        for hands in map("".join, itertools.product("LR", repeat=3))
+        for hands in map("".join, itertools.product("LR", repeat=2))
     }
     result, execution, _ = solve(method, task, hands="every", period=20)
     assert execution.reward == max(given_hands.values()) == given_hands[execution.hands]
-    assert result.details["sequences"] == 8
-    assert result.details["simulated_movements"] < 3 * 8
+    assert len(set(given_hands.values())) > 1
+    assert result.details["sequences"] == 4
+    assert result.details["simulated_movements"] < 2 * 4
 
 
 def test_nearest_hands_are_those_without_a_secondary_objective():
@@ -293,7 +294,7 @@ def test_table_of_solvers(monkeypatch):
     monkeypatch.setattr(qp_solvers, "HANDS", "RRR")
     monkeypatch.setattr(qp_solvers, "TASK", "ascending")
     monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-304")
-    found = qp_solvers.recorded(12)
+    found = qp_solvers.recorded(6)
     figures = qp_solvers.measure(found)
     figures["osqp"].failures.append("level 1: osqp ended user_limit")
     figures["osqp"].solutions[0] = None

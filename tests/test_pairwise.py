@@ -257,7 +257,7 @@ def test_few_failed_and_missing_runs(tmp_path):
     assert math.isnan(sometimes["runs_1"])  # no optimum is known
     assert sometimes["smallest"] > 0
     text = page(failed)
-    note = pairwise_table(failed, "own").notes[-1]
+    note = pairwise_table(failed, "own").notes[1]
     assert "dual-process/EC4 solved 7 of 8, sometimes solved 3 of 4, never solved 0 of 3" in note
     assert "Needs at least two tasks" in text
 

@@ -1,11 +1,8 @@
 """Methods and tasks from elsewhere: entry points, files, and the README's examples."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 import tomllib
 from functools import partial
 from pathlib import Path
@@ -13,10 +10,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from benchmarks import executors
+from benchmarks import registry as registry_module
 from benchmarks.registry import registry
 from benchmarks.suites import Cell, run_specs
 from coartic import CoarticError, load_task
 from tests.support.commands import call
+from tests.support.suites import InProcess, ask_here
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "tests" / "example_plugin"
@@ -28,6 +28,13 @@ def coartic(monkeypatch, capsys):
     """The command line: exit code, standard output, standard error."""
     monkeypatch.setenv("COLUMNS", "200")
     return partial(call, monkeypatch, capsys)
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    """Methods are asked and perform their runs here, for tests of what they say and leave."""
+    monkeypatch.setattr(registry_module, "_ask", ask_here)
+    monkeypatch.setattr(executors, "Local", lambda jobs: InProcess())
 
 
 @pytest.fixture
@@ -72,7 +79,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     out = tmp_path / "out"
     code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", "--method-file", METHOD,
-        "--tasks", "two-armed-1,two-armed-2", "--out", out,
+        "--tasks", "two-armed-1,two-armed-2", "--out", out, "--jobs", "1",
     )  # fmt: skip
     assert code == 0, error
     runs = pd.read_parquet(out / "runs.parquet")
@@ -89,6 +96,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     assert "unknown method 'nearest-hand'" in error
 
 
+@pytest.mark.usefixtures("in_process")
 def test_a_changed_file_makes_its_records_stale(coartic, tmp_path):
     method = tmp_path / "mine.py"
     method.write_text(METHOD.read_text(encoding="utf-8"), encoding="utf-8")
@@ -104,6 +112,7 @@ def test_a_changed_file_makes_its_records_stale(coartic, tmp_path):
     assert "not used, made by other code: 1 record" in error
 
 
+@pytest.mark.usefixtures("in_process")
 def test_a_changed_helper_makes_records_stale_too(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     helper = tmp_path / "coartic_test_helper.py"
@@ -117,6 +126,7 @@ def test_a_changed_helper_makes_records_stale_too(tmp_path, monkeypatch):
     assert codes[0] == codes[1] != codes[2]
 
 
+@pytest.mark.usefixtures("in_process")
 def test_a_helper_in_another_encoding_counts_as_python_reads_it(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     helper = tmp_path / "coartic_test_latin.py"
@@ -130,6 +140,7 @@ def test_a_helper_in_another_encoding_counts_as_python_reads_it(tmp_path, monkey
     assert codes[0] == codes[1] != codes[2]
 
 
+@pytest.mark.usefixtures("in_process")
 def test_what_a_helper_imports_is_read_as_well(tmp_path, monkeypatch):
     """An import that is not there may be meant so; one that is no Python is not."""
     monkeypatch.syspath_prepend(tmp_path)
@@ -147,6 +158,7 @@ def test_what_a_helper_imports_is_read_as_well(tmp_path, monkeypatch):
         registry([method])
 
 
+@pytest.mark.usefixtures("in_process")
 def test_what_a_validator_makes_of_a_parameter_is_what_counts(tmp_path):
     """A value that is clamped is the same run as the value it is clamped to."""
     path = tmp_path / "mine.py"
@@ -167,21 +179,22 @@ def test_what_a_validator_makes_of_a_parameter_is_what_counts(tmp_path):
     assert clamped.run_id == stated.run_id
 
 
-def test_a_broken_plugin_is_a_warning(tmp_path):
+@pytest.mark.usefixtures("in_process")
+@pytest.mark.filterwarnings("always")
+def test_a_broken_plugin_is_a_warning(coartic, tmp_path, monkeypatch):
     """One bad package does not take the command line with it."""
+    monkeypatch.syspath_prepend(tmp_path)
     info = tmp_path / "bad-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bad\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[coartic.methods]\nbad = no_such_module:Method\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "coartic", "list"],
-        capture_output=True, text=True, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(tmp_path)},
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert "warning: plug-in bad: entry point 'bad' cannot be used" in done.stderr
-    assert "dual-process/EC1" in done.stdout
+    code, listed, error = coartic("list")
+    assert code == 0
+    assert "warning: plug-in bad: entry point 'bad' cannot be used" in error
+    assert "dual-process/EC1" in listed
 
 
+@pytest.mark.usefixtures("in_process")
 def test_a_method_that_cannot_say_where_it_applies(coartic, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(
@@ -223,6 +236,7 @@ def test_a_method_that_cannot_say_where_it_applies(coartic, tmp_path):
         ),
     ],
 )
+@pytest.mark.usefixtures("in_process")
 def test_method_files_that_cannot_be_used(source, words, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(source, encoding="utf-8")

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
@@ -205,7 +205,14 @@ def test_every_evaluation_is_counted(monkeypatch):
     st.sampled_from([OneGoal, TwoGoals]),
     st.integers(0, 99),
 )
+@example(goals=[(2.7421875, 0.5), (0.0, 0.0)], locked=[], method=OneGoal, seed=56)
 def test_what_is_planned_is_what_happens(goals, locked, method, seed):
+    """The ticks are those expected, and the other arm stands still, up to rounding.
+
+    A movement is planned from where the planner has the one before it end. Its points are
+    those of the executor's formula, computed in another order (``baselines.posture_based``,
+    ``coartic.movement``), so that they may differ in the last digit.
+    """
     if locked == ["x"]:
         goals = [(x / 3, y) for x, y in goals]
     task = bent(goals=[list(goal) for goal in goals], initial_hands="best-of-all")
@@ -220,7 +227,7 @@ def test_what_is_planned_is_what_happens(goals, locked, method, seed):
         miss = task.robot.forward_kinematics(movement.target, movement.hand)
         assert math.dist(miss, task.goals[movement.goal - 1]) <= ACCURACY + 1e-12
         other = task.robot.joints("left" if movement.hand == "right" else "right")
-        assert np.array_equal(movement.target[other], q[other])
+        np.testing.assert_allclose(movement.target[other], q[other], rtol=0, atol=1e-12)
 
 
 def test_a_goal_out_of_reach_is_infeasible():

@@ -14,6 +14,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from rich.console import Console
 
 from analysis.markup import Span, inline
@@ -32,15 +33,15 @@ from analysis.report.document import (
 from analysis.report.formats.csv import runs_csv, table_csv
 from analysis.report.formats.html import MOST_ROWS, html
 from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
-from analysis.report.formats.latex import PACKAGES, latex_table, latex_tables, latex_text
+from analysis.report.formats.latex import PACKAGES, latex_table, latex_text
 from analysis.report.formats.markdown import markdown
 from analysis.report.formats.terminal import terminal_table
 from analysis.report.legends import with_legends
 from analysis.report.summary import without_variants
+from analysis.report.tables.layout import LAYOUTS, Layout
 from analysis.report.text import number_text, parts
 from analysis.report.write import write_report
 from analysis.words import typographic
-from coartic import CoarticError
 from coartic.files import LISTING
 from tests.support.reports import Page
 
@@ -93,7 +94,7 @@ def document():
 
 
 def test_documents_that_do_not_fit_are_refused():
-    with pytest.raises(ValueError, match="ids used twice: a"):
+    with pytest.raises(ValueError, match="a: ids are used once"):
         Document("t", (Section("a", "A"), Section("b", "B", sections=(Section("a", "C"),))))
     with pytest.raises(ValueError, match="no run ids"):
         Document("t", (Section("a", "A", (TABLE,)),), runs={LEARNER: ("aa-1",)})
@@ -391,7 +392,7 @@ def test_every_character_of_ours_has_an_escape():
 
 
 def test_latex_columns_are_as_wide_as_their_numbers():
-    text = latex_tables(document())["methods-shelf"]
+    text = latex_table(next(t for t in document().tables() if t.id == "methods-shelf"))
     assert (
         r"\begin{tabularx}{\linewidth}{@{}lS[table-format=-3.1]S[table-format=1.1]r"
         r"S[table-format=1.1]S[table-format=7.0]S[table-format=1.3]"
@@ -447,13 +448,13 @@ def test_tables_longer_than_a_page_are_continued():
     )
 
 
-def render(figure):
-    return {f"{figure.id}.svg": figure.svg.encode()}
+def files_of(figures):
+    return {f"{figure.id}.svg": figure.svg.encode() for figure in figures}
 
 
 def write(folder, shown=None):
     shown = shown or document()
-    write_report(shown, shown.figures(), folder, render=render)
+    write_report(shown, files_of(shown.figures()), folder)
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
@@ -518,16 +519,23 @@ def test_a_report_replaces_the_one_before(tmp_path):
 def test_a_report_that_fails_leaves_the_one_before(tmp_path):
     folder = tmp_path / "report"
     before = write(folder)
-    with pytest.raises(ValueError, match="figures without a plot: line-2"):
-        write_report(document(), document().figures()[:1], folder, render=render)
-
-    def fails(figure):
-        raise CoarticError("no such font")
-
-    with pytest.raises(CoarticError, match="no such font"):
-        write_report(document(), document().figures(), folder, render=fails)
+    with pytest.raises(ValueError, match="figures without a file: line-2"):
+        write_report(document(), files_of(document().figures()[:1]), folder)
     after = {
         p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()
     }
     assert after == before
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_a_layout_has_the_columns_that_it_speaks_of():
+    layout = LAYOUTS["across-tasks"]
+    with pytest.raises(ValueError, match="table across-tasks has no columns gain"):
+        layout.row("a", method="a", gain=1.0)
+    fields = dict(layout) | {"intervals": {"gain": ""}}
+    with pytest.raises(ValidationError, match="intervals of no columns: gain"):
+        Layout.model_validate(fields)
+    with pytest.raises(ValidationError, match="colour"):
+        Layout.model_validate(
+            dict(layout) | {"columns": [{"name": "a", "header": "a", "colour": 1}]}
+        )

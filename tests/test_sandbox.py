@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from benchmarks import registry as registry_module
 from benchmarks import sandbox
 from benchmarks.executors import Local
 from benchmarks.harness import record_of
@@ -19,9 +20,8 @@ from benchmarks.reproduce import perform_once
 from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
 from benchmarks.specification import Limits
 from benchmarks.store import Store
-from benchmarks.suites import Cell, run_specs
-from coartic import CoarticError, load_task
-from tests.support.suites import perform_plan, spec_of
+from coartic import CoarticError
+from tests.support.suites import InProcess, ask_here, perform_plan, spec_of
 
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
@@ -29,18 +29,27 @@ BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 
 @pytest.fixture(scope="module")
 def known():
-    return registry([BROKEN])
+    """Methods, those of the broken file among them: asked here, performed in sandboxes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry_module, "_ask", ask_here)
+        yield registry([BROKEN])
+
+
+def performed_here(spec):
+    """The record of a run that needs no sandbox."""
+    (answer,) = InProcess().perform([spec.job()])
+    return record_of(answer, spec)
 
 
 def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path):
     store = Store(tmp_path)
-    hung = spec_of(known, "test/sleeps", Limits(1.0), runs=2)
-    dying = spec_of(known, "test/dies", runs=2)
-    good = spec_of(known, "dual-process/EC1", runs=3)
+    hung = spec_of(known, "test/sleeps", Limits(1.0))
+    dying = spec_of(known, "test/dies")
+    good = spec_of(known, "dual-process/EC1", runs=2)
     clock = time.monotonic()
     progress = perform_plan([*hung, *dying, *good], store, Local(2))
     assert time.monotonic() - clock < 60
-    assert (progress.done, progress.failed) == (7, 4)
+    assert (progress.done, progress.failed) == (4, 2)
     for spec in hung:
         record = store.read(spec.run_id)
         assert (record.status, record.reason) == ("timeout", "time limit of 1 s exceeded")
@@ -98,22 +107,19 @@ def test_a_question_that_nobody_reads_is_not_waited_for():
 
 
 def test_a_worker_killed_from_outside_loses_nothing(known, tmp_path):
-    """The run is performed again in a fresh process, and nobody can tell."""
+    """The run that it was at is performed again in a fresh process, and nobody can tell."""
     store = Store(tmp_path)
 
     class Killing(Local):
         def perform(self, jobs):
             for index, answer in enumerate(super().perform(jobs)):
-                if index in (1, 4):
-                    for child in workers_of(os.getpid()):
-                        os.kill(child, signal.SIGKILL)
+                if index == 0:  # the next run has begun
+                    (worker,) = workers_of(os.getpid())
+                    os.kill(worker, signal.SIGKILL)
                 yield answer
 
-    task = load_task("two-armed-2")
-    cell = Cell(task, known["dual-process/EC4"])
-    specs = [spec for _, spec in run_specs([cell], runs=12, seed=0, trials=4000)]
-    progress = perform_plan(specs, store, Killing(2))
-    assert (progress.done, progress.failed) == (12, 0)
+    progress = perform_plan(spec_of(known, "test/naps", runs=3), store, Killing(1))
+    assert (progress.done, progress.failed) == (3, 0)
 
 
 def workers_of(pid):
@@ -136,11 +142,10 @@ def workers_of(pid):
     return [p for p, (_, line) in parents.items() if b"benchmarks.worker" in line and below(p)]
 
 
-def test_a_method_that_kills_its_own_process_is_data_after_some_tries(known, tmp_path):
-    store = Store(tmp_path)
+def test_a_method_that_kills_its_own_process_is_data_after_some_tries(known, monkeypatch):
+    monkeypatch.setattr(sandbox, "_RETRIES", 1)
     (spec,) = spec_of(known, "test/segfaults")
-    perform_plan([spec], store, Local(1))
-    record = store.read(spec.run_id)
+    record = perform_once(spec)
     assert record.status == "crashed"
     assert "killed by SIGSEGV" in record.reason
 
@@ -165,8 +170,9 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
 
     ``python -m benchmarks.kill_resume`` does it at a hundred moments.
     """
+    jobs = "2" if word == signal.SIGINT else "1"  # a suite that ends has to end each of them
     suite = subprocess.Popen(
-        [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, "--jobs", "2"],
+        [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, "--jobs", jobs],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         env={**os.environ, "COARTIC_TEST_MARK": str(tmp_path)},
@@ -222,7 +228,7 @@ def test_what_a_method_starts_ends_with_it(known, tmp_path):
 
 
 def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known):
-    names = ("test/leaver", "test/good", "dual-process/EC1", "test/leaver")
+    names = ("test/good", "test/leaver", "dual-process/EC1")
     keeper = Keeper()
     workers = []
     try:
@@ -233,7 +239,7 @@ def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known):
             workers += [workers_of(os.getpid())[-1:], record.details.get("pid")]
     finally:
         keeper.close()
-    assert len({tuple(w) for w in workers[::2]}) == 4  # none is used for another method
+    assert len({tuple(w) for w in workers[::2]}) == 3  # none is used for another method
 
 
 def test_the_clock_stops_where_the_run_is_stopped(known):
@@ -262,7 +268,7 @@ def test_what_is_kept_of_a_run_is_bounded(known, monkeypatch):
     assert len(record.reason) < 1100
     assert "\x1b" not in record.reason
     (spec,) = spec_of(known, "test/hoarder")
-    assert "at most 65536 are kept" in perform_once(spec).reason
+    assert "at most 65536 are kept" in performed_here(spec).reason
     monkeypatch.setattr(sandbox, "LARGEST_ANSWER", 1 << 20)
     assert "it answered with more than 1 MiB" in perform_once(spec).reason
 
@@ -271,9 +277,9 @@ def test_a_score_is_what_the_solution_gives_elsewhere(known):
     """Whatever the method does to its own process."""
     (honest,) = spec_of(known, "test/good")
     (cheat,) = spec_of(known, "test/stepper")
-    assert perform_once(cheat).solution == perform_once(honest).solution
+    assert perform_once(cheat).solution == performed_here(honest).solution
     (prover,) = spec_of(known, "test/prover")
-    assert "states a bound, which is for methods optimum/*" in perform_once(prover).reason
+    assert "states a bound, which is for methods optimum/*" in performed_here(prover).reason
 
 
 def test_a_line_from_elsewhere_is_no_answer():

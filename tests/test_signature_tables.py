@@ -1,19 +1,23 @@
 """Tables of signatures: in the right place, of the right runs, with the right p."""
 
+from typing import get_args
+
 import numpy as np
 import pandas as pd
 import pytest
+from pydantic import ValidationError
 from scipy import stats
 
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
 from analysis.report.pages.signatures import signatures_document
-from analysis.report.tables import contexts_table, signatures_tables, slopes_tables
-from analysis.report.tables.signatures import definitions_table
+from analysis.report.tables.contexts import contexts_table, slopes_tables
+from analysis.report.tables.layout import LAYOUTS
+from analysis.report.tables.signatures import definitions_table, signatures_tables
 from analysis.report.text import number_text
 from analysis.signatures import study_rows, within
 from analysis.signatures.register import REGISTER
-from analysis.signatures.rows import Place, Signature
+from analysis.signatures.rows import Place, Shown, Signature
 from analysis.study import Study
 from coartic import corrective_trial, initial_hands
 from tests.support.suites import run_and_write, suite_of
@@ -192,3 +196,10 @@ def test_a_signature_is_a_measure_and_a_row(traced, monkeypatch):
     study = Study(traced.results)
     shown = by_column(tables_of(study, "ascending")["main-signatures"])[EC1]["length"]
     assert -shown.value == traced.cells["ascending", EC1].runs.reward.mean()
+
+
+def test_a_signature_names_a_table_that_there_is():
+    assert set(get_args(Shown)) <= LAYOUTS.keys()
+    fields = dict(REGISTER["total against initial"])
+    with pytest.raises(ValidationError, match="table"):
+        Signature.model_validate(fields | {"table": "nowhere"})

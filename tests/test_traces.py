@@ -416,21 +416,21 @@ def test_variants_have_their_reward_only(home):
     ]
 
 
-def test_a_report_does_not_know_where_it_lies(study, home, tmp_path):
-    again = Study(load_results(study.results.folder))
+def test_a_report_does_not_know_where_it_lies(searched, searched_home, tmp_path):
+    again = Study(load_results(searched.folder))
     report_of(again, tmp_path / "elsewhere")
     first, second = (
         {p.relative_to(folder).as_posix(): p.read_bytes()
          for p in sorted(folder.rglob("*")) if p.is_file()}
-        for folder in (home, tmp_path / "elsewhere")
+        for folder in (searched_home, tmp_path / "elsewhere")
     )  # fmt: skip
     assert list(first) == list(second)
     assert [name for name in first if first[name] != second[name]] == []
-    secrets = [str(study.results.folder), str(tmp_path), "/home/somebody", str(Path.cwd())]
+    secrets = [str(searched.folder), str(tmp_path), "/home/somebody", str(Path.cwd())]
     for name, content in first.items():
         assert not [s for s in secrets if s.encode() in content], name
     # In the results folder it is found; elsewhere only its plan is known.
-    assert trace(home, "coarticAscendingOptimum").folder == study.results.folder
+    assert trace(searched_home, "coarticAscendingOptimum").folder == searched.folder
     assert trace(tmp_path / "elsewhere", "coarticAscendingOptimum").folder is None
 
 
@@ -611,8 +611,13 @@ def searched(tmp_path_factory):
     return with_environment(folder)
 
 
-def test_searches_in_the_folder_are_the_optimums_runs(searched):
-    home = report_of(Study(searched), searched.folder / "report")
+@pytest.fixture(scope="module")
+def searched_home(searched):
+    return report_of(Study(searched), searched.folder / "report")
+
+
+def test_searches_in_the_folder_are_the_optimums_runs(searched_home):
+    home = searched_home
     own = {"free": [SEARCH, BOUND], "still": [f"{SEARCH} other_arm=still"]}
 
     def labels(name, *where):

@@ -116,7 +116,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     rng = np.random.default_rng(1)
     start = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)[free]
     best = math.inf
-    for _ in range(6):
+    for _ in range(3):
         found = minimize(
             objective,
             start + 0.1 * rng.standard_normal(start.shape),

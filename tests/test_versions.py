@@ -216,7 +216,9 @@ def test_other_code_is_said_and_never_mixed(first, tmp_path):
     folder = other.results.folder
     copied(first, folder)  # its tables and manifest, with both versions' records
     load_results(folder)
-    ours, theirs = (study.results.cells[0].runs.run_id.tolist() for study in (first, other))
+    ours, theirs = (
+        next(iter(study.cells.values())).runs.run_id.tolist() for study in (first, other)
+    )
     for run_ids, words in (
         ([theirs[0], *ours[1:]], f"run {theirs[0]} is not as planned: it has another code"),
         (ours[1:], "has another number of runs"),

@@ -13,27 +13,32 @@ rates.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from analysis.calibration.simulation import Check, Draw, arguments, lines
+from analysis.calibration.simulation import Check, Draw, simulate
 from analysis.published import Summary
-from analysis.statistics import estimates as statistics
-from analysis.statistics import hypotheses
-from analysis.statistics.across_tasks import interquartile_mean
+from analysis.statistics import across_tasks, estimates
 from analysis.statistics.equivalence import Equivalence, bootstrap_equivalence, difference
-from analysis.statistics.estimates import LEVEL
+from analysis.statistics.estimates import LEVEL, Inference
+from analysis.statistics.hypotheses import (
+    Alternative,
+    bootstrap_test,
+    permutation_test,
+    sign_flip_test,
+)
 from coartic.robot import Array
 
 RUNS = 20
 RESAMPLES = 999
 SIMULATIONS = 4_000
 MARGIN = 5.0
+_SIGNS: dict[Alternative, str] = {"greater": ">", "less": "<"}
 
 Sample = Callable[[np.random.Generator], Any]
 """Draws what a test or interval is given."""
@@ -46,8 +51,12 @@ class Population:
     name: str
     draw: Draw
     mean: float
-    middle: float
-    """Interquartile mean."""
+
+    @cached_property
+    def middle(self) -> float:
+        """Interquartile mean, of a million values: exact to about SD/1000."""
+        values = np.sort(self.draw(np.random.default_rng(0), 1_000_000))
+        return float(stats.trim_mean(values, 0.25))
 
     def sample(self, runs: int = RUNS) -> Sample:
         """So many rewards."""
@@ -62,23 +71,21 @@ class Population:
         return lambda rng: self.centred(rng) / 10 + shift
 
 
-# Share, mean and SD of the hand sequences that runs settle on: two-armed-2 under
-# exploration condition 4, two-armed-1 under condition 2.
-_TWO = ((0.7, -331.0, 7.0), (0.3, -355.0, 1.0))
-_THREE = ((0.73, -617.0, 8.0), (0.17, -580.0, 14.0), (0.10, -517.0, 7.0))
-
-
 def populations() -> tuple[Population, ...]:
-    """Normal, skewed, and mixtures like learned rewards of the two-armed tasks."""
+    """Normal, skewed, and mixtures like learned rewards of the two-armed tasks.
+
+    Levels are share, mean and SD of the hand sequences that runs settle on: two-armed-2 under
+    exploration condition 4, two-armed-1 under condition 2.
+    """
     return (
-        _population("normal", lambda rng, n: rng.normal(-303, 3, n), -303.0),
-        _population("skewed", lambda rng, n: -300 - rng.gamma(1.5, 4.0, n), -306.0),
-        _mixture("two levels", _TWO),
-        _mixture("three levels", _THREE),
+        Population("normal", lambda rng, n: rng.normal(-303, 3, n), -303.0),
+        Population("skewed", lambda rng, n: -300 - rng.gamma(1.5, 4.0, n), -306.0),
+        _mixture("two levels", (0.7, -331.0, 7.0), (0.3, -355.0, 1.0)),
+        _mixture("three levels", (0.73, -617.0, 8.0), (0.17, -580.0, 14.0), (0.10, -517.0, 7.0)),
     )
 
 
-def _mixture(name: str, levels: tuple[tuple[float, float, float], ...]) -> Population:
+def _mixture(name: str, *levels: tuple[float, float, float]) -> Population:
     """Normal levels, rounded to whole ticks; rounding does not move the mean."""
     shares, means, sds = np.array(levels).T
 
@@ -86,50 +93,15 @@ def _mixture(name: str, levels: tuple[tuple[float, float, float], ...]) -> Popul
         chosen = rng.choice(len(shares), size=n, p=shares)
         return np.asarray(np.rint(rng.normal(means[chosen], sds[chosen])))
 
-    return _population(name, draw, float(shares @ means))
+    return Population(name, draw, float(shares @ means))
 
 
-def _population(name: str, draw: Draw, mean: float) -> Population:
-    """The interquartile mean from a million values: exact to about SD/1000."""
-    values = np.sort(draw(np.random.default_rng(0), 1_000_000))
-    return Population(name, draw, mean, float(stats.trim_mean(values, 0.25)))
-
-
-def checks() -> list[Check]:
+def checks() -> Iterator[Check]:
     """Everything that is simulated, in the order of the table."""
     every = populations()
-    normal, _, two, _ = every
-    pairs = [(each, each) for each in every]
-    # Equal means, different shapes: what a test of means is asked in earnest.
-    pairs += [pair for each in every[1:] for pair in ((each, normal), (normal, each))]
-    found = [
-        _check(f"{name}, one-tailed", f"{a.name} > {b.name}", _rejects, test, a.centred, b.centred)
-        for a, b in pairs
-        for name, test in _TESTS.items()
-    ]
-    found += [_known_test(each, tail) for each in every for tail in _SIGNS]
-    found += [_flip_test(each, normal, tail) for each in (normal, two) for tail in _SIGNS]
-    found += [_covers(normal, runs) for runs in (5, 10)]
-    for each in every:
-        found += [_covers(each), _covers_difference(each, normal), _covers(each, middle=True)]
-    found += [_covers_improvement(theta) for theta in (0.5, 0.8, 0.95, 0.99)]
-    found.append(_covers_across(every))
-    for each in every:
-        above, below = (_equivalent(each, normal, side) for side in (1, -1))
-        found += [check for pair in zip(above, below, strict=True) for check in pair]
-    for each in every:
-        found += [
-            _covers_studentised("mean", each),
-            _covers_studentised("difference", each, normal),
-        ]
-    return found
-
-
-_SIGNS: dict[hypotheses.Alternative, str] = {"greater": ">", "less": "<"}
-_TESTS = {
-    "bootstrap test": hypotheses.bootstrap_test,
-    "permutation test": hypotheses.permutation_test,
-}
+    yield from _tests(*every)
+    yield from _intervals(*every)
+    yield from _equivalences(*every)
 
 
 def _check(
@@ -150,76 +122,71 @@ def _check(
     return Check(subject, data, seen, nominal)
 
 
-def _rejects(found: statistics.Inference) -> bool:
+def _rejects(found: Inference) -> bool:
     return found.p <= LEVEL
 
 
-def _misses(truth: float) -> Callable[[statistics.Inference], bool]:
+def _misses(truth: float) -> Callable[[Inference], bool]:
     """Whether an interval leaves out the true value; one that is missing does."""
     return lambda found: not found.low <= truth <= found.high
 
 
-def _agrees(found: Equivalence) -> bool:
-    return found.verdict == "equivalent"
+def _tests(*every: Population) -> Iterator[Check]:
+    """Of means that are equal, whatever the shapes: what a test of means is asked in earnest."""
+    normal, _, two, _ = every
+    pairs = [(each, each) for each in every]
+    pairs += [pair for each in every[1:] for pair in ((each, normal), (normal, each))]
+    of_two = {"bootstrap test": bootstrap_test, "permutation test": permutation_test}
+    for a, b in pairs:
+        for name, of in of_two.items():
+            subject, data = f"{name}, one-tailed", f"{a.name} > {b.name}"
+            yield _check(subject, data, _rejects, of, a.centred, b.centred)
+    for each in every:
+        for tail, sign in _SIGNS.items():
+            subject, data = "bootstrap test against a known value", f"{each.name} {sign} value"
+            known = partial(bootstrap_test, second=each.mean, alternative=tail)
+            yield _check(subject, data, _rejects, known, each.sample())
+    for each in (normal, two):
+        for tail, sign in _SIGNS.items():
+            subject, data = "sign-flip test, one-tailed", f"{each.name} {sign} {normal.name}"
+            flips = partial(sign_flip_test, alternative=tail)
+            yield _check(subject, data, _rejects, flips, each.centred, normal.centred)
 
 
-def _known_test(population: Population, tail: hypotheses.Alternative) -> Check:
-    test = partial(hypotheses.bootstrap_test, second=population.mean, alternative=tail)
-    data = f"{population.name} {_SIGNS[tail]} value"
-    subject = "bootstrap test against a known value"
-    return _check(subject, data, _rejects, test, population.sample())
+def _intervals(*every: Population) -> Iterator[Check]:
+    """BCa's, and those across tasks."""
+    normal = every[0]
+
+    def mean(of: Population, n: int) -> Check:
+        subject = f"BCa interval of a mean, n = {n}"
+        return _check(subject, of.name, _misses(of.mean), estimates.mean, of.sample(n))
+
+    yield from (mean(normal, 5), mean(normal, 10))
+    for each in every:
+        yield mean(each, RUNS)
+        subject, data = "BCa interval of a difference of means", f"{each.name} - {normal.name}"
+        errs, samples = _misses(each.mean - normal.mean), (each.sample(), normal.sample())
+        yield _check(subject, data, errs, estimates.difference_of_means, *samples)
+        subject, errs = "BCa interval of an interquartile mean", _misses(each.middle)
+        yield _check(subject, each.name, errs, estimates.interquartile_mean, each.sample())
+    for theta in (0.5, 0.8, 0.95, 0.99):
+        shift = math.sqrt(2) * float(stats.norm.ppf(theta))
+        yield _check(
+            "interval of a probability of improvement",
+            f"normal, {theta}",
+            _misses(theta),
+            estimates.probability_of_improvement,
+            partial(_normal, shift),
+            partial(_normal, 0.0),
+        )
+    yield _across(every)
 
 
-def _flip_test(first: Population, second: Population, tail: hypotheses.Alternative) -> Check:
-    test = partial(hypotheses.sign_flip_test, alternative=tail)
-    data = f"{first.name} {_SIGNS[tail]} {second.name}"
-    subject = "sign-flip test, one-tailed"
-    return _check(subject, data, _rejects, test, first.centred, second.centred)
+def _normal(mean: float, rng: np.random.Generator) -> Array:
+    return rng.normal(mean, 1, RUNS)
 
 
-def _covers(population: Population, runs: int = RUNS, *, middle: bool = False) -> Check:
-    """The interval of a mean, or of an interquartile mean."""
-    subject = f"BCa interval of a{'n interquartile mean' if middle else f' mean, n = {runs}'}"
-    errs = _misses(population.middle if middle else population.mean)
-    infer = statistics.interquartile_mean if middle else statistics.mean
-    return _check(subject, population.name, errs, infer, population.sample(runs))
-
-
-def _covers_difference(first: Population, second: Population) -> Check:
-    return _check(
-        "BCa interval of a difference of means",
-        f"{first.name} - {second.name}",
-        _misses(first.mean - second.mean),
-        statistics.difference_of_means,
-        first.sample(),
-        second.sample(),
-    )
-
-
-def _covers_studentised(name: str, *populations: Population) -> Check:
-    """The interval of the equivalence test, of a mean or a difference; its margin is idle."""
-
-    def infer(a: Array, b: Array | float = 0.0, **options: Any) -> Equivalence:
-        return bootstrap_equivalence(a, b, 1.0, **options)
-
-    subject = f"studentised bootstrap interval of a {name}"
-    data = " - ".join(each.name for each in populations)
-    return _check(subject, data, _misses(0.0), infer, *[each.centred for each in populations])
-
-
-def _covers_improvement(theta: float) -> Check:
-    shift = math.sqrt(2) * float(stats.norm.ppf(theta))
-    return _check(
-        "interval of a probability of improvement",
-        f"normal, {theta}",
-        _misses(theta),
-        statistics.probability_of_improvement,
-        lambda rng: rng.normal(shift, 1, RUNS),
-        lambda rng: rng.normal(0, 1, RUNS),
-    )
-
-
-def _covers_across(tasks: tuple[Population, ...]) -> Check:
+def _across(tasks: tuple[Population, ...]) -> Check:
     """Every task scaled to its own mean and SD, so that all of them overlap."""
     rng = np.random.default_rng(0)
     scales = [float(each.draw(rng, 1_000_000).std()) for each in tasks]
@@ -233,35 +200,39 @@ def _covers_across(tasks: tuple[Population, ...]) -> Check:
     pool = np.concatenate(list(scores(rng, 1_000_000).values()))
     truth = float(stats.trim_mean(np.sort(pool), 0.25))
     subject = "interval of an interquartile mean across tasks"
-    return _check(subject, "all four", _misses(truth), interquartile_mean, scores)
+    return _check(subject, "all four", _misses(truth), across_tasks.interquartile_mean, scores)
 
 
-def _equivalent(first: Population, second: Population, side: int) -> list[Check]:
-    """At the margin, between samples, and between a sample and a published summary."""
+def _equivalences(*every: Population) -> Iterator[Check]:
+    """Means a margin apart, of samples and beside a published summary; then the intervals."""
+    normal = every[0]
 
     def beside_summary(a: Array, b: Array, **_: object) -> Equivalence:
         published = Summary(float(b.mean()), float(b.std(ddof=1)), len(b))
         return difference(a, published, margin=MARGIN)
 
-    data = f"{first.name}, {'above' if side > 0 else 'below'}"
-    samples = first.near(side * MARGIN), second.near(0.0)
-    return [
-        _check(f"{subject}, at the margin", data, _agrees, infer, *samples, nominal=LEVEL / 2)
+    def agrees(found: Equivalence) -> bool:
+        return found.verdict == "equivalent"
+
+    def interval(a: Array, b: Array | float = 0.0, **options: Any) -> Equivalence:
+        return bootstrap_equivalence(a, b, 1.0, **options)  # the margin is idle
+
+    for each in every:
         for subject, infer in (
             ("equivalence by bootstrap", partial(bootstrap_equivalence, margin=MARGIN)),
             ("equivalence to mean ± SD (Welch)", beside_summary),
-        )
-    ]
-
-
-def main() -> None:
-    """``python -m analysis.calibration.error_rates``: print a line for each check."""
-    given = arguments(__doc__, SIMULATIONS, 0)
-    seed: int = given.seed
-    sections, rule = {"Errs": checks()}, lambda number, check: seed + number
-    for line in lines(sections, given.simulations, rule, "wilson", given.jobs):
-        print(line, flush=True)
+        ):
+            for side, word in ((1, "above"), (-1, "below")):
+                name, data = f"{subject}, at the margin", f"{each.name}, {word}"
+                samples = each.near(side * MARGIN), normal.near(0.0)
+                yield _check(name, data, agrees, infer, *samples, nominal=LEVEL / 2)
+    for each in every:
+        for kind, of in (("mean", (each,)), ("difference", (each, normal))):
+            subject = f"studentised bootstrap interval of a {kind}"
+            data = " - ".join(one.name for one in of)
+            yield _check(subject, data, _misses(0.0), interval, *(one.centred for one in of))
 
 
 if __name__ == "__main__":
-    main()
+    sections = {"Errs": list(checks())}
+    simulate(__doc__, sections, SIMULATIONS, 0, lambda seed, number, _: seed + number, "wilson")

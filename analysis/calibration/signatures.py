@@ -10,20 +10,20 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from analysis.calibration.simulation import Check, Draw, arguments, lines
-from analysis.signatures import intervals
+from analysis.calibration.simulation import Check, Draw, simulate
 from analysis.signatures.context import lead_time, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, subspaces, synergy
 from analysis.signatures.recruitment import entropy
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifice_p, sacrifices
+from analysis.statistics import intervals
+from analysis.statistics.intervals import Interval
 from coartic import Movement, corrective_trial, execute, hand_sequences, load_task
 from coartic.robot import Array
 
@@ -42,11 +42,9 @@ NULLSPACE, RANGE = subspaces(JACOBIAN)
 _SD = 0.05  # of a joint over runs
 
 Family = Callable[[np.random.Generator], tuple[Array, Array]]
-
-
-def normal(rng: np.random.Generator, n: int) -> Array:
-    """Independent joints of equal variance."""
-    return _SD * rng.standard_normal((n, len(_JOINTS)))
+"""Draws postures of a family of tasks, shape ``(n, k)``, and the position of each."""
+Infer = Callable[[np.random.Generator], Interval]
+Seen = Callable[[np.random.Generator], bool]
 
 
 def correlated(rng: np.random.Generator, n: int) -> Array:
@@ -56,17 +54,14 @@ def correlated(rng: np.random.Generator, n: int) -> Array:
     return _SD * (within @ NULLSPACE.T + across @ RANGE.T)
 
 
-def heavy(rng: np.random.Generator, n: int) -> Array:
-    """Joints with heavy tails (Student's t, 5 degrees of freedom)."""
-    return _SD * rng.standard_t(5, (n, len(_JOINTS)))
-
-
-def skewed(rng: np.random.Generator, n: int) -> Array:
-    """Joints with one-sided tails (exponential)."""
-    return _SD * rng.standard_exponential((n, len(_JOINTS)))
-
-
-SCATTERS: tuple[Draw, ...] = (normal, correlated, heavy, skewed)
+SCATTERS: dict[str, Draw] = {
+    "normal": lambda rng, n: _SD * rng.standard_normal((n, len(_JOINTS))),
+    "correlated": correlated,
+    "heavy": lambda rng, n: _SD * rng.standard_t(5, (n, len(_JOINTS))),
+    "skewed": lambda rng, n: _SD * rng.standard_exponential((n, len(_JOINTS))),
+}
+"""Of joints over runs, independent and of equal variance but for one; heavy tails are Student's
+with 5 degrees of freedom, skewed ones exponential."""
 _PARTS = {"motor-equivalent part": NULLSPACE, "non-motor-equivalent part": RANGE}
 TICKS: dict[str, Draw] = {
     "normal": lambda rng, n: 5.0 * rng.standard_normal(n),
@@ -110,36 +105,35 @@ def tests(*, planted: bool) -> list[Check]:
     """
     found: list[Check] = []
 
-    def add(subject: str, data: str, seen: Callable[..., bool], *about: Any) -> None:
-        nominal = None if planted else ALPHA
-        found.append(Check(subject, data, partial(seen, *about), nominal))
+    def add(subject: str, data: str, seen: Seen) -> None:
+        found.append(Check(subject, data, seen, None if planted else ALPHA))
 
     away = {name: 1.25 * _SD * basis[:, 0] * planted for name, basis in _PARTS.items()}
     still = away["motor-equivalent part"]
     ratios = ((20, 0.5), (20, 2.0)) if planted else ((10, 1.0), (20, 1.0))
-    for scatter in SCATTERS:
-        kind = scatter.__name__
-        for first, second in ((20, 20), (20, 8)):
-            data = f"{kind}, {first} and {second} runs"
-            add("context dependence", data, _context, scatter, first, second, None, still)
+    for kind, scatter in SCATTERS.items():
+        for second in (20, 8):
+            context = partial(_context, scatter, still, second, None)
+            add("context dependence", f"{kind}, 20 and {second} runs", context)
         for part, basis in _PARTS.items():
-            add(part, kind, _context, scatter, 20, 20, basis, away[part])
-        add("lead time", f"any, {kind}" if planted else kind, _lead, scatter, still)
+            add(part, kind, partial(_context, scatter, away[part], 20, basis))
+        add("lead time", f"any, {kind}" if planted else kind, partial(_lead, scatter, still))
         for runs, ratio in ratios:
             size = f", {ratio:g} of the SD" if planted else ""
-            add("ΔV z", f"{kind}, {runs} runs{size}", _synergy, scatter, runs, ratio)
-        for what, (shared, curve, counts) in LOCI.items():
+            rejects = _rejects(partial(_synergy, scatter, runs, ratio))
+            add("ΔV z", f"{kind}, {runs} runs{size}", rejects)
+        for what in LOCI:
             slope = (4.0 if what else 1.0) * _SD if planted else 0.0
-            family = partial(_family, scatter, slope, shared, curve, counts)
-            add("locus slope", f"{kind}{what}", _locus, family)
-            add("locus slope norm", f"{kind}{what}", _norm, family)
+            family = _family(scatter, slope, what)
+            add("locus slope", f"{kind}{what}", _rejects(partial(_slope, family)))
+            add("locus slope norm", f"{kind}{what}", _rejects(partial(_norm, family)))
     for kind, draw in TICKS.items():
         if planted:
-            add("sacrifice", kind, _sacrifice, draw, 5.0, -7.0)
+            add("sacrifice", kind, partial(_sacrifice, draw, 5.0, -7.0))
         else:
             threshold = f"{kind}, first at the threshold"
-            add("sacrifice", threshold, _sacrifice, draw, ROUNDING, -30.0)
-            add("sacrifice", f"{kind}, whole as before", _sacrifice, draw, 30.0, 0.0)
+            add("sacrifice", threshold, partial(_sacrifice, draw, ROUNDING, -30.0))
+            add("sacrifice", f"{kind}, whole as before", partial(_sacrifice, draw, 30.0, 0.0))
     if not planted:
         add("sacrifice", "no regard for later goals", _shortsighted)
     return found
@@ -155,86 +149,69 @@ def single() -> list[Check]:
     ]
 
 
-def coverage() -> list[Check]:
+def coverage() -> Iterator[Check]:
     """Every interval of a signature, by kind of value: whether it holds the true one."""
-    found: list[Check] = []
-
-    def add(subject: str, data: str, seen: Callable[..., bool], *about: Any) -> None:
-        found.append(Check(subject, data, partial(seen, *about), 1 - ALPHA))
-
+    check = partial(Check, nominal=1 - ALPHA)
     for name, (draw, mean) in VALUES.items():
         for runs in (10, 20):
-            add("mean", f"{name}, {runs} runs", _mean_held, draw, mean, runs)
+            yield check("mean", f"{name}, {runs} runs", _holds(partial(_mean, draw, runs), mean))
     for chance in (0.5, 0.9, 0.98):
         for runs in (10, 20):
-            add("share", f"of {chance:g}, {runs} runs", _share_held, chance, runs)
-    for scatter in SCATTERS:
-        kind = scatter.__name__
+            held = _holds(partial(_share, chance, runs), chance)
+            yield check("share", f"of {chance:g}, {runs} runs", held)
+    neutral = 0.5 * math.log(NULLSPACE.shape[1] / RANGE.shape[1])
+    for kind, scatter in SCATTERS.items():
         for ratio in (1.0, 0.5):
-            data = f"{kind}, 20 runs, {ratio:g} of the SD"
-            add("ΔV z", data, _synergy_held, scatter, ratio)
-        for what, (shared, curve, counts) in LOCI.items():
-            family = partial(_family, scatter, _SD, shared, curve, counts)
-            add("locus slope", f"{kind}{what}", _slope_held, family)
-    return found
+            held = _holds(partial(_synergy, scatter, 20, ratio), neutral - math.log(ratio))
+            yield check("ΔV z", f"{kind}, 20 runs, {ratio:g} of the SD", held)
+        for what in LOCI:
+            held = _holds(partial(_slope, _family(scatter, _SD, what)), _SD)
+            yield check("locus slope", f"{kind}{what}", held)
 
 
-def seed_of(number: int, check: Check, seed: int = SEED) -> list[int]:
+def _rejects(infer: Infer) -> Seen:
+    return lambda rng: infer(rng).p <= ALPHA
+
+
+def _holds(infer: Infer, truth: float) -> Seen:
+    def held(rng: np.random.Generator) -> bool:
+        found = infer(rng)
+        return found.low <= truth <= found.high
+
+    return held
+
+
+def seed_of(seed: int, number: int, check: Check) -> list[int]:
     """A seed of its own for each check, whatever else is simulated."""
     return [seed, zlib.crc32(check.name.encode())]
 
 
-def entropies(simulations: int, runs: int = 20, seed: int = SEED) -> list[tuple[float, float]]:
-    """True hand entropy, bit, and the mean of its estimate, for three sets of sequences.
+def entropies(simulations: int, seed: int = SEED) -> list[tuple[float, float]]:
+    """True hand entropy, bit, and the mean of its estimate by 20 runs, for three distributions.
 
     It has no interval: where every run has the same hands, nothing says what else there is.
     """
     found = []
     for chances in ((0.95, 0.05), (0.7, 0.3), (0.73, 0.17, 0.1)):
-        rng = np.random.default_rng([seed, runs, len(chances)])
-        draws = rng.choice(len(chances), p=chances, size=(simulations, runs))
+        rng = np.random.default_rng([seed, 20, len(chances)])
+        draws = rng.choice(len(chances), p=chances, size=(simulations, 20))
         estimates = [entropy(map(str, row)) for row in draws.tolist()]
         found.append((float(stats.entropy(chances, base=2)), float(np.mean(estimates))))
     return found
 
 
-def _mean_held(draw: Draw, truth: float, runs: int, rng: np.random.Generator) -> bool:
-    _, low, high = intervals.mean(draw(rng, runs))
-    return low <= truth <= high
+def _mean(draw: Draw, runs: int, rng: np.random.Generator) -> Interval:
+    return intervals.mean(draw(rng, runs))
 
 
-def _share_held(chance: float, runs: int, rng: np.random.Generator) -> bool:
-    _, low, high = intervals.share((rng.random(runs) < chance).tolist())
-    return low <= chance <= high
-
-
-def _synergy_held(scatter: Draw, ratio: float, rng: np.random.Generator) -> bool:
-    """Equal variances per dimension, those that move the hand times the ratio's square."""
-    found = synergy(_POSTURE + _squeezed(scatter(rng, 20), ratio), JACOBIAN)
-    return found.low <= found.neutral - math.log(ratio) <= found.high
-
-
-def _slope_held(family: Family, rng: np.random.Generator) -> bool:
-    postures, places = family(rng)
-    slope = locus_slopes(postures[:, :1], places)[0]
-    return slope.low <= _SD <= slope.high
-
-
-def _squeezed(postures: Array, ratio: float) -> Array:
-    """Deviations that move the hand, times a ratio."""
-    across: Array = postures @ RANGE @ RANGE.T
-    return postures + (ratio - 1.0) * across
+def _share(chance: float, runs: int, rng: np.random.Generator) -> Interval:
+    return intervals.share((rng.random(runs) < chance).tolist())
 
 
 def _context(
-    scatter: Draw,
-    first: int,
-    second: int,
-    basis: Array | None,
-    shift: Array,
-    rng: np.random.Generator,
+    scatter: Draw, shift: Array, second: int, basis: Array | None, rng: np.random.Generator
 ) -> bool:
-    groups = scatter(rng, first) + shift, scatter(rng, second)
+    groups = scatter(rng, 20) + shift, scatter(rng, second)
     return permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA
 
 
@@ -247,36 +224,37 @@ def _lead(scatter: Draw, shift: Array, rng: np.random.Generator) -> bool:
     return lead_time(first, second, rng, alpha=ALPHA, resamples=RESAMPLES) is not None
 
 
-def _synergy(scatter: Draw, runs: int, ratio: float, rng: np.random.Generator) -> bool:
-    return synergy(_POSTURE + _squeezed(scatter(rng, runs), ratio), JACOBIAN).p <= ALPHA
+def _synergy(scatter: Draw, runs: int, ratio: float, rng: np.random.Generator) -> Interval:
+    """Equal variances per dimension, those that move the hand times the ratio's square."""
+    postures = scatter(rng, runs)
+    across: Array = postures @ RANGE @ RANGE.T
+    return synergy(_POSTURE + (postures + (ratio - 1.0) * across), JACOBIAN).z
 
 
-def _family(
-    scatter: Draw,
-    slope: float,
-    shared: float,
-    curve: float,
-    runs: tuple[int, ...],
-    rng: np.random.Generator,
-) -> tuple[Array, Array]:
-    """Postures of a family of tasks, shape ``(n, k)``, and positions; the first joint follows."""
+def _family(scatter: Draw, slope: float, what: str) -> Family:
+    """A family of :data:`LOCI` whose first joint follows the moving goal."""
+    shared, curve, runs = LOCI[what]
     middle = PLACES.mean()
     bend = (PLACES - middle) ** 2
-    bend *= curve * _SD / bend.max()
-    of_task = shared * scatter(rng, len(PLACES))
-    of_task[:, 0] += slope * (PLACES - middle) + bend
-    places = np.repeat(np.arange(len(PLACES)), runs)
-    return of_task[places] + scatter(rng, len(places)), PLACES[places]
+    line = slope * (PLACES - middle) + bend * (curve * _SD / bend.max())
+
+    def drawn(rng: np.random.Generator) -> tuple[Array, Array]:
+        of_task = shared * scatter(rng, len(PLACES))
+        of_task[:, 0] += line
+        places = np.repeat(np.arange(len(PLACES)), runs)
+        return of_task[places] + scatter(rng, len(places)), PLACES[places]
+
+    return drawn
 
 
-def _locus(family: Family, rng: np.random.Generator) -> bool:
-    """The first joint alone is looked at."""
+def _slope(family: Family, rng: np.random.Generator) -> Interval:
+    """Of the first joint alone."""
     postures, places = family(rng)
-    return locus_slopes(postures[:, :1], places)[0].p <= ALPHA
+    return locus_slopes(postures[:, :1], places)[0]
 
 
-def _norm(family: Family, rng: np.random.Generator) -> bool:
-    return slope_norm(*family(rng), rng).p <= ALPHA
+def _norm(family: Family, rng: np.random.Generator) -> Interval:
+    return slope_norm(*family(rng), rng)
 
 
 def _sacrifice(draw: Draw, first: float, total: float, rng: np.random.Generator) -> bool:
@@ -291,13 +269,13 @@ def _sacrificed(changes: Array, rng: np.random.Generator) -> bool:
 
 
 @cache
-def _without_regard(seed: int = SEED) -> Array:
+def _without_regard() -> Array:
     """Changes of runs that have no regard for later goals, shape ``(160, 4)``.
 
     On two-armed task 1, ten with every hand sequence: the corrective process's postures with
     noise (0.05, as the learner's), against the corrective process with the same hands.
     """
-    task, rng = load_task("two-armed-1"), np.random.default_rng(seed)
+    task, rng = load_task("two-armed-1"), np.random.default_rng(SEED)
     changes = []
     for alone in [corrective_trial(task, hands) for hands in hand_sequences(task)]:
         for _ in range(10):
@@ -331,22 +309,14 @@ def _one_sacrifice(rng: np.random.Generator) -> bool:
     return sacrifices(np.round([7.0 + first, -23.0 + rest]))
 
 
-def main() -> None:
-    """Print one line per check; what departs from its nominal rate is marked."""
-    given = arguments(__doc__, SIMULATIONS, SEED)
+if __name__ == "__main__":
     sections = {
         f"Nulls: rejected at {ALPHA:.0%}": tests(planted=False),
         "Planted effects: detected": tests(planted=True),
         "Yes or no of one run: yes": single(),
-        f"Intervals of {1 - ALPHA:.0%}: hold the true value": coverage(),
+        f"Intervals of {1 - ALPHA:.0%}: hold the true value": list(coverage()),
     }
-    rule = partial(seed_of, seed=given.seed)
-    for line in lines(sections, given.simulations, rule, jobs=given.jobs):
-        print(line, flush=True)
+    asked = simulate(__doc__, sections, SIMULATIONS, SEED, seed_of)
     print("\nHand entropy of 20 runs, bit: true, mean estimate")
-    for truth, estimate in entropies(given.simulations, seed=given.seed):
+    for truth, estimate in entropies(asked.simulations, seed=asked.seed):
         print(f"{truth:.3f}  {estimate:.3f}")
-
-
-if __name__ == "__main__":
-    main()

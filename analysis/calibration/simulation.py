@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from functools import partial
+from typing import Literal
 
 import numpy as np
 from joblib import Parallel, delayed
 from scipy import stats
 
+from analysis.statistics.intervals import Interval
 from coartic.robot import Array
 
 Draw = Callable[[np.random.Generator, int], Array]
@@ -34,37 +36,23 @@ class Check:
         return f"{self.subject}, {self.data}"
 
 
-class Rate(NamedTuple):
-    """Share of data sets in which something is seen, with its 95 % interval."""
-
-    share: float
-    low: float
-    high: float
-
-    def mark(self, nominal: float | None) -> str:
-        """Says so where the interval excludes the nominal rate."""
-        if nominal is None or self.low <= nominal <= self.high:
-            return ""
-        return "ABOVE" if self.low > nominal else "BELOW"
-
-
 Seed = int | Sequence[int]
-Interval = Literal["wilson", "exact"]
+Method = Literal["wilson", "exact"]
 
 
-def rate(check: Check, simulations: int, seed: Seed, interval: Interval = "exact") -> Rate:
+def rate(check: Check, simulations: int, seed: Seed, method: Method = "exact") -> Interval:
     """How often a check sees something in so many data sets; the same seed, the same rate."""
     rng = np.random.default_rng(seed)
     seen = sum(bool(check.seen(rng)) for _ in range(simulations))
-    low, high = stats.binomtest(seen, simulations).proportion_ci(0.95, method=interval)
-    return Rate(seen / simulations, float(low), float(high))
+    low, high = stats.binomtest(seen, simulations).proportion_ci(0.95, method=method)
+    return Interval(seen / simulations, float(low), float(high))
 
 
 def lines(
     sections: Mapping[str, Sequence[Check]],
     simulations: int,
     seed_of: Callable[[int, Check], Seed],
-    interval: Interval = "exact",
+    method: Method = "exact",
     jobs: int = 1,
 ) -> Iterator[str]:
     """One a check, under titles, with a mark where it departs from its nominal rate.
@@ -73,19 +61,32 @@ def lines(
     """
     plan = [check for checks in sections.values() for check in checks]
     found = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(rate)(check, simulations, seed_of(number, check), interval)
+        delayed(rate)(check, simulations, seed_of(number, check), method)
         for number, check in enumerate(plan)
     )
     for title, checks in sections.items():
         yield f"\n{title}"
         for check in checks:
-            own: Rate = next(found)
-            line = f"{check.name:70} {own.share:6.2%}  [{own.low:.2%}, {own.high:.2%}]"
-            yield f"{line}  {own.mark(check.nominal)}".rstrip()
+            own: Interval = next(found)
+            line = f"{check.name:70} {own.value:6.2%}  [{own.low:.2%}, {own.high:.2%}]"
+            due = own.value if check.nominal is None else check.nominal
+            mark = "ABOVE" if own.low > due else "BELOW" if own.high < due else ""
+            yield f"{line}  {mark}".rstrip()
 
 
-def arguments(words: str | None, simulations: int, seed: int) -> argparse.Namespace:
-    """Those of a command that simulates; exits with a sentence where they are of no use."""
+def simulate(
+    words: str | None,
+    sections: Mapping[str, Sequence[Check]],
+    simulations: int,
+    seed: int,
+    seed_of: Callable[[int, int, Check], Seed],
+    method: Method = "exact",
+) -> argparse.Namespace:
+    """A command that prints :func:`lines`; ``seed_of`` takes the seed asked for before the rest.
+
+    ``words``, of which the first line is shown, say what it does; ``simulations`` and ``seed``
+    are what it does unless asked otherwise. Exits with a sentence where that is of no use.
+    """
     parser = argparse.ArgumentParser(description=(words or "").split("\n")[0])
     parser.add_argument("--simulations", type=int, default=simulations)
     parser.add_argument("--seed", type=int, default=seed)
@@ -94,4 +95,7 @@ def arguments(words: str | None, simulations: int, seed: int) -> argparse.Namesp
     if given.simulations < 1:
         parser.error("at least one simulation")
     print(f"{given.simulations} simulated data sets each, seed {given.seed}; intervals at 95 %")
+    rule = partial(seed_of, given.seed)
+    for line in lines(sections, given.simulations, rule, method, given.jobs):
+        print(line, flush=True)
     return given

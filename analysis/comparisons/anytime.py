@@ -24,7 +24,7 @@ COLUMNS = (
 )
 
 
-def anytime_curves(study: Study, *, seed: int = 0) -> pd.DataFrame:
+def anytime_curves(study: Study) -> pd.DataFrame:
     """Best reward so far within a budget: one row per task, method, spend and budget.
 
     Columns: ``task``, ``method``, ``spend``, ``kind`` (``curve`` for methods that learn by
@@ -36,8 +36,8 @@ def anytime_curves(study: Study, *, seed: int = 0) -> pd.DataFrame:
     that nothing is extrapolated. The mean is missing until every run has a solution, never
     one of the faster runs alone; the median counts a run without one as worse than any.
     Intervals are those of :func:`analysis.statistics.resampling.mean_interval`, pointwise, not
-    a band around the whole curve; they are missing for a single run. ``seed`` is that of the
-    resampling; a cell's rows do not depend on other cells. Runs whose time is not taken
+    a band around the whole curve; they are missing for a single run. A cell's rows do not depend
+    on other cells. Runs whose time is not taken
     (:func:`analysis.comparisons.methods.solve_times`) have no part in the curve over time, nor
     methods with a base that a parameter locks in any.
     """
@@ -48,20 +48,20 @@ def anytime_curves(study: Study, *, seed: int = 0) -> pd.DataFrame:
         head = {"task": cell.task, "method": cell.label, "spend": spend}
         head["kind"] = "curve" if learns else "point"
         if len(budgets):
-            rewards = _rewards(runs, spend, budgets, learns, seed)
+            rewards = _rewards(runs, spend, budgets, learns)
             parts.append(pd.DataFrame({**head, "budget": budgets, "runs": len(runs), **rewards}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=COLUMNS)
 
 
 def _rewards(
-    runs: Sequence[BestSoFar], spend: str, budgets: Array, learns: bool, seed: int
+    runs: Sequence[BestSoFar], spend: str, budgets: Array, learns: bool
 ) -> dict[str, Array]:
     """What the runs have reached within each budget (k,)."""
     # The spread of what planners spend is not one of their reward: theirs is of whole runs.
     within = budgets if learns else np.array([math.inf])
     values = np.array([run.best(spend, within) for run in runs])
     solved = np.isfinite(values)
-    mean, low, high = mean_interval(np.where(solved.all(axis=0), values, math.nan), seed)
+    mean, low, high = mean_interval(np.where(solved.all(axis=0), values, math.nan))
     median = np.median(values, axis=0)
     median[~np.isfinite(median)] = math.nan
     return {"solved": solved.sum(axis=0), "mean": mean, "low": low, "high": high, "median": median}

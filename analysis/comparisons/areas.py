@@ -29,7 +29,7 @@ class Area(NamedTuple):
     high: float
 
 
-def areas(study: Study, *, seed: int = 0) -> pd.DataFrame:
+def areas(study: Study) -> pd.DataFrame:
     """Area under the anytime curve: one row per other arm, task, method and spend.
 
     The area of a run is its gap to the optimum R*, averaged over the logarithm of the
@@ -61,7 +61,7 @@ def areas(study: Study, *, seed: int = 0) -> pd.DataFrame:
             continue
         start = end / trials
         each = np.array([[_area(run, spend, best, start, end)] for run in runs])
-        mean, low, high = (float(value[0]) for value in mean_interval(each, seed))
+        mean, low, high = (float(value[0]) for value in mean_interval(each))
         head = cell.task, cell.label, other_arm, spend, start, end
         rows.append(Area(*head, len(runs), mean, low, high))
     return pd.DataFrame(rows, columns=Area._fields)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from analysis.results.folder import CellRuns
+from analysis.results.folder import CellKey, CellRuns
 from analysis.results.optima import locks_base
 from analysis.statistics.spread import sd
 from analysis.words import tally
@@ -92,15 +92,16 @@ class MethodRow:
         return self.forward_kinematics + self.jacobians
 
 
-def method_rows(study: Study) -> list[MethodRow]:
-    """A row per task and method: within a task the optimum, then the best mean reward first."""
+def method_rows(study: Study) -> dict[CellKey, MethodRow]:
+    """Every method on every task: within a task the optimum, then the best mean reward first."""
     order = {name: place for place, name in enumerate(study.tasks)}
 
     def place(row: MethodRow) -> tuple[int, bool, float]:
         worst_last = math.inf if math.isnan(row.reward) else -row.reward
         return order[row.task], not row.method.startswith(SEARCH), worst_last
 
-    return sorted((_row(study, cell) for cell in study.cells.values()), key=place)
+    rows = sorted((_row(study, cell) for cell in study.cells.values()), key=place)
+    return {(row.task, row.label): row for row in rows}
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:

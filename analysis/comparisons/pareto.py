@@ -29,7 +29,7 @@ COLUMNS = (
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
-def pareto_sets(study: Study, *, seed: int = 0) -> pd.DataFrame:
+def pareto_sets(study: Study) -> pd.DataFrame:
     """Mean reward against spend: one row per task, method and spend, best reward first.
 
     A method is on the front if no other has a mean reward as high for as little spend, with
@@ -50,7 +50,7 @@ def pareto_sets(study: Study, *, seed: int = 0) -> pd.DataFrame:
     left out: a mean of the others flatters them. So are the optimum's searches, which are
     references, and methods with a base that a parameter locks.
     """
-    parts = [part for task in study.tasks for part in _fronts(study, _solving(study, task), seed)]
+    parts = [part for task in study.tasks for part in _fronts(study, _solving(study, task))]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=COLUMNS)
 
 
@@ -66,7 +66,7 @@ def _solving(study: Study, task: str) -> list[CellRuns]:
     ]
 
 
-def _fronts(study: Study, cells: Sequence[CellRuns], seed: int) -> Iterator[pd.DataFrame]:
+def _fronts(study: Study, cells: Sequence[CellRuns]) -> Iterator[pd.DataFrame]:
     """The fronts of one task, one a spend."""
     if not cells:
         return
@@ -75,11 +75,11 @@ def _fronts(study: Study, cells: Sequence[CellRuns], seed: int) -> Iterator[pd.D
     no_more: Flags = np.array([[other <= own for other in told] for own in told])
     reward = np.array([row.reward for row in rows])
     rewards = [cell.runs.reward.to_numpy(dtype=np.float64) for cell in cells]
-    rewards_again = np.stack([resampled(each, seed).mean(axis=-1) for each in rewards], axis=-1)
+    rewards_again = np.stack([resampled(each).mean(axis=-1) for each in rewards], axis=-1)
     for spend in LABELS:
         spent = [_spent(cell, spend, len(row.told)) for cell, row in zip(cells, rows, strict=True)]
         amount = np.array([float(_median(each)) for each in spent])
-        amounts = np.stack([_median(resampled(each, seed)) for each in spent], axis=-1)
+        amounts = np.stack([_median(resampled(each)) for each in spent], axis=-1)
         tolerance = TIME_TOLERANCE if spend == "solve_s" else 0.0
         worse = dominated(reward, amount, tolerance)
         again = dominated(rewards_again, amounts, tolerance)

@@ -13,7 +13,7 @@ import pandas as pd
 
 from analysis.comparisons.methods import STILL, solve_times
 from analysis.results.folder import CellRuns, Results
-from analysis.results.optima import locks_base
+from analysis.results.optima import ARMS, locks_base
 from coartic.robot import Array
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ LABELS = {
     "information": "information",
 }
 """Spends in short. Jacobians and kinds of information are known of whole runs alone."""
-OTHER_ARMS = ("free", "still")
-"""Whose optimum: with all joints free, or with the arm that is not chosen kept still."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,7 @@ def cells_by_optimum(
     study: Study,
 ) -> Iterator[tuple[str, int, CellRuns, str, list[BestSoFar]]]:
     """The same with other arm and reward of each optimum that the method's solutions keep to."""
-    for other_arm in OTHER_ARMS:
+    for other_arm in ARMS:
         for cell, spend, runs in cells_by_spend(study):
             best = study.optima.get((cell.task, other_arm))
             keeps = other_arm == "free" or (cell.good.other_arm_travel <= STILL).all()

@@ -10,13 +10,14 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import median, solve_times
+from analysis.comparisons.methods import MethodRow
 from analysis.comparisons.surroundings import Differing, codes, differing_tasks, surroundings
 from analysis.results.folder import CellRuns
 from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
@@ -25,16 +26,9 @@ from analysis.statistics.hypotheses import bootstrap_test, holm
 from analysis.study import Study, load
 from coartic import CoarticError
 from coartic.robot import Array
-from coartic.tables import label_of
 
-SPENT = {
-    "trials": "trials",
-    "movement_ticks": "ticks",
-    "forward_kinematics": "kinematics",
-    "jacobians": "Jacobians",
-    "solve_s": "solve time",
-}
-"""Spends whose medians are compared, in words."""
+SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
+"""Spends whose medians are compared."""
 VERDICTS = {
     "identical": "identical in every run",
     "equivalent": "not identical, equivalent",
@@ -46,25 +40,21 @@ VERDICTS = {
 """What becomes of a cell, in words."""
 
 
+_SIDES = {"n": "runs", "solved": "solved", "mean": "reward", **{name: name for name in SPENT}}
+_OF_SIDES = [f"{name}_{side}" for name in _SIDES for side in "ab"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class VersionRow:
     """A cell that both folders have; NaN where there is no number.
 
-    The fields are the columns of the table that ``coartic compare --csv`` writes.
+    The fields are columns of the table that ``coartic compare --csv`` writes. That has task,
+    method and variant as well, and of either side (``_a``, ``_b``) ``n`` runs, ``solved`` with a
+    solution, ``mean`` reward in ticks, and medians over runs of what is spent, time in s.
     """
 
-    task: str
-    method: str
-    variant: str
-    n_a: int
-    """Runs."""
-    n_b: int
-    solved_a: int
-    """Runs with a solution."""
-    solved_b: int
-    mean_a: float = math.nan
-    """Reward, ticks."""
-    mean_b: float = math.nan
+    a: MethodRow
+    b: MethodRow
     shared: int
     """Seeds that both have."""
     identical: int
@@ -84,27 +74,18 @@ class VersionRow:
     """Ticks within which the means count as equivalent."""
     verdict: str = "not compared"
     """Of :data:`VERDICTS`; ``remarks`` say why a cell is not compared."""
-    trials_a: float = math.nan
-    """Medians over runs of what is spent, time in s."""
-    trials_b: float = math.nan
-    movement_ticks_a: float = math.nan
-    movement_ticks_b: float = math.nan
-    forward_kinematics_a: float = math.nan
-    forward_kinematics_b: float = math.nan
-    jacobians_a: float = math.nan
-    jacobians_b: float = math.nan
-    solve_s_a: float = math.nan
-    solve_s_b: float = math.nan
     remarks: str
 
-    @property
-    def label(self) -> str:
-        """The method with its variant."""
-        return label_of(self.method, self.variant)
+    def both(self, name: str) -> tuple[float, float]:
+        """A field of A and B; NaN where it is not compared."""
+        if self.verdict == "not compared" and name not in ("runs", "solved"):
+            return math.nan, math.nan
+        return getattr(self.a, name), getattr(self.b, name)
 
-    def spent(self, name: str) -> tuple[float, float]:
-        """What A and B spent, of :data:`SPENT`."""
-        return getattr(self, f"{name}_a"), getattr(self, f"{name}_b")
+    def columns(self) -> dict[str, Any]:
+        """Its values by column."""
+        sides = chain.from_iterable(map(self.both, _SIDES.values()))
+        return {**vars(self.a), **vars(self), **dict(zip(_OF_SIDES, sides, strict=True))}
 
 
 @dataclass(frozen=True)
@@ -125,9 +106,11 @@ class VersionComparison:
 
     @property
     def cells(self) -> pd.DataFrame:
-        """The rows with the fields of :class:`VersionRow` as columns."""
-        columns = [field.name for field in fields(VersionRow)]
-        return pd.DataFrame(list(self.rows), columns=columns)
+        """The rows with the columns that :class:`VersionRow` describes."""
+        compared = [field.name for field in fields(VersionRow)][2:-1]
+        counted, spent = _OF_SIDES[: -2 * len(SPENT)], _OF_SIDES[-2 * len(SPENT) :]
+        columns = ["task", "method", "variant", *counted, *compared, *spent, "remarks"]
+        return pd.DataFrame([row.columns() for row in self.rows], columns=columns)
 
     @property
     def summary(self) -> list[str]:
@@ -175,45 +158,43 @@ def _rows(first: Study, second: Study) -> list[VersionRow]:
     for key, cell in first.cells.items():
         if key in second.cells:
             other = ours[cell.method] != theirs[cell.method]
-            rows.append(_row(cell, second.cells[key], tasks.get(cell.task), other_code=other))
+            made = VersionRow(
+                a=first.method_rows[key],
+                b=second.method_rows[key],
+                **_runs(cell, second.cells[key], tasks.get(cell.task), other_code=other),
+            )
+            rows.append(_compared(made, cell.good, second.cells[key].good))
     adjusted = holm([row.p for row in rows])
     return [replace(row, p_adjusted=p) for row, p in zip(rows, adjusted, strict=True)]
 
 
-def _row(
+def _runs(
     first: CellRuns, second: CellRuns, differing: list[str] | None, *, other_code: bool
-) -> VersionRow:
-    """A cell of both; ``differing``: keys in which its tasks differ, None where in none."""
-    a, b = first.good, second.good
+) -> dict[str, Any]:
+    """Runs that both have; ``differing``: keys in which the tasks differ, None where in none."""
     both = first.runs.merge(second.runs, on="seed", suffixes=("_a", "_b"), validate="1:1")
-    failed = [
-        f"{side} solved {len(good)} of {len(cell.runs)}"
-        for side, good, cell in (("A", a, first), ("B", b, second))
-        if len(good) < len(cell.runs) or not len(good)
+    remarks = [
+        f"{side} solved {len(cell.good)} of {len(cell.runs)}"
+        for side, cell in (("A", first), ("B", second))
+        if len(cell.good) < len(cell.runs) or not len(cell.good)
     ]
-    remarks = [*failed, _parameters(first, second)]
+    compared = not differing and not remarks
+    remarks.append(_parameters(first, second))
     if differing:  # the rewards of two tasks say nothing of each other
         remarks = [f"the tasks of this name differ: {', '.join(differing)}"]
     remarks += ["other code"] if other_code else []
-    row = VersionRow(
-        task=first.task,
-        method=first.method,
-        variant=first.variant,
-        n_a=len(first.runs),
-        n_b=len(second.runs),
-        solved_a=len(a),
-        solved_b=len(b),
-        shared=len(both),
-        identical=0 if differing else int((both.result_a == both.result_b).sum()),
-        remarks="; ".join(filter(None, remarks)),
-    )
-    if differing or failed:
+    identical = 0 if differing else int((both.result_a == both.result_b).sum())
+    return {
+        "shared": len(both),
+        "identical": identical,
+        "verdict": "no interval" if compared else "not compared",
+        "remarks": "; ".join(filter(None, remarks)),
+    }
+
+
+def _compared(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> VersionRow:
+    if row.verdict == "not compared":
         return row
-    found: dict[str, Any] = {"mean_a": float(a.reward.mean()), "mean_b": float(b.reward.mean())}
-    for side, good in (("a", a), ("b", b)):
-        spent = good.assign(solve_s=solve_times(good))
-        found |= {f"{name}_{side}": median(spent[name]) for name in SPENT}
-    row = replace(row, **found)
     if row.identical == len(a) == len(b):
         return replace(row, verdict="identical", paired=True, difference=0.0)
     return _with_difference(row, a, b)
@@ -234,9 +215,8 @@ def _with_difference(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> Versi
         low=found.low,
         high=found.high,
         p=bootstrap_test(*samples, "two-sided", seed=SEED).p,
-        verdict="no interval",
     )
-    margin = MARGIN * abs(row.mean_a)
+    margin = MARGIN * abs(row.a.reward)
     if not margin or min(len(a), len(b)) < FEWEST:
         return row
     agreed = bootstrap_equivalence(*samples, margin, seed=SEED)

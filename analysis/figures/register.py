@@ -22,6 +22,7 @@ from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_of
 from analysis.study import Study
 from coartic import CoarticError
+from coartic.text import did_you_mean
 
 Section = Literal[
     "tasks-drawn", "paper", "movements", "learning", "methods", "cost", "coarticulation"
@@ -106,14 +107,18 @@ class Figures(Mapping[str, Figure]):
     def plot(self, name: str) -> Plot:
         """A figure with its words and numbers, by its id; KeyError where there is none."""
         for entry in REGISTER:
-            if name.startswith(entry.name):
+            if str(name).startswith(entry.name):
                 found = self._found(entry)
                 if isinstance(found, CoarticError):
-                    raise KeyError(f"no figure {name}: {found}")
+                    raise KeyError(f"no figure {name!r}: {found}")
                 for plot in found:
                     if plot.id == name:
                         return plot
-        raise KeyError(f"no figure {name}; there are {', '.join(self)}")
+        hint = did_you_mean(str(name), self) or f"; there are {', '.join(self)}"
+        raise KeyError(f"no figure {name!r}{hint}")
+
+    def __repr__(self) -> str:
+        return f"Figures by id, of {self._study!r}"
 
     def __getitem__(self, name: str) -> Figure:
         """The figure alone."""

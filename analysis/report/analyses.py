@@ -13,10 +13,10 @@ from analysis.study import Study
 def analyse(study: Study) -> dict[str, bytes]:
     """All pages and tables by file name."""
     pages = {
-        "claims.md": markdown(claims_document(study), tables=""),
-        "comparisons.md": markdown(comparisons_document(study), tables=""),
-        "frontier.md": markdown(frontier_document(study), tables=""),
-        "signatures.md": markdown(signatures_document(study), tables=""),
+        "claims.md": claims_document,
+        "comparisons.md": comparisons_document,
+        "frontier.md": frontier_document,
+        "signatures.md": signatures_document,
     }
     tables = {
         "claims.csv": study.claims,
@@ -29,5 +29,6 @@ def analyse(study: Study) -> dict[str, bytes]:
         "areas.csv": study.areas,
         "pareto.csv": study.pareto,
     }
-    texts = pages | {name: table.to_csv(index=False) for name, table in tables.items()}
+    texts = {name: markdown(page(study), tables="") for name, page in pages.items()}
+    texts |= {name: table.to_csv(index=False) for name, table in tables.items()}
     return {name: text.encode() for name, text in texts.items()}

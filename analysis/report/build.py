@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,6 @@ from analysis.figures import Figures, Plot
 from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.figures.register import Section as FigureSection
 from analysis.markup import escaped, words
-from analysis.report import tables
 from analysis.report.document import (
     Block,
     Bullets,
@@ -28,7 +26,6 @@ from analysis.report.document import (
 )
 from analysis.report.formats.csv import table_csv
 from analysis.report.headlines import headline_numbers
-from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
 from analysis.report.pages.claims import claim_section
@@ -41,7 +38,14 @@ from analysis.report.summary import (
     version_text,
     without_variants,
 )
+from analysis.report.tables.claims import claims_table
+from analysis.report.tables.common import table_ids
+from analysis.report.tables.contexts import contexts_table, slopes_tables
+from analysis.report.tables.cost import reading_of_cost
+from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
+from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.report.tables.paper import beside_paper
+from analysis.report.tables.signatures import signatures_tables
 from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
@@ -123,9 +127,12 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
     return (section for section in sections if section.blocks or section.sections)
 
 
-def write(report: Report, study: Study, folder: Path) -> None:
+def write(
+    report: Report, study: Study, folder: Path, *, begin: Callable[[], object] = lambda: None
+) -> None:
     """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
 
+    ``begin`` is called when all is made and nothing written.
     Raises CoarticError where it cannot be written, or something is in the way.
     """
     check_report_folder(folder, study.results.folder)
@@ -135,8 +142,10 @@ def write(report: Report, study: Study, folder: Path) -> None:
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study, report.document, report.numbers),
     }
-    render = partial(rendered, endings=report.formats)
-    write_report(report.document, report.plots, folder, extra, render=render)
+    figures: dict[str, bytes] = {}
+    for plot in report.plots:
+        figures |= rendered(plot, endings=report.formats)
+    write_report(report.document, figures, folder, extra, begin=begin)
 
 
 def _title(results: Results) -> str:
@@ -156,7 +165,7 @@ def _lead(results: Results) -> str:
 def _summary(study: Study) -> Section:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
-    runs, labels = counted(len(results.runs), "run"), {cell.label for cell in results.cells}
+    runs, labels = counted(len(results.runs), "run"), {label for _, label in results.cells}
     facts = (
         f"{counted(len(results.tasks), 'task')}, {counted(len(labels), 'method')} with their "
         f"variants, {counted(len(results.cells), 'cell')}; "
@@ -168,7 +177,7 @@ def _summary(study: Study) -> Section:
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         items = (*items, note)
     blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study)), Bullets(items)]
-    overall = tables.overall_table(study)
+    overall = overall_table(study)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
     return _section("summary", "Summary", blocks)
@@ -190,7 +199,7 @@ def _by_task(
     study: Study, name: str, blocks_of: Callable[[str], Sequence[Block]]
 ) -> Iterator[Section]:
     """A section a task, where there is something to show of it."""
-    for task, slug in tables.table_ids(study).items():
+    for task, slug in table_ids(study).items():
         blocks = blocks_of(task)
         if blocks:
             yield _section(f"on-{slug}-{name}", task, blocks)
@@ -200,15 +209,15 @@ def _methods(study: Study, figures: list[Block]) -> Section:
     pairs = not _many(study)
 
     def of(task: str) -> list[Block]:
-        blocks = _tables(tables.methods_table(study, task))
+        blocks = _tables(methods_table(study, task))
         if pairs:
-            both = tables.pairwise_table(study, task), tables.cost_table(study, task)
+            both = pairwise_table(study, task), cost_table(study, task)
             blocks += _tables(*both, folded=True)
         return blocks
 
-    reading = tables.reading_of_methods(study)
+    reading = reading_of_methods(study)
     if study.pair_rows and pairs:
-        reading += tables.reading_of_pairs(study)
+        reading += reading_of_pairs(study)
     below = _by_task(study, "methods", of)
     return _section("methods", "Methods side by side", [*figures, Bullets(reading)], below)
 
@@ -223,7 +232,7 @@ def _cost(study: Study, figures: list[Block]) -> Section:
         folded = [replace(table, folded=True) for table in found[1:]]
         return [optima_known(study, task), *found[:1], *folded] if found else []
 
-    reading = Bullets(tables.READING_OF_COST)
+    reading = Bullets(reading_of_cost())
     return _section("cost", title, [*figures, reading], _by_task(study, "cost", of))
 
 
@@ -232,9 +241,9 @@ def _signatures(study: Study, figures: list[Block]) -> Section:
     below = _by_task(
         study,
         "signatures",
-        lambda task: _tables(*tables.signatures_tables(study, task, short=short)),
+        lambda task: _tables(*signatures_tables(study, task, short=short)),
     )
-    between = _tables(tables.contexts_table(study), *tables.slopes_tables(study))
+    between = _tables(contexts_table(study), *slopes_tables(study))
     title = "Signatures of coarticulation"
     return _section("coarticulation", title, [*figures, *between], below)
 
@@ -242,7 +251,7 @@ def _signatures(study: Study, figures: list[Block]) -> Section:
 def _claims(study: Study, figures: Mapping[str, str]) -> Section:
     found = [claim_section(entry, figures) for entry in study.judged]
     each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(found), folded=True)
-    return _section(CLAIMS, "Claims", _tables(tables.claims_table(study)), [each])
+    return _section(CLAIMS, "Claims", _tables(claims_table(study)), [each])
 
 
 def _about(
@@ -289,8 +298,7 @@ def _section(
 
 
 def _tables(*found: DataTable | None, folded: bool = False) -> list[Block]:
-    made = (with_legends(table) for table in found if table is not None)
-    return [replace(table, folded=folded or table.folded) for table in made]
+    return [replace(table, folded=folded or table.folded) for table in filter(None, found)]
 
 
 def _figure(plot: Plot) -> FigureBlock:

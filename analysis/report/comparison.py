@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from analysis.markup import code, escaped, words
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
-from analysis.report.legends import with_legends
 from analysis.report.limitations import limitations
 from analysis.report.summary import version_text
-from analysis.report.tables import methods_table, reading_of_methods, table_ids
+from analysis.report.tables.common import table_ids
+from analysis.report.tables.methods import methods_table, reading_of_methods
 from analysis.report.tables.paper import beside_paper
 from coartic.text import counted
 
@@ -72,9 +72,8 @@ def _made(study: Study) -> str:
 def _noted(tables: Iterable[DataTable | None], said: set[str]) -> tuple[Block, ...]:
     """The tables that there are, each with the notes that were not ``said`` before."""
     found: list[Block] = []
-    for table in tables:
-        if table is not None:
-            notes = with_legends(table).notes
-            found.append(replace(table, notes=tuple(note for note in notes if note not in said)))
-            said.update(notes)
+    for table in filter(None, tables):
+        fresh = tuple(note for note in table.notes if note not in said)
+        found.append(replace(table, notes=fresh))
+        said.update(fresh)
     return tuple(found)

@@ -14,7 +14,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
+
+from analysis.results.optima import OtherArm
 
 RestsOn = Literal["runs", "optimum", "paper", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, the paper, words of
@@ -62,6 +66,8 @@ Value = float | int | str | Estimate | None
 class Column:
     """One column of a table."""
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
     name: str
     """Of the CSV column: a Python identifier, stable."""
     header: str
@@ -77,7 +83,7 @@ class Column:
     """Header of the intervals, where values have them."""
     rests_on: tuple[RestsOn, ...] = ()
     """What its values were computed from; of numbers there is always something."""
-    other_arm: Literal["free", "still"] = "free"
+    other_arm: OtherArm = "free"
     """Of the optimum that it rests on, if it does."""
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has
@@ -102,6 +108,11 @@ class Row:
     """By column name, what a value was computed from where it is something else."""
     link: str = ""
     """Address within the page that the row's name leads to."""
+
+    @property
+    def all_cells(self) -> set[CellKey]:
+        """What any of its values was computed from."""
+        return {*self.cells}.union(*self.cells_by_column.values())
 
 
 @dataclass(frozen=True)
@@ -220,16 +231,17 @@ class Document:
                 raise ValueError("id 'runs' is kept for the list of runs")
         twice = {name for name in ids if ids.count(name) > 1}
         if twice:
-            raise ValueError(f"ids used twice: {', '.join(sorted(twice))}")
+            raise ValueError(
+                f"{', '.join(sorted(twice))}: ids are used once, by one section, table or figure"
+            )
         for table in self.tables():
             for row in table.rows:
-                for cells in (row.cells, *row.cells_by_column.values()):
-                    unknown = [cell for cell in cells if cell not in self.runs]
-                    if unknown:
-                        raise ValueError(
-                            f"table {table.id}, row {row.key!r}: the document has no run ids "
-                            f"of {unknown}"
-                        )
+                unknown = row.all_cells - self.runs.keys()
+                if unknown:
+                    raise ValueError(
+                        f"table {table.id}, row {row.key!r}: the document has no run ids of "
+                        f"{sorted(unknown)}"
+                    )
 
     def walk(self) -> Iterator[Section]:
         """All sections and subsections, in order."""

@@ -16,7 +16,8 @@ import numpy as np
 from analysis.comparisons.methods import solve_times
 from analysis.methods import LEARNER
 from analysis.published import published_cell, published_initial
-from analysis.report.numbers import PREFIX, Cell, Names, Number, macro_names, words
+from analysis.report.document import CellKey
+from analysis.report.numbers import PREFIX, Names, Number, macro_names, words
 from analysis.results.folder import CellRuns
 from analysis.results.optima import SHIPPED
 from analysis.signatures.register import PER_DIMENSION, REGISTER
@@ -88,7 +89,7 @@ class _About:
 
     stem: str
     of: str
-    cells: tuple[Cell, ...] = ()
+    cells: tuple[CellKey, ...] = ()
 
     def value(self, what: str, value: float, kind: Kind | None = None, **known: Any) -> Number:
         """``kind``: of :data:`_KINDS` by default; ``known``: further fields of the number."""

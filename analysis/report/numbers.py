@@ -14,15 +14,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.methods import LEARNER
+from analysis.report.document import CellKey
+from analysis.report.formats.templates import LATEX, template
 from coartic.text import one_line
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
 PREFIX = "coartic"
-Cell = tuple[str, str]
-"""Task and label."""
-
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 
 
@@ -42,7 +41,7 @@ class Number:
     n: int | None = None
     how: str = ""
     """How value and interval were obtained."""
-    cells: tuple[Cell, ...] = ()
+    cells: tuple[CellKey, ...] = ()
     """What it was computed from; none for what the paper prints and for shipped optima."""
     of: str = ""
     """What the meaning is said of, such as a method on a task."""
@@ -118,29 +117,8 @@ def macro_names(study: Study) -> Names:
 
 def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
     """The macros as a LaTeX file. Numbers go through ``\\coarticnum``, which may be redefined."""
-    lines = [
-        *map(_comment, about),
-        "% Intervals are at 95 %; `coartic trace MACRO` says how they were made, of which runs.",
-        "% Redefine \\coarticnum to print numbers your way, with siunitx for example:",
-        "%   \\newcommand{\\coarticnum}[1]{\\num{#1}}   before \\input",
-        f"\\providecommand{{\\{PREFIX}num}}[1]{{\\ensuremath{{#1}}}}",
-    ]
-    of = ""
-    for number in numbers:
-        unit = f", {number.unit}" if number.unit else ""
-        how = f"; {number.how}" if number.how and math.isnan(number.low) else ""
-        if number.of != of:
-            of = number.of
-            lines.append(_comment(f"{of}:"))
-        lines.append(_comment(f"{number.meaning}{unit}{how}"))
-        for suffix, text in number.companions():
-            content = number.full(_tex, "$n$") if suffix == "Full" else _tex(text)
-            lines.append(f"\\newcommand{{\\{number.macro}{suffix}}}{{{content}}}")
-    return "\n".join(lines) + "\n"
-
-
-def _comment(text: str) -> str:
-    return f"% {one_line(text)}"
+    layout = template("numbers.tex.jinja", one_line, **LATEX)
+    return layout.render(numbers=numbers, about=about, shown=_tex, prefix=PREFIX)
 
 
 def _tex(number: str) -> str:

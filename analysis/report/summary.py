@@ -15,8 +15,9 @@ from analysis.claims.register import Judged, Verdict
 from analysis.comparisons.paper import paper_rows
 from analysis.methods import LEARNER
 from analysis.published import published_cell
-from analysis.report.document import Bullets, Column, DataTable, Estimate, Row
-from analysis.report.tables.common import marked, mean_of, table
+from analysis.report.document import Bullets, DataTable, Estimate
+from analysis.report.tables.common import marked, mean_of
+from analysis.report.tables.layout import LAYOUTS
 from analysis.words import typographic
 from coartic.record import Environment
 from coartic.text import counted
@@ -40,7 +41,7 @@ def best_condition(study: Study, task: str) -> str | None:
 
 def tasks_table(study: Study) -> DataTable | None:
     """One row a task: initial, learned, published and best possible reward."""
-    rows = []
+    layout, rows = LAYOUTS["tasks-in-short"], []
     for name in study.results.tasks:
         label = best_condition(study, name)
         if label is None:
@@ -51,40 +52,21 @@ def tasks_table(study: Study) -> DataTable | None:
         initial = good.initial_reward.dropna()
         paper, best = published_cell(name, condition), study.optima.get((name, "free"))
         printed = paper.summary if paper else None
-        values = (
-            marked(study, name),
-            float(initial.iloc[0]) if len(initial) else None,
-            condition,
-            replace(learned, sd=None),
-            Estimate(printed.mean, printed.sd) if printed else None,
-            best.reward if best else None,
-            ("proven" if best.proven else "best known") if best else None,
-            (best.reward - learned.value) / -best.reward if best and best.reward else None,
+        row = layout.row(
+            name,
+            cells=((name, label),),
+            task=marked(study, name),
+            initial=float(initial.iloc[0]) if len(initial) else None,
+            condition=condition,
+            learned=replace(learned, sd=None),
+            published=Estimate(printed.mean, printed.sd) if printed else None,
+            optimum=best.reward if best else None,
+            proof=("proven" if best.proven else "best known") if best else None,
+            gap=(best.reward - learned.value) / -best.reward if best and best.reward else None,
         )
         searches = dict.fromkeys(("optimum", "proof"), best.cells) if best else {}
-        rows.append(Row(name, values, ((name, label),), searches))
-    return table(
-        "tasks-in-short",
-        "The learner's best condition on every task.",
-        (
-            Column("task", "task"),
-            Column("initial", "initial", "number", "ticks", 0, rests_on=("runs",)),
-            Column("condition", "condition"),
-            Column("learned", "learned", "number", "ticks", 1, rests_on=("runs",)),
-            Column("published", "published", "number", "ticks", 1, rests_on=("paper",)),
-            Column("optimum", "optimum", "number", "ticks", 0, rests_on=("optimum",)),
-            Column("proof", "known as", rests_on=("optimum",)),
-            Column("gap", "gap", "share", digits=1, rests_on=("runs", "optimum")),
-        ),
-        rows,
-        (
-            "Rewards are means over runs, −1 for every control tick: the nearer 0, the better. "
-            "Learned: the best of a run's trials, exploration noise included (a noiseless "
-            "replay of what is kept gets a little less, see Limitations). "
-            "Initial: the corrective process alone. Published: mean ± SD of the same condition. "
-            "Optimum: with all joints free. Gap: from the learned reward to it, as a share of it.",
-        ),
-    )
+        rows.append(replace(row, cells_by_column=searches))
+    return layout.table(rows)
 
 
 def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:

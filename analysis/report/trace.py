@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.markup import words
 from analysis.report.document import CellKey, DataTable, RestsOn
-from analysis.report.tables.methods import READING_OF_METHODS
+from analysis.report.formats.templates import template
+from analysis.report.tables.layout import LAYOUTS
 from analysis.report.text import heads, texts
 from analysis.report.trace_file import FILE, Source, TraceFile, read_trace
 from analysis.results.optima import SHIPPED
@@ -118,32 +119,17 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
 
 def trace_text(found: Trace) -> str:
     """A trace for a terminal: one fact a line, then the runs."""
-    made, folder = found.environment, found.folder
-    commit = made.commit.id + " with changes" * made.commit.dirty if made.commit else "unknown"
-    packages = ", ".join(f"{name} {version}" for name, version in made.packages.items())
-    lines = [
-        f"{found.name} = {found.text}",
-        found.meaning,
-        *([f"how: {found.how}"] if found.how else []),
-        f"results: {folder or 'not beside this report; its FOLDER has the specification'}",
-        f"specification: {found.file.specification}",
-        f"asked for by: {shell_line(*made.command)}",
-        f"code: coartic {made.coartic}, commit {commit}, model code {made.model_code}",
-        f"environment: Python {made.python}, {made.platform}, {packages}",
-    ]
-    if not found.sources:
-        lines.append(f"runs: none; this value is {found.origin}")
-    one = "one: " + shell_line("coartic", "reproduce", "RUN", "--in", folder or "FOLDER")
-    for source in found.sources:
-        count, commits = len(source.run_ids), ", ".join(source.commits)
-        runs = counted(count, "run")
-        lines += ["", f"{source.task} x {source.label}: {runs}, made at commit {commits}"]
-        if source.command:
-            lines.append(f"anew: {source.command}")
-            if source.makes > count:
-                lines.append(f"  makes {source.makes} runs, of which these {count}")
-        lines += [one, *(f"  {run}" for run in source.run_ids)]
-    return "\n".join(map(one_line, lines))
+    page = template("trace.txt.jinja", counted, shell, finalize=_on_one_line)
+    return page.render(found=found, made=found.environment, folder=found.folder).rstrip("\n")
+
+
+def shell(command: Iterable[str | Path]) -> str:
+    """A command to paste."""
+    return shell_line(*command)
+
+
+def _on_one_line(value: object) -> str:
+    return one_line(str(value))
 
 
 def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[str]) -> Trace:
@@ -167,7 +153,7 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
         if "optimum" in column.rests_on and task in tasks and arm == column.other_arm
     ]
     # The tables of methods share what stands above them all.
-    above = READING_OF_METHODS if table.id.startswith("methods-") else ()
+    above = LAYOUTS["methods"].read() if table.id.startswith("methods-") else ()
     notes = dict.fromkeys(map(words, (*above, *table.notes)))
     own = row.cells if "runs" in column.rests_on or not column.rests_on else ()
     cells = [

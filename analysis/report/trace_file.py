@@ -61,12 +61,10 @@ class TraceFile(BaseModel):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        rows = [row for table in self.tables for row in table.rows]
-        named = [number.cells for number in self.numbers]
-        named += [best.cells for *_, best in self.optima]
-        named += [cells for row in rows for cells in (row.cells, *row.cells_by_column.values())]
-        known = {(source.task, source.label) for source in self.sources}
-        if not {cell for cells in named for cell in cells} <= known:
+        named = {cell for table in self.tables for row in table.rows for cell in row.all_cells}
+        named.update(*(number.cells for number in self.numbers))
+        named.update(*(best.cells for *_, best in self.optima))
+        if not named <= {(source.task, source.label) for source in self.sources}:
             raise ValueError("it names cells that it does not have")
         return self
 

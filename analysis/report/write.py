@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
 
 from analysis.report.document import Document
 from analysis.report.formats.csv import runs_csv, table_csv
 from analysis.report.formats.html import html
-from analysis.report.formats.latex import latex_inputs, latex_tables
+from analysis.report.formats.latex import latex_inputs, latex_table
 from analysis.report.formats.markdown import markdown
 from coartic import CoarticError
-from coartic.files import check_folder, publish
-
-Plot = TypeVar("Plot")
-_OWNER = "report"
+from coartic.files import REPORT, check_folder, publish
 
 
 def check_report_folder(folder: Path, results: Path) -> None:
@@ -28,32 +24,34 @@ def check_report_folder(folder: Path, results: Path) -> None:
         raise CoarticError(
             f"{folder} holds the results themselves; a report has a folder of its own"
         )
-    check_folder(folder, owner=_OWNER, alone=True)
+    check_folder(folder, owner=REPORT, alone=True)
 
 
 def write_report(
     document: Document,
-    plots: Iterable[Plot],
+    figures: Mapping[str, bytes],
     folder: Path,
     extra: Mapping[str, str] | None = None,
     *,
-    render: Callable[[Plot], Mapping[str, bytes]],
+    begin: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a report into ``folder``, in the place of an earlier one.
 
-    ``report.html`` stands alone; ``report.md`` links to ``figures/`` with what ``render`` makes
-    of each plot: contents by file name, at least ``ID.svg``; ``tables/`` holds CSV and LaTeX,
-    ``tables.tex`` inputs the latter; ``extra`` are further text files by name. The same
-    document gives the same bytes. Raises ValueError where a figure of the document is not among
-    the plots, CoarticError as :func:`coartic.files.publish` for a folder that is a report's alone.
+    ``report.html`` stands alone; ``report.md`` links to ``figures/`` with ``figures``: contents
+    by file name, at least ``ID.svg`` of each; ``tables/`` holds CSV and LaTeX, ``tables.tex``
+    inputs the latter; ``extra`` are further text files by name; ``begin`` is called when all is
+    made and nothing written. The same document gives the same bytes. Raises ValueError where a
+    figure of the document is not among the files, CoarticError as
+    :func:`coartic.files.publish` for a folder that is a report's alone.
     """
-    figures = {f"figures/{name}": data for plot in plots for name, data in render(plot).items()}
-    lost = [f.id for f in document.figures() if f"figures/{f.id}.svg" not in figures]
+    lost = [f.id for f in document.figures() if f"{f.id}.svg" not in figures]
     if lost:
-        raise ValueError(f"figures without a plot: {', '.join(lost)}")
+        raise ValueError(f"figures without a file: {', '.join(lost)}")
     texts = {**_texts(document), **(extra or {})}
-    files = figures | {name: text.encode() for name, text in texts.items()}
-    publish(folder, files, owner=_OWNER, alone=True)
+    files = {f"figures/{name}": data for name, data in figures.items()}
+    files |= {name: text.encode() for name, text in texts.items()}
+    begin()
+    publish(folder, files, owner=REPORT, alone=True)
 
 
 def _texts(document: Document) -> dict[str, str]:
@@ -64,6 +62,7 @@ def _texts(document: Document) -> dict[str, str]:
         "tables.tex": latex_inputs(document),
         "tables/runs.csv": runs_csv(document),
     }
-    texts |= {f"tables/{table.id}.csv": table_csv(table) for table in document.tables()}
-    texts |= {f"tables/{name}.tex": text for name, text in latex_tables(document).items()}
+    for table in document.tables():
+        texts[f"tables/{table.id}.csv"] = table_csv(table)
+        texts[f"tables/{table.id}.tex"] = latex_table(table)
     return texts

@@ -12,6 +12,9 @@ from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
 from coartic.tables import Manifest, label_of
 
+CellKey = tuple[str, str]
+"""Name of a task, and label of a method: its name with its variant."""
+
 
 @dataclass(frozen=True)
 class CellRuns:
@@ -27,7 +30,7 @@ class CellRuns:
         """The method with its variant."""
         return label_of(self.method, self.variant)
 
-    @property
+    @cached_property
     def good(self) -> pd.DataFrame:
         """The runs that have a solution."""
         return self.runs[self.runs["status"] == "ok"]
@@ -50,21 +53,15 @@ class Results:
         return {name: parse_task(task, source) for name, task in content.items()}
 
     @cached_property
-    def cells(self) -> list[CellRuns]:
+    def cells(self) -> dict[CellKey, CellRuns]:
         """The cells with their runs, in the order of the plan."""
-        return [
-            CellRuns(
-                cell.task,
-                cell.method,
-                cell.variant,
-                self.runs[
-                    (self.runs.task == cell.task)
-                    & (self.runs.method == cell.method)
-                    & (self.runs.variant == cell.variant)
-                ],
-            )
-            for cell in self.manifest.specification.cells
-        ]
+        found, runs = {}, self.runs
+        for cell in self.manifest.specification.cells:
+            own = (runs.task == cell.task) & (runs.method == cell.method)
+            own &= runs.variant == cell.variant
+            names = cell.task, cell.method, cell.variant
+            found[cell.task, cell.label] = CellRuns(*names, runs[own])
+        return found
 
     def solutions(self) -> pd.DataFrame:
         """Movements of every run's solution."""

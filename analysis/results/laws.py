@@ -21,9 +21,8 @@ from pydantic import ValidationError
 from coartic import PAPER, CoarticError, parse_task
 from coartic.codec import read_record
 from coartic.inputs import problems_inline, read_bytes
-from coartic.record import Record, RecordError, run_seed
+from coartic.record import BUILT_IN, Record, RecordError, run_seed
 from coartic.tables import (
-    BUILT_IN,
     FORMAT,
     Manifest,
     Plan,

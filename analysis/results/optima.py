@@ -22,6 +22,7 @@ from pydantic import BaseModel, ConfigDict
 
 from analysis.results.folder import Results, load_results
 from analysis.results.laws import BASE
+from analysis.signatures.context import KEPT
 from coartic import CoarticError, Task
 from coartic.files import write_atomically
 from coartic.record import SEARCH
@@ -35,8 +36,8 @@ DATA = Path(__file__).with_name("optima.json")
 SHIPPED = f"shipped data (analysis/results/{DATA.name})"
 
 OtherArm = Literal["free", "still"]
-"""Whether the arm that is not chosen may move."""
 ARMS: tuple[OtherArm, ...] = ("free", "still")
+"""Whether the arm that is not chosen may move, or is kept still."""
 
 
 class Entry(BaseModel):
@@ -126,8 +127,7 @@ def locks_base(runs: pd.DataFrame) -> bool:
 def essence(task: Task) -> str:
     """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
     content = task.model_dump(mode="json")
-    kept = ("start", "goals", "radius", "hands", "locked_base", "robot")
-    text = json.dumps({key: content[key] for key in kept}, sort_keys=True)
+    text = json.dumps({key: content[key] for key in ("goals", *KEPT)}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

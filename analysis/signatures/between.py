@@ -114,10 +114,8 @@ def lead(contexts: Contexts, signature: Signature) -> Rows:
     first, second = (last_ticks(group, contexts.goal, count) for group in contexts.runs)
     found = lead_time(first, second, rng_of(signature, place))
     place = replace(place, longest=count - 1)
-    if found is None:
-        yield signature.at(place, n=n, why_not="not distinguishable at the hit")
-    else:
-        yield signature.at(place, value=float(found), n=n)
+    why = "not distinguishable at the hit" if found is None else ""
+    yield signature.at(place, value=math.nan if found is None else float(found), n=n, why_not=why)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -22,7 +21,7 @@ from scipy.cluster.hierarchy import DisjointSet
 
 from analysis.signatures.context import KEPT
 from analysis.signatures.permutation import orders, p_values
-from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.intervals import Interval, student
 from analysis.statistics.spread import mean
 from coartic import Task
 from coartic.robot import Array
@@ -79,61 +78,38 @@ def _along(points: Array) -> Array:
     return positions
 
 
-class Slope(NamedTuple):
-    """Regression of one joint on the position of a neighbouring goal."""
-
-    value: float
-    """Length unit (base) or rad (joint) per length unit; -∞ to ∞, 0 no dependence."""
-    low: float
-    """Interval at 95 %."""
-    high: float
-    p: float
-    """Two-sided, of slope 0."""
-
-
-class Norm(NamedTuple):
-    """How far the whole posture follows."""
-
-    value: float
-    """Length of the vector of slopes, ≥ 0; length unit and rad mixed, per length unit."""
-    p: float
-    """Of no dependence of any joint."""
-
-
-def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Slope]:
+def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Interval]:
     """One slope per joint, by least squares over the mean posture at each position.
 
-    ``configurations`` has shape ``(n, dof)``: postures at goal g, one row a run; ``positions``
-    ``(n,)`` those of the neighbouring goal in each run's task. Interval and test have
-    positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are run once
-    or often, and take what departs from the line as independent and of equal variance between
-    positions: curvature widens the interval. Joints that do not change have slope 0 and p 1.
-    Raises ValueError for fewer than three positions.
+    Length unit (base) or rad (joint) per length unit, -∞ to ∞; 0 no dependence, of which ``p``
+    is the two-sided test. ``configurations`` has shape ``(n, dof)``: postures at goal g, one row
+    a run; ``positions`` ``(n,)`` those of the neighbouring goal in each run's task. Interval and
+    test have positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are
+    run once or often, and take what departs from the line as independent and of equal variance
+    between positions: curvature widens the interval. Joints that do not change have slope 0 and
+    p 1. Raises ValueError for fewer than three positions.
     """
     x, means = _by_position(configurations, positions)
-    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(x) - 2))
     slopes = []
     for joint in means.T:
-        if np.ptp(joint) == 0:
-            slopes.append(Slope(0.0, 0.0, 0.0, 1.0))
-            continue
-        fit = stats.linregress(x, joint)
-        half = reach * float(fit.stderr)
-        slopes.append(
-            Slope(float(fit.slope), fit.slope - half, fit.slope + half, float(fit.pvalue))
-        )
+        slope = Interval(0.0, 0.0, 0.0, 1.0)
+        if np.ptp(joint) > 0:
+            fit = stats.linregress(x, joint)
+            value, error, p = map(float, (fit.slope, fit.stderr, fit.pvalue))
+            slope = student(value, error, len(x) - 2, p)
+        slopes.append(slope)
     return slopes
 
 
 def slope_norm(
     configurations: Array, positions: Sequence[float] | Array, rng: np.random.Generator
-) -> Norm:
-    """Length of the vector of all joints' slopes, as :func:`locus_slopes` has them.
+) -> Interval:
+    """Length of the vector of all joints' slopes (:func:`locus_slopes`), without interval.
 
-    It is never negative and so biased upwards. Permutation test: the mean postures are put in
-    every order along the line (up to seven positions, else 9999 orders drawn), so that with k
-    positions p is at least 2/k!. It takes the means as exchangeable where nothing depends on the
-    position. Raises ValueError for fewer than three positions.
+    Length unit and rad mixed, per length unit; ≥ 0 and so biased upwards. Permutation test: the
+    mean postures are put in every order along the line (up to seven positions, else 9999 orders
+    drawn), so that with k positions p is at least 2/k!. It takes the means as exchangeable where
+    nothing depends on the position. Raises ValueError for fewer than three positions.
     """
     x, means = _by_position(configurations, positions)
     means = means - mean(means)
@@ -142,7 +118,7 @@ def slope_norm(
     ways, exact = orders(len(x), rng)
     observed = np.asarray(np.linalg.norm(weights @ means))
     null = np.linalg.norm(weights[ways] @ means, axis=1)
-    return Norm(float(observed), float(p_values(null, observed, exact=exact)))
+    return Interval(float(observed), p=float(p_values(null, observed, exact=exact)))
 
 
 def _by_position(configurations: Array, positions: Sequence[float] | Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
-from analysis.statistics.estimates import CONFIDENCE
+from analysis.statistics.intervals import Interval, student
 from analysis.statistics.spread import mean, sd
 from coartic import Hand, Task
 from coartic.robot import Array
@@ -69,15 +69,11 @@ class Synergy(NamedTuple):
     """V_ort: variance in its complement per dimension."""
     delta: float
     """ΔV = (V_ucm - V_ort) / V_tot, from -n/d_ort to n/d_ucm."""
-    z: float
-    """Fisher-like transform of ΔV, -∞ to ∞."""
-    low: float
-    """Interval of z at 95 %; NaN where the jackknife has nothing to go by."""
-    high: float
     neutral: float
     """z where both variances are equal, ½ ln(d_ucm/d_ort)."""
-    p: float
-    """Two-sided, of z equal to ``neutral``."""
+    z: Interval
+    """Fisher-like transform of ΔV, -∞ to ∞, with its jackknife interval where that has anything
+    to go by, and the two-sided test of ``neutral``."""
 
 
 def synergy(configurations: Array, jacobian: Array) -> Synergy:
@@ -100,7 +96,8 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     """
     null, complement = subspaces(jacobian)
     free, bound = null.shape[1], complement.shape[1]
-    nothing = Synergy(*[math.nan] * 8)
+    nan = math.nan
+    nothing = Synergy(nan, nan, nan, nan, Interval(nan))
     n = len(configurations)
     if n < 2 or not free or not bound:
         return nothing
@@ -116,7 +113,7 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     delta = (within - orthogonal) * (free + bound) / (free * within + bound * orthogonal)
     z = 0.5 * math.log(sums[0] / sums[1])
     neutral = 0.5 * math.log(free / bound)
-    untested = Synergy(within, orthogonal, delta, z, math.nan, math.nan, neutral, math.nan)
+    untested = Synergy(within, orthogonal, delta, neutral, Interval(z))
     left = [_leave_one_out(part, total) for part, total in zip(parts, sums, strict=True)]
     if lines < 2 or min(map(np.min, left)) <= _PROJECTED:
         return untested
@@ -125,9 +122,8 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     error = sd(pseudo) / math.sqrt(n)
     if not error:
         return untested
-    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * error
     p = 2.0 * float(stats.t.sf(abs(z - neutral) / error, n - 1))
-    return Synergy(within, orthogonal, delta, z, z - reach, z + reach, neutral, p)
+    return untested._replace(z=student(z, error, n - 1, p))
 
 
 def _leave_one_out(part: Array, total: float) -> Array:

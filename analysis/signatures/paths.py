@@ -19,16 +19,17 @@ REVERSAL = 0.01
 """Way back that makes a reversal, length unit: the model's step m."""
 TICK_RATE = 100.0
 """Ticks a second that smoothness assumes, so that its cut-off is in Hz; ours."""
+_CUT_OFF, _THRESHOLD = 10.0, 0.05  # of the spectrum: Hz, of its peak
 _LEAST_ROWS = 6  # below that a third derivative says nothing
 _ROUNDING = 1e-10  # of the peak speed: jerk below it is rounding
 _NO_LENGTH = 1e-9  # of a displacement in joint space
 
 
-def base_reversals(positions: Array, tolerance: float = REVERSAL) -> int:
+def base_reversals(positions: Array) -> int:
     """How often a base coordinate changes the sign of its velocity, ≥ 0.
 
     ``positions`` has shape ``(ticks,)``, length unit. A change of sign counts once the base
-    has gone back by more than ``tolerance``; what is smaller is jitter.
+    has gone back by more than :data:`REVERSAL`; what is smaller is jitter.
     """
     reversals = 0
     direction = 0
@@ -36,12 +37,12 @@ def base_reversals(positions: Array, tolerance: float = REVERSAL) -> int:
     for x in positions[1:].tolist():
         if direction == 0:
             low, high = min(low, x), max(high, x)
-            if high - low > tolerance:
+            if high - low > REVERSAL:
                 direction = 1 if x == high else -1
                 turn = x
         elif (x - turn) * direction > 0:
             turn = x
-        elif (turn - x) * direction > tolerance:
+        elif (turn - x) * direction > REVERSAL:
             reversals += 1
             direction = -direction
             turn = x
@@ -72,26 +73,24 @@ def turning_angles(postures: Array) -> Array:
     return angles
 
 
-def spectral_arc_length(
-    hand_path: Array, *, rate: float = TICK_RATE, cut_off: float = 10.0, threshold: float = 0.05
-) -> float:
+def spectral_arc_length(hand_path: Array) -> float:
     """SPARC of a hand path's speed profile: -∞ to 0, smoother nearer 0.
 
-    The negative length of the amplitude spectrum's curve, amplitude and frequency both
-    scaled to 1, up to the last frequency below ``cut_off`` (Hz) with an amplitude of at least
-    ``threshold``. Dimensionless and independent of amplitude and duration; about -1.4 for
-    one smooth movement. ``hand_path`` has shape ``(ticks, 2)``. NaN for paths that are too
-    short or do not move. Zero padding by a factor of 16 or more. Source: Balasubramanian,
-    Melendez-Calderon, Roby-Brami & Burdet (2015), doi:10.1186/s12984-015-0090-9.
+    The negative length of the amplitude spectrum's curve, amplitude and frequency both scaled to
+    1, up to the last frequency below 10 Hz with an amplitude of at least 0.05. Dimensionless and
+    independent of amplitude and duration; about -1.4 for one smooth movement. ``hand_path`` has
+    shape ``(ticks, 2)``. NaN for paths that are too short or do not move. Zero padding by a
+    factor of 16 or more. Source: Balasubramanian, Melendez-Calderon, Roby-Brami & Burdet (2015),
+    doi:10.1186/s12984-015-0090-9.
     """
-    speed = np.linalg.norm(np.diff(hand_path, axis=0), axis=1) * rate
+    speed = np.linalg.norm(np.diff(hand_path, axis=0), axis=1) * TICK_RATE
     if len(hand_path) < _LEAST_ROWS or not speed.any():
         return math.nan
     size = 2 ** (math.ceil(math.log2(len(speed))) + 4)
-    frequencies = np.fft.rfftfreq(size, 1 / rate)
+    frequencies = np.fft.rfftfreq(size, 1 / TICK_RATE)
     amplitudes = np.abs(np.fft.rfft(speed, size))
     amplitudes /= amplitudes.max()
-    last = int(np.flatnonzero((frequencies <= cut_off) & (amplitudes >= threshold))[-1])
+    last = int(np.flatnonzero((frequencies <= _CUT_OFF) & (amplitudes >= _THRESHOLD))[-1])
     if last == 0:
         return math.nan
     across = np.diff(frequencies[: last + 1]) / frequencies[last]

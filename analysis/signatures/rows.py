@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ImportString
 
@@ -91,6 +91,12 @@ Measure = Callable[..., Rows]
 of tasks), then the signatures that it measures, in the order of the register."""
 
 
+Shown = Literal[
+    "main-signatures", "hands", "other-arm", "travel", "synergy", "variance", "contexts", "slopes"
+]
+"""Tables that show signatures (:mod:`analysis.report.tables`)."""
+
+
 class Signature(BaseModel):
     """One signature, as a row of ``register.toml``, which says what the fields are."""
 
@@ -102,7 +108,7 @@ class Signature(BaseModel):
     extent: str
     meaning: str
     heading: str
-    table: str
+    table: Shown
     digits: int | None = None
     matrix: str = ""
     macro: str = ""

@@ -7,34 +7,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.statistics.estimates import RESAMPLES
 from analysis.statistics.hypotheses import bootstrap_test
-from coartic import PAPER, Execution, Hand, MotionModel, Task, Trajectory, correct, move
+from coartic import Execution, Hand, Task, Trajectory, correct, move
 from coartic.robot import Array
 
 ROUNDING = 1
 """Ticks that a planned movement can lose to rounding alone."""
 
 
-def isolated_reaches(
-    task: Task, q: Array, goal: int, model: MotionModel = PAPER
-) -> dict[Hand, int]:
+def isolated_reaches(task: Task, q: Array, goal: int) -> dict[Hand, int]:
     """Ticks in which each hand reaches a goal from ``q`` by the corrective process alone.
 
     ``goal`` counts from 1. Hands that the corrective process brings to no hit are left out;
     0 where the hand is there.
     """
     found: dict[Hand, int] = {}
-    centre = task.goals[goal - 1]
+    centre, robot = task.goals[goal - 1], task.robot
     for hand in task.hands:
-        miss = task.robot.forward_kinematics(q, hand) - centre
+        miss = robot.forward_kinematics(q, hand) - centre
         if np.hypot(*miss) <= task.radius:
             found[hand] = 0
             continue
-        target = correct(task.robot, q, hand, centre, locked_base=task.locked_base, model=model)
+        target = correct(robot, q, hand, centre, locked_base=task.locked_base)
         if target.converged:
-            reached = move(
-                task.robot, q, target.q, hand, centre, task.radius,
-                stop_on_arrival=False, model=model,
-            )  # fmt: skip
+            reached = move(robot, q, target.q, hand, centre, task.radius, stop_on_arrival=False)
             if reached.hit:
                 found[hand] = reached.ticks
     return found

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.signatures import intervals
 from analysis.signatures.manifold import jacobian_of, synergy
 from analysis.signatures.other_arm import (
     preshaping,
@@ -36,6 +35,7 @@ from analysis.signatures.rows import (
 )
 from analysis.signatures.subtasks import excess, sacrifice_p, sacrifices
 from analysis.signatures.trajectories import Trajectories, postures
+from analysis.statistics import intervals
 from analysis.statistics.estimates import SEED
 from coartic.robot import Array
 
@@ -194,16 +194,15 @@ def synergies(
         joints, jacobian = jacobian_of(cell.task, hand, q)
         found = synergy(q[:, joints], jacobian)
         place = Place(goal=number, hand=hand, hands=runs[0].execution.hands)
-        why = "runs do not differ" if math.isnan(found.z) else ""
+        why = "runs do not differ" if math.isnan(found.z.value) else ""
         parts = (within, found.within), (across, found.orthogonal), (delta, found.delta)
         for signature, value in parts:
             yield signature.at(place, value=value, n=n, why_not=why)
         if not why:
             place = replace(place, neutral=found.neutral)
-            if math.isnan(found.p):
+            if math.isnan(found.z.p):
                 why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        test = {"value": found.z, "low": found.low, "high": found.high, "p": found.p}
-        yield z.at(place, **test, n=n, why_not=why)
+        yield z.at(place, **found.z._asdict(), n=n, why_not=why)
 
 
 def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: str = "") -> Rows:

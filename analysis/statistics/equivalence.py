@@ -27,6 +27,7 @@ from analysis.statistics.estimates import (
     samples_of,
 )
 from analysis.statistics.hypotheses import standard_error, studentised_null
+from analysis.statistics.intervals import student, wilson
 from analysis.statistics.spread import mean, variance
 
 MARGIN = 0.01
@@ -101,9 +102,9 @@ def difference(ours: ArrayLike, published: Summary, *, margin: float | None = No
         return replace(found, low=value, high=value, note=NO_SPREAD)
     freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
     error = math.sqrt(total)
-    half = float(special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
+    _, low, high, _ = student(value, error, freedom)
     p = float(special.stdtr(freedom, (abs(value) - margin) / error))
-    return replace(found, low=value - half, high=value + half, p=p)
+    return replace(found, low=low, high=high, p=p)
 
 
 def bootstrap_equivalence(
@@ -182,24 +183,15 @@ def difference_of_shares(
     for count, total in (first, second):
         if not 0 <= count <= total or not total:
             raise ValueError(f"{count} of {total} runs is no share")
-    (a, low_a, high_a), (b, low_b, high_b) = (
-        _wilson(count, total, confidence) for count, total in (first, second)
-    )
+    a, b = (wilson(*of, confidence) for of in (first, second))
+    apart = a.value - b.value
     return Inference(
-        a - b,
+        apart,
         (first[1], second[1]),
         "difference of shares, score interval (Newcombe 1998, method 10)",
-        a - b - math.hypot(a - low_a, high_b - b),
-        a - b + math.hypot(high_a - a, b - low_b),
+        apart - math.hypot(a.value - a.low, b.high - b.value),
+        apart + math.hypot(a.high - a.value, b.value - b.low),
     )
-
-
-def _wilson(count: int, total: int, confidence: float) -> tuple[float, float, float]:
-    """A share with Wilson's interval."""
-    z2, share = float(special.ndtri(0.5 + confidence / 2)) ** 2, count / total
-    middle = (count + z2 / 2) / (total + z2)
-    half = math.sqrt(z2 * (total * share * (1 - share) + z2 / 4)) / (total + z2)
-    return share, max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _positive(margin: float) -> float:

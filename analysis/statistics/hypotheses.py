@@ -91,17 +91,16 @@ def permutation_test(
     give 12 870, 7 and 7 give 3 432), otherwise as many are drawn and p counts the observed
     one too. NaN with fewer than two values in a sample.
     """
-    a, b = sample(first), sample(second)
-    exact = math.comb(len(a) + len(b), len(a)) <= resamples
-    found = Inference(
-        float(spread.difference(a, b)),
-        (len(a), len(b)),
-        f"{_TAILS[alternative]} {_drawn(exact, resamples)} permutation test, studentised",
+    samples = sample(first), sample(second)
+    return _permuted(
+        samples,
+        _bounded_t,
+        "independent",
+        "permutation test, studentised",
+        alternative,
+        seed,
+        resamples,
     )
-    if min(found.n) < 2:
-        return replace(found, note="no test: a sample has fewer than 2 values")
-    p = _permuted((a, b), _bounded_t, "independent", alternative, seed, resamples)
-    return replace(found, p=p, seed=None if exact else seed)
 
 
 def sign_flip_test(
@@ -122,27 +121,30 @@ def sign_flip_test(
     differences = (
         differences_of_pairs(first, second) if np.ndim(second) else samples_of(first, second)[0]
     )
-    exact = 2 ** len(differences) <= resamples
-    found = Inference(
-        float(spread.mean(differences)),
-        (len(differences),),
-        f"{_TAILS[alternative]} {_drawn(exact, resamples)} sign-flip test of paired differences",
+    name = "sign-flip test of paired differences"
+    return _permuted(
+        (differences,), spread.difference, "samples", name, alternative, seed, resamples
     )
-    if len(differences) < 2:
-        return replace(found, note="no test: fewer than 2 pairs")
-    p = _permuted((differences,), spread.mean, "samples", alternative, seed, resamples)
-    return replace(found, p=p, seed=None if exact else seed)
 
 
 def _permuted(
     samples: tuple[Array, ...],
     statistic: Callable[..., Array],
     kind: Literal["independent", "samples"],
+    name: str,
     alternative: Alternative,
     seed: int,
     resamples: int,
-) -> float:
-    found = stats.permutation_test(
+) -> Inference:
+    n = tuple(map(len, samples))
+    exact = (math.comb(sum(n), n[0]) if kind == "independent" else 2 ** n[0]) <= resamples
+    drawn = "exact" if exact else f"Monte Carlo ({resamples} resamples)"
+    method = f"{_TAILS[alternative]} {drawn} {name}"
+    found = Inference(float(spread.difference(*samples)), n, method)
+    if min(n) < 2:
+        few = "a sample has fewer than 2 values" if kind == "independent" else "fewer than 2 pairs"
+        return replace(found, note=f"no test: {few}")
+    result = stats.permutation_test(
         samples,
         statistic,
         permutation_type=kind,
@@ -152,7 +154,7 @@ def _permuted(
         batch=1_000,
         rng=np.random.default_rng(seed),
     )
-    return float(found.pvalue)
+    return replace(found, p=float(result.pvalue), seed=None if exact else seed)
 
 
 def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:
@@ -225,7 +227,3 @@ def _p_value(null: Array, observed: Array, alternative: Alternative) -> float:
     tied = np.isclose(null, observed, rtol=1e-9, atol=0.0)
     extreme = tied | (null <= observed if alternative == "less" else null >= observed)
     return float(1 + extreme.sum()) / (1 + len(null))
-
-
-def _drawn(exact: bool, resamples: int) -> str:
-    return "exact" if exact else f"Monte Carlo ({resamples} resamples)"

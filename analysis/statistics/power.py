@@ -18,57 +18,35 @@ from analysis.statistics.estimates import LEVEL
 POWER = 0.8
 
 
-def power(
-    difference: float,
-    first_sd: float,
-    second_sd: float,
-    runs: int,
-    *,
-    level: float = LEVEL,
-    tails: int = 1,
-) -> float:
+def power(difference: float, first_sd: float, second_sd: float, runs: int) -> float:
     """P(a t-test with ``runs`` runs of each sample finds a true difference of means).
 
-    ``tails`` is 1, as the paper tests (the sign of ``difference`` is the one expected), or
-    2. For pairs, or one sample against a known value, the SD of the differences is
-    ``first_sd`` and ``second_sd`` is 0. Without any spread every difference but 0 is found.
-    Raises ValueError for a negative SD, fewer than 2 runs, or other tails.
+    One-tailed at :data:`~analysis.statistics.estimates.LEVEL`, as the paper tests: the sign of
+    ``difference`` is the one expected. For pairs, or one sample against a known value, the SD of
+    the differences is ``first_sd`` and ``second_sd`` is 0. Without any spread every difference
+    but 0 is found. Raises ValueError for a negative SD or fewer than 2 runs.
     """
-    if min(first_sd, second_sd) < 0 or runs < 2 or tails not in (1, 2):
-        raise ValueError("power needs SDs of at least 0, at least 2 runs, and 1 or 2 tails")
+    if min(first_sd, second_sd) < 0 or runs < 2:
+        raise ValueError("power needs SDs of at least 0 and at least 2 runs")
     variances = first_sd**2, second_sd**2
     total = sum(variances)
     if total == 0:
         return float(difference != 0)
     freedom = (runs - 1) * total**2 / sum(variance**2 for variance in variances)
     shift = abs(difference) * math.sqrt(runs / total)
-    critical = float(special.stdtrit(freedom, 1 - level / tails))
-    found = float(stats.nct.sf(critical, freedom, shift))
-    if tails == 2:
-        # The lower tail, mirrored: scipy's cdf is NaN far out.
-        found += float(stats.nct.sf(critical, freedom, -shift))
-    return found
+    return float(stats.nct.sf(special.stdtrit(freedom, 1 - LEVEL), freedom, shift))
 
 
-def runs_needed(
-    difference: float,
-    first_sd: float,
-    second_sd: float,
-    *,
-    target: float = POWER,
-    level: float = LEVEL,
-    tails: int = 1,
-) -> int:
-    """Fewest runs of each sample with :func:`power` of at least ``target``; 2 or more.
+def runs_needed(difference: float, first_sd: float, second_sd: float) -> int:
+    """Fewest runs of each sample with :func:`power` of at least :data:`POWER`; 2 or more.
 
-    Raises ValueError for a difference of 0, which no number of runs finds, and for a
-    target that does not lie between ``level`` and 1.
+    Raises ValueError for a difference of 0, which no number of runs finds.
     """
-    if difference == 0 or not level < target < 1:
-        raise ValueError("runs_needed needs a difference, and a power between the level and 1")
+    if difference == 0:
+        raise ValueError("runs_needed needs a difference")
 
     def enough(runs: int) -> bool:
-        return power(difference, first_sd, second_sd, runs, level=level, tails=tails) >= target
+        return power(difference, first_sd, second_sd, runs) >= POWER
 
     most = 2
     while not enough(most):
@@ -76,30 +54,19 @@ def runs_needed(
     return bisect_left(range(most), True, lo=max(2, most // 2), key=enough)
 
 
-def smallest_difference(
-    first_sd: float,
-    second_sd: float,
-    runs: int,
-    *,
-    target: float = POWER,
-    level: float = LEVEL,
-    tails: int = 1,
-) -> float:
-    """Smallest true difference of means that :func:`power` finds with ``target``, > 0.
+def smallest_difference(first_sd: float, second_sd: float, runs: int) -> float:
+    """Smallest true difference of means that is found with a power of :data:`POWER`, > 0.
 
     In the unit of the SDs; 0 without any spread, where every difference is found. Raises
-    ValueError as :func:`power`, and for a target that does not lie between ``level`` and 1.
+    ValueError as :func:`power` does.
     """
-    if not level < target < 1:
-        raise ValueError("smallest_difference needs a power between the level and 1")
-
-    def excess(difference: float) -> float:
-        found = power(difference, first_sd, second_sd, runs, level=level, tails=tails)
-        return found - target
-
     scale = math.hypot(first_sd, second_sd)
     if scale == 0:
         return 0.0
+
+    def excess(difference: float) -> float:
+        return power(difference, first_sd, second_sd, runs) - POWER
+
     most = scale
     while excess(most) < 0:
         most *= 2

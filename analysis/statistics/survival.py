@@ -4,29 +4,21 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import CensoredData, ecdf
 
 from analysis.statistics.estimates import CONFIDENCE, TAILS
+from analysis.statistics.intervals import Interval
 
 
-@dataclass(frozen=True)
-class Median:
-    """Median time to the event; infinite where so few reached it that there is none."""
-
-    value: float
-    low: float
-    high: float
-
-
-def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Median:
+def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Interval:
     """Median of the product-limit estimate S(t) (Kaplan & Meier, 1958) of the times (n,).
 
     ``reached`` is False for runs that are right-censored at their time, which is infinite
-    for those known never to reach it. The median is the first time at which S ≤ 0.5. Its
+    for those known never to reach it. The median is the first time at which S ≤ 0.5, infinite
+    where so few reached it that there is none. Its
     interval (Brookmeyer & Crowley, 1982) holds the times at which the pointwise interval
     of S holds 0.5: by Greenwood's variance on the complementary log-log scale. Where that
     variance is not defined, the exact binomial limits (Clopper & Pearson, 1934) stand in:
@@ -41,7 +33,7 @@ def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Median:
     if not len(times):
         raise ValueError("no times")
     if not reached.any():
-        return Median(math.inf, _none_before(len(times)), math.inf)
+        return Interval(math.inf, _none_before(len(times)), math.inf)
     times = np.where(np.isinf(times), times[np.isfinite(times)].max(), times)
     estimate = ecdf(CensoredData.right_censored(times, ~reached)).sf
     at, survival = estimate.quantiles, estimate.probabilities
@@ -53,7 +45,7 @@ def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Median:
     lower = np.where(survival <= 0, 0.0, np.where(survival >= 1, 1.0, lower))
     none_left = 1 - TAILS[0] ** (1 / reached.sum())
     upper = np.where(survival <= 0, none_left, np.where(survival >= 1, 1.0, upper))
-    return Median(
+    return Interval(
         _first(at, survival),
         min(_first(at, lower), _none_before(len(times))),
         _first(at, upper),

@@ -51,13 +51,22 @@ def _completing(*sources: Callable[[], Iterable[str]]) -> Callable[[str], list[s
     return complete
 
 
+def directory(text: str) -> Path:
+    """A folder by its name. Raises CoarticError for an empty one, which is not the current one."""
+    if not text.strip():
+        raise CoarticError("the name of a folder is empty; the current folder is .")
+    return Path(text)
+
+
 SuiteName = Annotated[
     str,
     typer.Argument(
         help="Suite to run (`coartic list`), or a TOML file.", autocompletion=_completing(_suites)
     ),
 ]
-ResultsFolder = Annotated[Path, typer.Argument(help="Results folder, such as results/all.")]
+ResultsFolder = Annotated[
+    Path, typer.Argument(parser=directory, help="Results folder, such as results/all.")
+]
 RunId = Annotated[str, typer.Argument(help="Id of a run, or its beginning.")]
 Records = Annotated[Path, typer.Option("--in", help="Folder to look for the run in.")]
 Out = Annotated[str, typer.Option("--out", help="Folder for the results.")]

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import endings_in, labels_in
-from coartic.cli.terminal import say, show_data, show_table
+from coartic.cli.arguments import directory, endings_in, labels_in
+from coartic.cli.terminal import if_interrupted, say, show_data, show_table, writing
 from coartic.errors import CoarticError
 from coartic.text import counted
 
@@ -19,13 +19,16 @@ GROUP = "Read"
 
 def analyse(folder: given.ResultsFolder) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
+    if_interrupted(f"nothing is written in {folder}")  # also not while this is imported
     from analysis.report.analyses import analyse as pages_of
     from analysis.study import load
     from coartic.files import publish
 
     study = load(folder)
     files = pages_of(study)
+    writing(folder)
     publish(folder, files, owner="analyse", alone=False)
+    if_interrupted(f"all files are written in {folder}")
     show_table(
         "Claims",
         ("claim", "verdict", "statement"),
@@ -40,7 +43,8 @@ def analyse(folder: given.ResultsFolder) -> None:
 def report(
     folder: given.ResultsFolder,
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write; DIR/report by default.")
+        Path | None,
+        typer.Option(parser=directory, help="Folder to write; DIR/report by default."),
     ] = None,
     methods: Annotated[
         str | None,
@@ -57,6 +61,8 @@ def report(
 
     A folder that holds anything else than an earlier report, unchanged, is refused.
     """
+    out = folder / "report" if out is None else out
+    if_interrupted(f"nothing is written in {out}")  # also not while this is imported
     from analysis.figures.plot import FILES
     from analysis.report.build import build, write
     from analysis.report.write import check_report_folder
@@ -65,11 +71,11 @@ def report(
     started = time.monotonic()
     endings = endings_in(formats, FILES)
     study = load(folder)
-    out = folder / "report" if out is None else out
     check_report_folder(out, folder)
     labels = None if methods is None else labels_in(methods, "--methods")
     made = build(study, labels, endings)
-    write(made, study, out)
+    write(made, study, out, begin=lambda: writing(out))
+    if_interrupted(f"the report is written in {out}")
     say(
         f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
         f"it: report.md, {counted(len(made.document.tables()), 'table')} (tables/, CSV and "
@@ -94,8 +100,12 @@ def trace(
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(metavar="DIR_A", help="Results folder A.")],
-    second: Annotated[Path, typer.Argument(metavar="DIR_B", help="Results folder B.")],
+    first: Annotated[
+        Path, typer.Argument(parser=directory, metavar="DIR_A", help="Results folder A.")
+    ],
+    second: Annotated[
+        Path, typer.Argument(parser=directory, metavar="DIR_B", help="Results folder B.")
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Page to write (.md), with a table beside it (.csv).")
     ] = None,
@@ -127,7 +137,8 @@ def compare(
 
 def cite(
     folder: Annotated[
-        Path | None, typer.Argument(help="Results folder; all built-in methods without.")
+        Path | None,
+        typer.Argument(parser=directory, help="Results folder; all built-in methods without."),
     ] = None,
     style: Annotated[str, typer.Option("--format", help="Only bibtex.")] = "bibtex",
     analysis: Annotated[
@@ -138,7 +149,7 @@ def cite(
     from analysis.citations import MethodSource, bibliography
     from analysis.results.folder import load_results
     from benchmarks.registry import CLASSES
-    from coartic.tables import BUILT_IN
+    from coartic.record import BUILT_IN
 
     if style != "bibtex":
         raise CoarticError(f"--format {style}: the one format is bibtex")

@@ -109,6 +109,23 @@ def performing(suite: str, folder: Path) -> Iterator[Display]:
             sys.exit(130)
 
 
+def if_interrupted(sentence: str) -> None:
+    """What Ctrl-C says from here on, before it ends the process as ever."""
+
+    def end(*_: object) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        say(f"interrupted; {sentence}", stream=sys.stderr)
+        signal.raise_signal(signal.SIGINT)
+
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as it is in the background
+        signal.signal(signal.SIGINT, end)
+
+
+def writing(folder: Path) -> None:
+    """From here on files are replaced in a folder: what Ctrl-C says of it."""
+    if_interrupted(f"{folder} holds old files beside new ones until the same command has ended")
+
+
 class Interrupts:
     """Until they end, Ctrl-C is a KeyboardInterrupt that does not get lost."""
 

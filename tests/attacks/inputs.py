@@ -27,7 +27,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 SECONDS = 5.0
 """CPU time within which an input is answered."""
@@ -633,6 +633,11 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
     "two suites": (run("paper", "quick"), "unexpected extra argument(s) (quick)"),
     "--out is empty": (("run", "paper", "--out", ""), "--out is empty"),
     "--out is blank": (("run", "paper", "--out", " "), "--out is empty"),
+    "report of nothing": (("report", ""), "the name of a folder is empty"),
+    "report into nothing": (("report", ".", "--out", " "), "the name of a folder is empty"),
+    "analysis of nothing": (("analyse", ""), "the name of a folder is empty"),
+    "comparison with nothing": (("compare", ".", ""), "the name of a folder is empty"),
+    "works behind nothing": (("cite", ""), "the name of a folder is empty"),
     "--out below a device": ((*PAPER, "--out", "/dev/null/x"), "cannot write"),
     "--out is a device": ((*PAPER, "--out", "/dev/null"), "cannot write /dev/null"),
     "--out is a long name": ((*PAPER, "--out", "x" * 300), "File name too long"),
@@ -861,6 +866,11 @@ def _here() -> None:
     for module in _COMMANDS_IMPORT:
         with contextlib.suppress(ImportError):  # of another version
             importlib.import_module(module)
+    line: Any = importlib.import_module("coartic.cli")
+    if hasattr(line, "app"):  # put together once, not for every case
+        from typer.main import get_command
+
+        line.app = get_command(line.app)
     gc.collect()
     gc.freeze()  # or every fork copies what it looks through
     here = Path.cwd()

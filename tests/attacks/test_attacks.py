@@ -13,15 +13,17 @@ from pathlib import Path
 
 import pytest
 
+import benchmarks.executors
 from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
 from benchmarks.store import Store
 from benchmarks.tables import write_tables
 from coartic import PAPER, CoarticError
 from coartic.scores import solved
+from tests.support.suites import InProcess
 
 from .checkout import PART_OF_A_FOLDER, Ended, in_process
-from .edits import accepted, edits, finished
+from .edits import SUITE, accepted, edits
 from .forgeries import FORGERIES, forge_in, says
 from .methods import ATTACKS
 
@@ -51,7 +53,13 @@ REFUSED = ("import/exit-0", "name/learner", "name/escape", "told/none")
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    return finished(ROOT, tmp_path_factory.mktemp("attacks"))
+    folder = tmp_path_factory.mktemp("attacks")
+    (folder / "small.toml").write_text(SUITE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(benchmarks.executors, "Local", InProcess)
+        code, said = in_process(["run", folder / "small.toml", "--out", folder / "whole"])
+    assert code == 0, said
+    return folder / "whole"
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import traceback
@@ -14,8 +15,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from benchmarks.run import run_suite
 from coartic import execute, load_task
 from coartic.rows import movements_from
+from tests.support.suites import InProcess
 
 from .checkout import Driver, Ended, adopt_orphans, left_behind, read_json, run, size_of
 from .methods import ATTACKS, Attack, Expectation
@@ -26,6 +29,8 @@ LIMIT_S = 90.0  # of a whole suite, for every hostile method in it
 RUN_LIMIT_S = 4.0
 LARGEST_FOLDER = 20_000_000
 LONGEST_TEXT = 2000
+ENDING = ("neighbour/answers-twice", "exhaust/errors")
+"""Attacks that end their process: together with others, one run of each is enough."""
 CODES: dict[Expectation, tuple[int, ...]] = {
     "recorded": (0, 1),
     "refused": (2,),
@@ -93,20 +98,17 @@ def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) 
     Several have to have the same expectation.
     """
     attack = attacks[0]
-    hostile = [_named(a) for a in attacks] if len(attacks) > 1 else [attack]
+    hostile = [_named(*a) for a in enumerate(attacks)] if len(attacks) > 1 else [attack]
     parts = [_cells(*(a.method for a in hostile)), _cells(*BUILT_IN)]
     (folder / "suite.toml").write_text(
         _SUITE + "".join(reversed(parts) if attack.after_others else parts)
     )
     command = ["run", "suite.toml", "--out", "out", "--jobs", "1"]
     command += ["--time-limit", f"{RUN_LIMIT_S:g}"]
-    paths = []
-    for number, one in enumerate(hostile):
-        if one.installed:
-            paths.append(_install(one, folder / "plugins"))
-        else:
-            (folder / f"hostile{number}.py").write_text(one.source, encoding="utf-8")
-            command += ["--method-file", f"hostile{number}.py"]
+    paths = [_install(a, folder / "plugins") for a in hostile if a.installed]
+    if sources := [a.source for a in hostile if not a.installed]:
+        (folder / "hostile.py").write_text("\n".join(sources), encoding="utf-8")
+        command += ["--method-file", "hostile.py"]
     ended = run(root, command, folder, limit=LIMIT_S * len(attacks), paths=paths)
     found = _manners(attack, ended, folder)
     out = folder / "out"
@@ -125,10 +127,13 @@ def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) 
     return found + _forged(hostile, clean, out)
 
 
-def _named(attack: Attack) -> Attack:
-    """The same under a name of its own."""
+def _named(number: int, attack: Attack) -> Attack:
+    """The same under a name of its own, as a method and as a class."""
     name = f"hostile/{attack.id.replace('/', '-')}"
     source = attack.source.replace('    name = "hostile"\n', f'    name = "{name}"\n', 1)
+    source = re.sub(r"\bHostile\b", f"Hostile{number}", source)
+    if attack.id in ENDING:
+        source = source.replace("stochastic = True", "stochastic = False")
     return replace(attack, method=name, source=source)
 
 
@@ -241,8 +246,10 @@ def main() -> None:
     """``ROOT FOLDER ID...``: these attacks in one suite; what did not hold, as JSON."""
     root, base, names = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), sys.argv[3:]
     adopt_orphans()
-    clean = clean_run(root, base / "clean")
-    print(json.dumps(let_loose([ATTACKS[name] for name in names], root, clean, base)))
+    (base / "clean.toml").write_text(_SUITE + _cells(*BUILT_IN))
+    run_suite(base / "clean.toml", base / "clean", executor=InProcess())
+    found = let_loose([ATTACKS[name] for name in names], root, base / "clean", base)
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

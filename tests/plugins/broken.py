@@ -12,6 +12,7 @@ from coartic.solution import Movement
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
 COUNTER = itertools.count()
 SEEN = []
+AT_IMPORT = random.random()
 
 
 def by_correction(session, hands=None):
@@ -57,6 +58,13 @@ class Random(Good):
 
     def solve(self, session):
         return Result(by_correction(session), {"drawn": random.random()})
+
+
+class Local(Good):
+    name = "test/local"
+
+    def solve(self, session):
+        return Result(by_correction(session), {"drawn_at_import": AT_IMPORT})
 
 
 class Remembers(Good):

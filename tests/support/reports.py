@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 import analysis.report.build
+from analysis.figures import register
 from analysis.report.build import build, write
 from analysis.report.formats.latex import PACKAGES
 
@@ -40,8 +41,9 @@ def undrawn():
 
 
 def document_of(study):
-    """The document of a report without figures."""
-    with undrawn():
+    """The document of a report that has no figures at all."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(register, "REGISTER", ())
         return build(study).document
 
 

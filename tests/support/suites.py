@@ -7,14 +7,15 @@ import pandas as pd
 
 from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
+from benchmarks.declaration import MethodFileError, brief
 from benchmarks.harness import perform_missing
 from benchmarks.registry import registry
 from benchmarks.run import plan_cells
 from benchmarks.sandbox import failure
 from benchmarks.specification import Limits
 from benchmarks.suites import Cell, load_suite, run_specs, select_cells
-from benchmarks.worker import perform
-from coartic import load_task
+from benchmarks.worker import answer, perform
+from coartic import CoarticError, load_task
 from coartic.tables import TIMINGS
 
 ROOT = Path(__file__).parents[2]
@@ -26,13 +27,29 @@ KNOWN = registry()
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 
 
+def ask_here(foreign, **question):
+    """As :mod:`benchmarks.registry` asks a method that is not built in, without a process."""
+    try:
+        return answer({**question, "foreign": foreign.model_dump(mode="json")})
+    except Exception as error:
+        said = str(error) if isinstance(error, CoarticError) else brief(error)
+        raise MethodFileError(said) from None
+
+
+def performed(job):
+    """The answer to a job, without a process for it."""
+    said = {"error": None, "answer": perform(json.loads(json.dumps(job)))}
+    return {"run_id": job["run_id"], "outcome": json.dumps(said)}
+
+
 class InProcess:
     """An executor without processes, for tests of everything else."""
 
+    def __init__(self, jobs=1):
+        pass
+
     def perform(self, jobs):
-        for job in jobs:
-            said = {"error": None, "answer": perform(json.loads(json.dumps(job)))}
-            yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
+        yield from map(performed, jobs)
 
 
 class Failing(InProcess):

@@ -38,7 +38,8 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array, se
         return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
 
     def inside(change: Array) -> float:
-        return float(task.radius**2 - miss(change) @ miss(change))
+        off = miss(change)
+        return float(task.radius**2 - off @ off)
 
     def inside_gradient(change: Array) -> Array:
         jacobian = task.robot.jacobian(moved(change), hand)[:, joints]

@@ -10,20 +10,14 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 from markupsafe import Markup, escape
 
 from analysis.markup import inline
-from analysis.report.document import (
-    Block,
-    CellKey,
-    Document,
-    FigureBlock,
-    PlayerBlock,
-    Row,
-)
+from analysis.report.document import CellKey, Document, FigureBlock, PlayerBlock, Row
+from analysis.report.formats.templates import template
 from analysis.report.text import Part, by_column
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
@@ -50,7 +44,7 @@ def html(document: Document) -> str:
     script = _resource("report.js") + f"(() => {{\n{_resource('sort.js')}}})();\n"
     if players:
         script += f"(() => {{\n{_resource('player.js')}}})();\n"
-    return _template().render(
+    return _page().render(
         document=document,
         numbers={cell: number for number, cell in enumerate(document.runs, 1)},
         styles=Markup(styles),
@@ -62,29 +56,14 @@ def html(document: Document) -> str:
 
 
 @cache
-def _template() -> Template:
-    page = Environment(
-        loader=PackageLoader("analysis.report", "formats"),
+def _page() -> Template:
+    return template(
+        "page.html.jinja",
+        *(inline, true_minus, by_column, small_print, cell_view, stretches, is_wide),
+        *(inlined_svg, script_data),
         autoescape=True,
         finalize=_on_one_line,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
     )
-    page.filters |= {
-        "inline": inline,
-        "true_minus": true_minus,
-        "by_column": by_column,
-        "small_print": small_print,
-        "cell_view": cell_view,
-        "stretches": stretches,
-        "is_wide": is_wide,
-        "inlined_svg": inlined_svg,
-        "data": _script_data,
-    }
-    page.tests |= {kind.__name__.lower(): kind.__instancecheck__ for kind in get_args(Block)}
-    return page.get_template("page.html.jinja")
 
 
 def _on_one_line(value: object) -> object:
@@ -181,6 +160,6 @@ def inlined_svg(figure: FigureBlock) -> Markup:
     )
 
 
-def _script_data(player: PlayerBlock) -> Markup:
+def script_data(player: PlayerBlock) -> Markup:
     """JSON within a script element, which only "<" could end."""
     return Markup(player.data.replace("<", "\\u003c"))

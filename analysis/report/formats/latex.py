@@ -12,11 +12,14 @@ import re
 import textwrap
 import unicodedata
 from collections.abc import Sequence
-from string import Template
+from functools import cache
+
+from jinja2 import Template
 
 from analysis.markup import inline
 from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
+from analysis.report.formats.templates import LATEX, template
 from analysis.report.text import Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
@@ -56,12 +59,8 @@ PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _LABELS = {"method", "first", "second"}  # columns of methods with their variants
+_COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
-
-
-def latex_tables(document: Document) -> dict[str, str]:
-    """Every table by id, with label ``tab:ID``: a ``table`` float, or a ``longtable``."""
-    return {table.id: latex_table(table) for table in document.tables()}
 
 
 def latex_inputs(document: Document) -> str:
@@ -75,71 +74,33 @@ def latex_inputs(document: Document) -> str:
 
 
 def latex_table(table: DataTable) -> str:
-    """One table: numbers in S columns as wide as they need, text and intervals beside them."""
+    """A ``table`` float, or a ``longtable``, with label ``tab:ID``.
+
+    Numbers are in S columns as wide as they need, text and intervals beside them.
+    """
     shown = [part for part in parts(table) if part.column.printed]
     broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
     width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
-    kinds = "".join(
-        rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
-        for part in shown
-    )
-    head = " & ".join(_head(part, table) for part in shown)
-    rows = "\n".join(
-        " & ".join(_cell(part, row.values[part.index]) for part in shown) + r" \\"
-        for row in table.rows
-    )
-    layout = _LONG if long else _FLOAT
-    begin, end = (
-        (r"\begin{tabularx}{\linewidth}", r"\end{tabularx}")
-        if broken
-        else (f"{_SCALED}\n\\begin{{tabular}}", r"\end{tabular}}")
-    )
-    return layout.substitute(
-        caption=f"\\caption{{{_spans(table.caption)}}}\n\\label{{tab:{table.id}}}",
-        begin=begin,
-        end=end,
-        kinds=f"{{@{{}}{kinds}@{{}}}}",
-        head=f"{head} \\\\\n\\midrule",
-        rows=rows,
-        notes="".join(
-            f"\\par\\smallskip\\noindent\\parbox{{\\linewidth}}{{{_spans(note)}}}\n"
-            for note in table.notes
+    return _layout().render(
+        id=table.id,
+        caption=_spans(table.caption),
+        kinds="".join(
+            rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
+            for part in shown
         ),
+        head=" & ".join(_head(part, table) for part in shown),
+        rows=[
+            " & ".join(_cell(part, row.values[part.index]) for part in shown) for row in table.rows
+        ],
+        notes=map(_spans, table.notes),
+        broken=broken,
+        long=long,
     )
 
 
-_SCALED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
-_FLOAT = Template(r"""\begin{table}[htbp]
-\centering
-\footnotesize
-\setlength{\tabcolsep}{3pt}
-$caption
-$begin$kinds
-\toprule
-$head
-$rows
-\bottomrule
-$end
-$notes\end{table}
-""")
-_LONG = Template(r"""\begingroup
-\scriptsize
-\setlength{\tabcolsep}{3pt}
-\setlength{\LTcapwidth}{\linewidth}
-\begin{longtable}$kinds
-$caption \\
-\toprule
-$head
-\endfirsthead
-\toprule
-$head
-\endhead
-\bottomrule
-\endfoot
-$rows
-\end{longtable}
-$notes\endgroup
-""")
+@cache
+def _layout() -> Template:
+    return template("table.tex.jinja", **LATEX)
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
@@ -196,12 +157,8 @@ def _spans(text: str) -> str:
     pieces = []
     for span in inline(text):
         words = latex_text(span.text)
-        if span.style == "emphasis":
-            words = f"\\emph{{{words}}}"
-        elif span.style == "strong":
-            words = f"\\textbf{{{words}}}"
-        elif span.style == "code":
-            words = f"\\texttt{{{words}}}"
+        if span.style in _COMMANDS:
+            words = f"\\{_COMMANDS[span.style]}{{{words}}}"
         elif span.address.startswith(("http://", "https://")):
             words = f"{words} (\\texttt{{{latex_text(span.address)}}})"
         pieces.append(words)

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 
-from analysis.markup import markdown as spans
+from jinja2 import Template
+
+from analysis.markup import markdown as inline_markdown
 from analysis.markup import markdown_text
-from analysis.report.document import (
-    Block,
-    Bullets,
-    DataTable,
-    Document,
-    FigureBlock,
-    PlayerBlock,
-    Prose,
-    Section,
-)
-from analysis.report.text import parts
+from analysis.report.document import Document, Row
+from analysis.report.formats.templates import template
+from analysis.report.text import Part, parts
 from coartic.text import one_line
 
 
@@ -26,54 +21,24 @@ def markdown(document: Document, tables: str = "tables") -> str:
     ``tables``: folder beside it with each table as CSV, which the tables name; empty where
     there is none.
     """
-    pieces = [f"# {markdown_text(document.title)}"]
-    if document.lead:
-        pieces.append(spans(document.lead.strip()))
-    for section in document.sections:
-        pieces += _section(section, 2, tables)
-    return "\n\n".join(pieces) + "\n"
+    return _page().render(document=document, tables=tables).rstrip("\n") + "\n"
 
 
-def _section(section: Section, level: int, tables: str) -> list[str]:
-    pieces = [f"{'#' * min(level, 6)} {markdown_text(section.title)}"]
-    for block in section.blocks:
-        pieces += _block(block, tables)
-    for below in section.sections:
-        pieces += _section(below, level + 1, tables)
-    return pieces
+@cache
+def _page() -> Template:
+    return template("page.md.jinja", markdown_text, spans, parts, shown_texts, table_line)
 
 
-def _block(block: Block, tables: str) -> list[str]:
-    match block:
-        case Prose():
-            return [spans(text.strip()) for text in block.paragraphs]
-        case Bullets():
-            return ["\n".join(f"- {spans(item.strip())}" for item in block.items)]
-        case DataTable():
-            return _table(block, tables)
-        case FigureBlock():
-            return [
-                f"![{markdown_text(block.alt)}](figures/{block.id}.svg)",
-                f"**{markdown_text(block.title)}.** {spans(block.caption)}",
-            ]
-        case PlayerBlock():
-            return [
-                f"**{markdown_text(block.title)}** (played in "
-                f"[report.html](report.html#{block.id})). {spans(block.caption)}"
-            ]
+def spans(text: str) -> str:
+    """Inline markup as Markdown."""
+    return inline_markdown(text.strip())
 
 
-def _table(table: DataTable, tables: str) -> list[str]:
-    shown = parts(table)
-    lines = [
-        _line(part.header for part in shown),
-        _line(("---" if part.column.kind == "text" else "---:" for part in shown), escape=False),
-        *(_line(part.text(row.values[part.index]) for part in shown) for row in table.rows),
-    ]
-    data = [f"Data: [{tables}/{table.id}.csv]({tables}/{table.id}.csv)."] if tables else []
-    return [spans(table.caption.strip()), "\n".join(lines), *map(spans, table.notes), *data]
+def shown_texts(row: Row, shown: Iterable[Part]) -> list[str]:
+    """What a row shows in each of these parts of columns."""
+    return [part.text(row.values[part.index]) for part in shown]
 
 
-def _line(cells: Iterable[str], escape: bool = True) -> str:
-    texts = (markdown_text(f" {one_line(cell)} ") if escape else f" {cell} " for cell in cells)
-    return f"|{'|'.join(texts)}|"
+def table_line(cells: Iterable[str]) -> str:
+    """A line of a table."""
+    return f"|{'|'.join(markdown_text(f' {one_line(cell)} ') for cell in cells)}|"

@@ -13,7 +13,7 @@ from analysis.markup import code, escaped
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from analysis.report.legends import with_legends
 from analysis.report.summary import verdicts
-from analysis.report.tables import claims_table
+from analysis.report.tables.claims import claims_table
 from analysis.words import NONE, slugs
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from analysis.comparisons.pairs import PairRow
 from analysis.markup import code, escaped
 from analysis.report.document import Block, Bullets, Document, Prose, Section
-from analysis.report.legends import with_legends
 from analysis.report.tables.common import marked, table_ids
+from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.methods import overall_table
 from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.statistics.estimates import LEVEL, RESAMPLES
@@ -54,14 +54,17 @@ def outcome(rows: Sequence[PairRow]) -> Iterator[str]:
     for row in rows:
         groups.setdefault((row.kind, row.first), []).append(row)
     for (kind, first), own in groups.items():
-        found: dict[str, list[str]] = {}
-        for row in sorted(own, key=_order):
-            found.setdefault(_VERDICTS[_order(row)], []).append(row.second)
-        words = "; ".join(f"{verdict} {', '.join(names)}" for verdict, names in found.items())
+        found = {
+            verdict: [row.second for row in own if _verdict(row) == verdict]
+            for verdict in _VERDICTS
+        }
+        words = "; ".join(
+            f"{verdict} {', '.join(names)}" for verdict, names in found.items() if names
+        )
         yield escaped(f"{first} and {_OTHERS[kind]}: {words}.")
 
 
-_VERDICTS = (
+_VERDICTS = _HIGHER, _LOWER, _NOT_APART, _UNTESTED = (
     "higher than",
     "lower than",
     "not told apart from",
@@ -69,13 +72,12 @@ _VERDICTS = (
 )
 
 
-def _order(row: PairRow) -> int:
-    """Place in :data:`_VERDICTS`."""
+def _verdict(row: PairRow) -> str:
     if math.isnan(row.p_permutation_holm):
-        return 3
+        return _UNTESTED
     if row.p_permutation_holm >= LEVEL:
-        return 2
-    return 0 if row.difference > 0 else 1
+        return _NOT_APART
+    return _HIGHER if row.difference > 0 else _LOWER
 
 
 def _least_p(row: PairRow) -> float:
@@ -88,22 +90,16 @@ def _least_p(row: PairRow) -> float:
 def _tasks(study: Study) -> Iterator[Section]:
     ids = table_ids(study)
     for task, rows in itertools.groupby(study.pair_rows, key=lambda row: row.task):
-        tables = (pairwise_table(study, task), cost_table(study, task))
-        blocks = [with_legends(table) for table in tables if table is not None]
+        tables = filter(None, (pairwise_table(study, task), cost_table(study, task)))
         said = Bullets(tuple(outcome(list(rows))))
-        yield Section(f"on-{ids[task]}", marked(study, task), (said, *blocks))
+        yield Section(f"on-{ids[task]}", marked(study, task), (said, *tables))
 
 
 def _across(study: Study) -> Iterator[Block]:
     tasks = list(dict.fromkeys(study.scores.task))
     names = escaped(", ".join(tasks)) or "none"
     table = overall_table(study)
-    text = (
-        f"On {names}. Intervals are about other runs, not other tasks; there are none for "
-        "methods that are run once, and none where the runs of each task all reach a gap "
-        "or none does. *dual-process (EC1, EC4)*: EC1 on one-armed tasks, EC4 on those "
-        "with two arms; likewise EC3, and variants."
-    )
+    (text,) = LAYOUTS["across-tasks"].read(names=names)
     if len(tasks) < 2:
         text = f"Needs at least two tasks with known optimum and initial solution; here: {names}."
     elif table is None:
@@ -111,7 +107,7 @@ def _across(study: Study) -> Iterator[Block]:
     yield Prose((text,))
     if table is None:
         return
-    yield with_legends(table)
+    yield table
     others = dict.fromkeys(study.scores.method[~study.scores.method.isin(study.overall.method)])
     left = escaped(", ".join(name for name in others if not name.startswith(SEARCH)))
     if left:

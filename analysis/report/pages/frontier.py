@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from analysis.markup import escaped
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
-from analysis.report.legends import with_legends
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.cost import (
-    READING_OF_COST,
     TARGET_SPENDS,
     areas_table,
     other_arms,
     pareto_table,
+    reading_of_cost,
     targets_table,
 )
 from analysis.words import typographic
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def frontier_document(study: Study) -> Document:
     """All tables of reward against cost, task by task."""
-    reading = Section("reading", "How to read it", (Bullets(READING_OF_COST),))
+    reading = Section("reading", "How to read it", (Bullets(reading_of_cost()),))
     by_task = (_on(study, task, slug) for task, slug in table_ids(study).items())
     return Document("Reward and what it costs", (reading, *by_task), runs=study.run_ids)
 
@@ -37,13 +37,9 @@ def _on(study: Study, task: str, slug: str) -> Section:
 
 def cost_tables(study: Study, task: str) -> Iterator[DataTable]:
     """Targets of each optimum, areas and Pareto sets of a task, as far as there are any."""
-    tables: list[DataTable | None] = [
-        targets_table(study, task, spend, arm)
-        for spend in TARGET_SPENDS
-        for arm in other_arms(study, task)
-    ]
-    tables += [areas_table(study, task), pareto_table(study, task)]
-    yield from (with_legends(table) for table in tables if table is not None)
+    places = itertools.product(TARGET_SPENDS, other_arms(study, task))
+    targets = (targets_table(study, task, *place) for place in places)
+    return filter(None, (*targets, areas_table(study, task), pareto_table(study, task)))
 
 
 def optima_known(study: Study, task: str) -> Prose:

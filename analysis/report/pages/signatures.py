@@ -4,30 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from analysis.report.document import Block, DataTable, Document, Prose, Section
+from analysis.report.document import Block, Document, Prose, Section
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
+from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.signatures import definitions_table, signatures_tables
 from analysis.signatures.rows import NO_RUN
 
 if TYPE_CHECKING:
     from analysis.study import Study
-
-LEAD = (
-    "Means over runs with Student's 95 % interval, shares of runs with Wilson's, slopes with the "
-    "regression's. A number alone is that of a single run, or of a quantity without an interval; "
-    "no spread says that these runs do not differ, not that others would not. Methods by mean "
-    "reward, best first. How tests and intervals hold: docs/signatures.md; all signatures, by "
-    "goal, hand and joint: `signatures.csv`."
-)
-TESTS = (
-    "p-values are two-sided for ΔV z and slopes, of permutation tests for contexts and norms of "
-    "slopes, one-sided for the sacrifice (in the mean over runs, the first subtask takes longer "
-    "by more than one tick and the whole takes less than by the corrective process with the same "
-    "hands). They are adjusted by Holm's method over all tests of their own table, in the table "
-    "of contexts over those of the same goal, hand and tasks, of slopes norms apart from joints. "
-    "Over several tables nothing is adjusted."
-)
 
 
 def signatures_document(study: Study) -> Document:
@@ -37,16 +22,16 @@ def signatures_document(study: Study) -> Document:
         found: list[Block] = [*signatures_tables(study, task)]
         blocks = found or [Prose((f"{NO_RUN.capitalize()}.",))]
         sections.append(Section(f"on-{slug}-signatures", marked(study, task), tuple(blocks)))
-    contexts = contexts_table(study)
-    between: list[tuple[str, str, list[DataTable]]] = [
-        ("between-contexts", "Between contexts", [contexts] if contexts else []),
+    for name, title, tables in (
+        ("between-contexts", "Between contexts", [contexts_table(study)]),
         ("locus-slopes", "Locus slopes", slopes_tables(study)),
         ("signatures-meaning", "What the signatures say", [definitions_table()]),
-    ]
-    sections += [Section(name, title, tuple(found)) for name, title, found in between if found]
-    tests: list[Block] = [Prose((TESTS,))]
+    ):
+        made = tuple(filter(None, tables))
+        sections += [Section(name, title, made)] if made else []
+    lead, tested = LAYOUTS["main-signatures"].read()
+    tests: list[Block] = [Prose((tested,))]
     if any(task.reconstructed for task in study.tasks.values()):
         tests.append(Prose(("† Reconstructed task (docs/model.md).",)))
     sections.insert(0, Section("signatures-reading", "How to read the tables", tuple(tests)))
-    runs = {key: tuple(map(str, cell.runs.run_id)) for key, cell in study.cells.items()}
-    return Document("Signatures of coarticulation", tuple(sections), LEAD, runs)
+    return Document("Signatures of coarticulation", tuple(sections), lead, study.run_ids)

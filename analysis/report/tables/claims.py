@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.claims.register import FITTED, RULES
-from analysis.report.document import Column, DataTable, Row
-from analysis.report.tables.common import finite, table
+from analysis.report.document import DataTable
+from analysis.report.tables.layout import LAYOUTS
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -15,41 +16,23 @@ if TYPE_CHECKING:
 
 def claims_table(study: Study) -> DataTable | None:
     """Every claim with its verdict, p-values and place; rows lead to the claims' sections."""
+    layout, rows = LAYOUTS["claims"], []
     by_run = {str(run): key for key, cell in study.cells.items() for run in cell.runs.run_id}
-    rows = [
-        Row(
+    for entry in study.judged:
+        row = layout.row(
             entry.claim.id,
-            (
-                entry.claim.id,
-                entry.claim.statement,
-                entry.marked,
-                finite(entry.adjusted_p),
-                finite(entry.adjusted_contrary_p),
-                ", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
-            ),
-            tuple(dict.fromkeys(by_run[run] for run in entry.run_ids)),
-            link=f"#claim-{entry.claim.id}",
+            entry,
+            dict.fromkeys(by_run[run] for run in entry.run_ids),
+            claim=entry.claim.id,
+            statement=entry.claim.statement,
+            verdict=entry.marked,
+            place=", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
         )
-        for entry in study.judged
-    ]
-    tested = sum(not math.isnan(entry.p) for entry in study.judged)
-    contraries = sum(not math.isnan(entry.contrary_p) for entry in study.judged)
-    return table(
-        "claims",
-        "What the paper says of its model, and what it does not compare.",
-        (
-            Column("claim", "claim"),
-            Column("statement", "statement", rests_on=("text",), printed=False),
-            Column("verdict", "verdict", rests_on=("runs",)),
-            Column("adjusted_p", "adjusted p", "p", digits=4, rests_on=("runs",)),
-            Column("adjusted_contrary_p", "of the contrary", "p", digits=4, rests_on=("runs",)),
-            Column("place", "place in the paper", rests_on=("paper",), printed=False),
-        ),
+        rows.append(replace(row, link=f"#claim-{entry.claim.id}"))
+    return layout.table(
         rows,
-        (
-            RULES,
-            f"Adjusted by Holm over the {tested} claims that could be tested here, for the "
-            f"contrary over {contraries}.",
-            FITTED,
-        ),
+        rules=RULES,
+        tested=sum(not math.isnan(entry.p) for entry in study.judged),
+        contraries=sum(not math.isnan(entry.contrary_p) for entry in study.judged),
+        fitted=FITTED,
     )

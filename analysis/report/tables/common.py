@@ -1,4 +1,4 @@
-"""What the report's tables share: names of tasks, values of cells, empty tables."""
+"""What the report's tables share: names of tasks, means, counts of hand sequences."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
+from analysis.report.document import Estimate
+from analysis.report.tables.layout import finite
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
 from analysis.words import slugs
@@ -21,25 +22,6 @@ def table_ids(study: Study) -> dict[str, str]:
     return slugs(study.results.tasks)
 
 
-def table(
-    name: str,
-    caption: str,
-    columns: tuple[Column, ...],
-    rows: list[Row],
-    notes: tuple[str, ...] = (),
-) -> DataTable | None:
-    """A table, or None where it would have no rows."""
-    return DataTable(name, caption, columns, tuple(rows), notes) if rows else None
-
-
-def row_of(
-    columns: tuple[Column, ...], key: str, of: Any, cells: tuple[CellKey, ...], **own: Value
-) -> Row:
-    """A row whose values are fields of ``of`` by the columns' names, but for its ``own``."""
-    values = (own[c.name] if c.name in own else getattr(of, c.name) for c in columns)
-    return Row(key, tuple(values), cells)
-
-
 def mean_of(rewards: Any) -> Estimate | None:
     """Mean with SD and BCa interval, as far as there are any."""
     if not len(rewards):
@@ -47,17 +29,6 @@ def mean_of(rewards: Any) -> Estimate | None:
     found = mean(rewards, seed=SEED)
     ends = () if math.isnan(found.low) else (found.low, found.high)
     return Estimate(found.estimate, finite(sd(rewards)), *ends)
-
-
-def with_interval(value: float, low: float, high: float) -> Value:
-    """A value with its interval where it has one; None for NaN."""
-    ends = () if math.isnan(low) else (low, high)
-    return None if math.isnan(value) else Estimate(value, None, *ends)
-
-
-def finite(value: float) -> float | None:
-    """None for NaN."""
-    return None if math.isnan(value) else float(value)
 
 
 def counts(hands: pd.Series) -> str | None:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.markup import escaped
 from analysis.report.document import CellKey, Column, DataTable, Row, Value
-from analysis.report.tables.common import table, table_ids
+from analysis.report.tables.common import table_ids
+from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.signatures import (
     cells_of,
+    columns_of,
     holm_adjusted,
     identifier,
     known,
     labels_of,
-    p_column,
-    runs_column,
-    value_column,
 )
 from analysis.signatures.locus import families
 from analysis.signatures.register import CONTEXTS, FAMILIES, REGISTER
@@ -52,33 +51,20 @@ def contexts_table(study: Study) -> DataTable | None:
         against = next(iter(own.values())).place.against
         cells = _cells_there(study, [(task, label), (against, label)])
         rows.append(Row(f"{task}, {at}, {label}", tuple(values), cells))
-    made = table(
-        "contexts",
-        "The same goal before different successors.",
-        _columns_of_contexts(tested),
-        rows,
-        (
-            "Postures at the same goal before different successors. Runs are those of both tasks. "
-            "The distance mixes length unit and rad; the parts are per root of their dimension. "
-            "The lead is the time before the hit for which contexts differ, of the shorter "
-            "movement's ticks.",
-            "p is of the permutation test, adjusted by Holm's method over all tests of the same "
-            f"goal, hand and tasks. {len(rows)} rows.",
-        ),
-    )
-    return made and replace(made, folded=len(rows) > MOST_CONTEXTS)
+    layout = LAYOUTS["contexts"].plus(_columns_of_contexts(tested))
+    layout = layout.model_copy(update={"folded": len(rows) > MOST_CONTEXTS})
+    return layout.table(rows, count=len(rows))
 
 
-def _columns_of_contexts(tested: set[str]) -> tuple[Column, ...]:
-    columns = [Column("method", "method"), Column("where", "where", printed=False), runs_column()]
+def _columns_of_contexts(tested: set[str]) -> Iterator[Column]:
     for signature in CONTEXTS:
-        name = identifier(signature.name)
-        columns.append(value_column(signature, name, signature.heading, True))
-        if signature.name in tested:
-            printed = signature.name == "context dependence"
-            columns.append(p_column(name, f"p of {signature.heading}", printed))
-    longest = Column("lead_at_most", "at most", "number", "ticks", 0, rests_on=("runs",))
-    return (*columns, replace(longest, printed=False))
+        name, heading = signature.name, signature.heading
+        p = f"p of {heading}" if name in tested else ""
+        printed = name == "context dependence"
+        yield from columns_of(signature, identifier(name), heading, p, p_printed=printed)
+    yield Column(
+        "lead_at_most", "at most", "number", "ticks", 0, rests_on=("runs",), printed=False
+    )
 
 
 def slopes_tables(study: Study) -> list[DataTable]:
@@ -87,8 +73,8 @@ def slopes_tables(study: Study) -> list[DataTable]:
     for row in study.signature_rows:
         if REGISTER[row.signature] in FAMILIES and known(row):
             found[row.task, replace(row.place, joint="")].append(row)
-    made = [_slopes_at(study, task, place, rows) for (task, place), rows in found.items()]
-    return [replace(table, folded=True) for table in made if table is not None]
+    made = (_slopes_at(study, task, place, rows) for (task, place), rows in found.items())
+    return list(filter(None, made))
 
 
 def _slopes_at(
@@ -108,26 +94,16 @@ def _slopes_at(
                 what = row.place.joint or "norm"
                 values = (label, what, row.n, *cells_of(row, adjusted, True))
                 found.append(Row(f"{label}, {what}", values, cells))
-    slope = REGISTER["locus slope"]
-    return table(
-        f"slopes-{table_ids(study)[task]}-{place.goal}-of-{place.moving}-{place.hand}",
-        f"Locus slopes: {place} (first of the tasks: {escaped(task)}).",
-        (
-            Column("method", "method"),
-            Column("joint", "joint"),
-            runs_column(printed=True),
-            value_column(slope, "slope", "slope", True),
-            p_column("slope", "p", True),
-        ),
-        found,
-        (
-            "Slopes of the posture at a goal on the position of a neighbouring goal, by joint: "
-            "length unit (base) or rad (joints) per length unit. They are those of the mean "
-            "posture at each position, with positions − 2 degrees of freedom, for methods that "
-            "are run once as for the others; curvature widens their intervals. Joints without "
-            "any slope are left out. The norm is that of all joints together; it is never "
-            "negative. p is adjusted by Holm's method over the table, norms apart from slopes.",
-        ),
+    columns = columns_of(REGISTER["locus slope"], "slope", "slope", "p", p_printed=True)
+    return (
+        LAYOUTS["slopes"]
+        .plus(columns)
+        .table(
+            found,
+            *(table_ids(study)[task], str(place.goal), "of", str(place.moving), place.hand),
+            place=place,
+            task=escaped(task),
+        )
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -15,41 +15,30 @@ from analysis.comparisons.progress import LABELS, SPENDS
 from analysis.comparisons.targets import Target
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.report.tables.common import finite, table, table_ids, with_interval
+from analysis.report.tables.common import table_ids
+from analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from analysis.results.optima import OtherArm
 from analysis.words import typographic
 from coartic.record import SEARCH
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-OtherArm = Literal["free", "still"]
 TARGET_SPENDS = ("trials", "forward_kinematics")
 """Spends whose targets have tables; ``targets.csv`` has all."""
 SOMETIMES = 0.05
 """Share of resamples in which a method that has a row is on some front."""
-READING_OF_COST = (
-    "Two-armed tasks have two optima: with all joints free, and with the arm that is not chosen "
-    "kept still; the second concerns methods that keep it so. The optimum's own searches and "
-    "methods with a base that a parameter locks are left out. Kinematics and time within a run "
-    "are its totals, spread evenly over its trials. A planner makes no trials.",
-    "**Targets**: of runs that their budget of trials stopped nobody knows when they would have "
-    "come near. They are censored, all at the horizon, the least spend at which one of them "
-    "ended: what was reached behind it counts among the runs that came near, not in the median "
-    "(18/20 and ∞ with a horizon of 2000: 18 runs did, but not half of the 20 within the 2000 "
-    "that all runs had). Other runs never reach what they missed. `targets.csv` of `coartic "
-    "analyse` has all four spends.",
-    "**Areas**: from one average trial to the largest whole spend of a method that learns; "
-    "comparable within a column. `areas.csv` has them in full, `anytime.csv` the curves.",
-    "**Pareto sets**: a method is on the front if none has a mean reward as high for as little "
-    "spend, and one of them better. A method with a single run has nothing to resample. Counts "
-    f"are exact; solve times within {100 * TIME_TOLERANCE:.0f} % of each other count as ties, "
-    "because they vary between machines and runs. Methods with a run that has no solution are "
-    "left out; methods on no front are in `pareto.csv`.",
-)
-"""What is behind the tables of this module."""
 _number = partial(Column, kind="number", rests_on=("runs",))
 _of_optimum = partial(Column, kind="number", rests_on=("runs", "optimum"))
-_SUFFIX = {"trials": "", "forward_kinematics": "-kinematics"}
+_IN_ID = {"forward_kinematics": ["kinematics"], "still": ["still"]}
+"""What ids of tables say of a spend and an arm, but for the first of them."""
+_TARGETS, _AREAS, _PARETO = (LAYOUTS[name] for name in ("targets", "areas", "pareto"))
+
+
+def reading_of_cost() -> tuple[str, ...]:
+    """What is behind the tables of this module."""
+    pareto = _PARETO.read(tolerance=100 * TIME_TOLERANCE)
+    return (*_TARGETS.read(), *_AREAS.read(), *pareto)
 
 
 def other_arms(study: Study, task: str) -> tuple[OtherArm, ...]:
@@ -70,31 +59,21 @@ def targets_table(
     near = [rows for rows in methods.values() if any(row.reached for row in rows)]
     if not near:
         return None
-    of_spend, of_arm = _SUFFIX[spend], "" if other_arm == "free" else "-still"
-    never = ", ".join(name for name, rows in methods.items() if rows not in near)
-    note = (
-        "Runs that came within a share of the optimum, and the median spend to get there "
-        "over all runs (Kaplan-Meier; runs stopped by their budget are censored at the "
-        f"horizon).{' Planners need no trials.' if spend == 'trials' else ''}"
-    )
-    if never:
-        note += f" Never within {100 * near[0][0].share:.0f} %: {escaped(never)}."
-    return table(
-        f"targets-{table_ids(study)[task]}{of_spend}{of_arm}",
-        f"{LABELS[spend].capitalize()} to come near the optimum of {escaped(task)}, other arm "
-        f"{other_arm}.",
-        (
-            Column("method", "method"),
-            *_within(near[0], spend, other_arm),
-            _number("horizon", "horizon", digits=0, printed=False),
-        ),
-        [_target_row(rows) for rows in sorted(near, key=_nearness)],
-        (note,),
+    never = escaped(", ".join(name for name, rows in methods.items() if rows not in near))
+    layout = _TARGETS.plus(_within(near[0], spend, other_arm))
+    return layout.table(
+        map(_target_row, sorted(near, key=_nearness)),
+        *(table_ids(study)[task], *_IN_ID.get(spend, []), *_IN_ID.get(other_arm, [])),
+        spend=LABELS[spend].capitalize(),
+        task=escaped(task),
+        other_arm=other_arm,
+        planners=" Planners need no trials." if spend == "trials" else "",
+        never=f" Never within {100 * near[0][0].share:.0f} %: {never}." if never else "",
     )
 
 
 def _within(targets: list[Target], spend: str, other_arm: OtherArm) -> Iterator[Column]:
-    """Of each share two columns: runs that came so near, and what it took."""
+    """Of each share two columns: runs that came so near, and what it took; then the horizon."""
     for target in targets:
         name = f"within_{target.share:.0%}".rstrip("%")
         head = f"within {100 * target.share:.0f} %: {typographic(str(target.target))}"
@@ -102,6 +81,7 @@ def _within(targets: list[Target], spend: str, other_arm: OtherArm) -> Iterator[
         column = partial(_of_optimum, other_arm=other_arm, printed=ends)
         yield column(f"{name}_reached", head, kind="text")
         yield column(name, f"median {LABELS[spend]}", digits=0)
+    yield _number("horizon", "horizon", digits=0, printed=False)
 
 
 def _target_row(targets: list[Target]) -> Row:
@@ -134,20 +114,18 @@ def areas_table(study: Study, task: str) -> DataTable | None:
     arms = [arm for arm in other_arms(study, task) if (frame.other_arm == arm).any()]
     spends = [spend for spend in SPENDS if (frame.spend == spend).any()]
     places = [(arm, spend) for arm in arms for spend in spends]
-    known: dict[str, dict[tuple[str, str], Area]] = {}
-    for row in frame.itertuples(index=False, name=None):
-        area = Area(*row)
-        known.setdefault(area.method, {})[area.other_arm, area.spend] = area
+    areas = [Area(*row) for row in frame.itertuples(index=False, name=None)]
+    known = {(area.method, area.other_arm, area.spend): area for area in areas}
 
     def first(method: str) -> float:
-        return known[method][places[0]].area if places[0] in known[method] else math.inf
+        return known[method, *places[0]].area if (method, *places[0]) in known else math.inf
 
     rows = []
-    for method in sorted(known, key=first):
-        own = (known[method].get(place) for place in places)
+    for method in sorted(dict.fromkeys(area.method for area in areas), key=first):
+        own = (known.get((method, *place)) for place in places)
         values = (found and with_interval(found.area, found.low, found.high) for found in own)
         rows.append(Row(method, (method, *values), ((task, method),)))
-    heads = [
+    heads = (
         _of_optimum(
             spend if arm == "free" else f"{spend}_still",
             f"over {LABELS[spend]}" + ("" if arm == "free" else ", arm still"),
@@ -156,18 +134,8 @@ def areas_table(study: Study, task: str) -> DataTable | None:
             printed=arm == "free" and spend in spends[:2],
         )
         for arm, spend in places
-    ]
-    return table(
-        f"areas-{table_ids(study)[task]}",
-        f"Area under the anytime curve on {escaped(task)}.",
-        (Column("method", "method"), *heads),
-        rows,
-        (
-            "Mean gap to the optimum, as a share of it, over the logarithm of the budget, with "
-            "its percentile bootstrap interval: 0 is optimal from the first trial on, 1 nothing "
-            "found. Within a task and a column only.",
-        ),
     )
+    return _AREAS.plus(heads).table(rows, table_ids(study)[task], task=escaped(task))
 
 
 def pareto_table(study: Study, task: str) -> DataTable | None:
@@ -178,29 +146,17 @@ def pareto_table(study: Study, task: str) -> DataTable | None:
         for method, own in frame.groupby("method", sort=False)
         if (own.told_share > SOMETIMES).any()
     ]
-    heads = [
-        Column("method", "method"),
-        Column("told", "told", rests_on=("text",)),
-        _number("reward", "reward", unit="ticks", digits=1),
-    ]
+    layout = _PARETO.plus(_fronts())
+    return layout.table(rows, table_ids(study)[task], task=escaped(task))
+
+
+def _fronts() -> Iterator[Column]:
+    """Of each spend three columns: the median, and on which fronts it is."""
+    share = partial(_number, kind="share", digits=0)
     for place, (spend, label) in enumerate(LABELS.items()):
-        share = partial(_number, kind="share", digits=0)
-        heads += [
-            _number(spend, label, printed=place < 3),
-            share(f"{spend}_front", "on front", printed=place < 3),
-            share(f"{spend}_told", "of those told no more", printed=False),
-        ]
-    return table(
-        f"pareto-{table_ids(study)[task]}",
-        f"Pareto sets of reward and spend on {escaped(task)}.",
-        tuple(heads),
-        rows,
-        (
-            "Of every spend the median over runs, and in how many bootstrap resamples of the runs "
-            "the method is on the front of all, and on that of the methods that are told no more "
-            "than it is. Methods on none (in at most 5 % of resamples) are left out.",
-        ),
-    )
+        yield _number(spend, label, printed=place < 3)
+        yield share(f"{spend}_front", "on front", printed=place < 3)
+        yield share(f"{spend}_told", "of those told no more", printed=False)
 
 
 def _on_fronts(rows: pd.DataFrame) -> Iterator[Value]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
@@ -15,56 +13,16 @@ from analysis.published import (
     published_exhaustive,
     published_initial,
 )
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.report.tables.common import counts, marked, mean_of, row_of, table, with_interval
+from analysis.report.document import DataTable, Estimate, Row, Value
+from analysis.report.tables.common import counts, marked, mean_of
+from analysis.report.tables.layout import LAYOUTS, with_interval
 from analysis.statistics.equivalence import MARGIN
 from analysis.words import typographic
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
-
-_of_paper = partial(Column, rests_on=("paper",), printed=False)
-_of_runs = partial(Column, rests_on=("runs",), printed=False)
-_PUBLISHED = Column("published", "paper", "number", "ticks", 1, rests_on=("paper",))
-_PUBLISHED_RUNS = _of_paper("published_runs", "published runs", "number")
-_PUBLISHED_AS = _of_paper("published_as", "published as")
-_OURS = Column("ours", "ours", "number", "ticks", 1, rests_on=("runs",))
-_RUNS = _of_runs("runs", "runs", "number")
-_DIFFERENCE = Column("difference", "difference", "number", "ticks", 1, rests_on=("runs", "paper"))
-_CELLS = (
-    Column("task", "task"),
-    Column("method", "method"),
-    *(_PUBLISHED, _PUBLISHED_RUNS, _PUBLISHED_AS, _OURS, _RUNS, _DIFFERENCE),
-    Column("verdict", "verdict", rests_on=("runs", "paper")),
-    _of_paper("margin", "margin", "number", "ticks", 1),
-    _of_paper("margin_of_gain", "of the gain", "share", "", 0),
-    _of_runs("initial", "initial", "number", "ticks", 0),
-    _of_paper("published_initial", "initial, published", "number", "ticks", 0),
-    _of_runs("hands", "hands: runs"),
-    _of_paper("published_hands", "hands, published"),
-)
-_SEQUENCES = (
-    Column("task", "task"),
-    Column("method", "method"),
-    Column("hands", "hands", rests_on=("runs", "paper")),
-    _PUBLISHED,
-    replace(_PUBLISHED_RUNS, printed=True),
-    _PUBLISHED_AS,
-    _OURS,
-    replace(_RUNS, printed=True),
-    _DIFFERENCE,
-)
-_PAPER = (
-    "Published: Shah, Barto & Fagg (2013), mean ± SD, rounded as there. *derived*: pooled from "
-    "what is printed by hand sequence; *runs assumed*: no number of runs stands beside it, "
-    f"{RUNS} is that of every experiment. The difference, ours less published, has Welch's "
-    "interval from the printed mean, SD and runs; where no SD is printed the printed mean is "
-    "taken as exact. "
-    "Each interval is for its row alone. Rewards are not normally distributed, as the paper says "
-    "of its own: the intervals are approximate, most of all where runs settle on several hand "
-    "sequences."
-)
+_CELLS, _SEQUENCES = LAYOUTS["published-and-ours"], LAYOUTS["by-hand-sequence"]
 
 
 def beside_paper(study: Study) -> tuple[DataTable | None, ...]:
@@ -78,43 +36,31 @@ def published_table(study: Study) -> DataTable | None:
     derived = dict.fromkeys(
         row.cell.task for row in rows if (published_initial(row.cell.task) or ("", 0, False))[2]
     )
-    notes = [
-        _PAPER,
-        "Ours: mean ± SD with its BCa interval; learned reward of a run is the best of its noisy "
-        "trials, as in the paper as we read it, −1 for every control tick.",
-        f"*Equivalent*: the interval of the difference lies within {MARGIN:.0%} of the published "
-        "reward, the margin; *different*: outside; *undecided*: neither. Of the gain: the margin "
-        "as a share of what learning gained in the paper. Runs with another number of trials "
-        f"than the paper's {TRIALS} are not comparable and get no verdict.",
-    ]
-    if derived:
-        notes.append(
-            f"Published initial rewards of {', '.join(derived)} are derived from other printed "
-            "numbers."
-        )
-    return table(
-        "published-and-ours",
-        "Learned reward in the paper's cells, published and ours.",
-        _CELLS,
-        [_published_row(study, row) for row in rows],
-        tuple(notes),
+    names = ", ".join(derived)
+    said = f"Published initial rewards of {names} are derived from other printed numbers."
+    return _CELLS.table(
+        (_published_row(study, row) for row in rows),
+        notes=(said,) if derived else (),
+        of_paper=_of_paper(),
+        margin=MARGIN,
+        trials=TRIALS,
     )
 
 
 def sequences_table(study: Study) -> DataTable | None:
     """Learned rewards of the paper's cells by hand sequence, published and ours."""
-    return table(
-        "by-hand-sequence",
-        "Learned reward by hand sequence, where the paper or our runs tell several apart.",
-        _SEQUENCES,
-        [_sequence_row(study, row) for row in sequence_rows(study)],
-        (_PAPER,),
-    )
+    rows = (_sequence_row(study, row) for row in sequence_rows(study))
+    return _SEQUENCES.table(rows, of_paper=_of_paper())
+
+
+def _of_paper() -> str:
+    """What both tables say of published rewards."""
+    return " ".join(_CELLS.read(runs=RUNS))
 
 
 def exhaustive_table(study: Study) -> DataTable | None:
     """The best hand sequences of the corrective process alone."""
-    rows = []
+    layout, rows = LAYOUTS["exhaustive"], []
     for task in study.tasks:
         trials = study.results.sequences[study.results.sequences.task == task]
         if len(trials) < 2:
@@ -124,34 +70,23 @@ def exhaustive_table(study: Study) -> DataTable | None:
             f"{hands} {typographic(str(reward))}"
             for hands, reward in zip(best.hands, best.reward, strict=True)
         )
-        values = (
-            marked(study, task),
-            f"{paper[0]} {typographic(str(paper[1]))}" if paper else None,
-            ", ".join(shown),
-            len(trials),
-            int(trials.reward.isna().sum()),
+        row = layout.row(
+            task,
+            task=marked(study, task),
+            published=f"{paper[0]} {typographic(str(paper[1]))}" if paper else None,
+            best=", ".join(shown),
+            sequences=len(trials),
+            failed=int(trials.reward.isna().sum()),
         )
-        rows.append(Row(task, values))
-    return table(
-        "exhaustive",
-        "The corrective process alone with every hand sequence.",
-        (
-            Column("task", "task"),
-            Column("published", "best, published", rests_on=("paper",)),
-            Column("best", "best four, ours", rests_on=("simulation",)),
-            Column("sequences", "sequences", "number", rests_on=("simulation",)),
-            Column("failed", "failed", "number", rests_on=("simulation",)),
-        ),
-        rows,
-    )
+        rows.append(row)
+    return layout.table(rows)
 
 
 def _published_row(study: Study, row: PaperRow) -> Row:
     cell, summary = row.cell, row.paper.summary
     initial = cell.good.initial_reward.dropna()
     published_hands = [f"{s.hands} {s.runs or ''}".strip() for s in row.paper.sequences]
-    return row_of(
-        _CELLS,
+    return _CELLS.row(
         f"{cell.task} {cell.label}",
         row,
         ((cell.task, cell.label),),
@@ -167,7 +102,7 @@ def _published_row(study: Study, row: PaperRow) -> Row:
 def _sequence_row(study: Study, row: SequenceRow) -> Row:
     key = row.cell.task, row.cell.label
     own = _beside(study, row, row.published)
-    return row_of(_SEQUENCES, " ".join((*key, row.hands)), row, (key,), **own)
+    return _SEQUENCES.row(" ".join((*key, row.hands)), row, (key,), **own)
 
 
 def _beside(

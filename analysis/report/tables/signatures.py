@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row, Value
-from analysis.report.tables.common import counts, table, table_ids, with_interval
+from analysis.report.tables.common import counts, table_ids
+from analysis.report.tables.layout import LAYOUTS, with_interval
 from analysis.signatures.register import REGISTER
 from analysis.signatures.rows import Signature, SignatureRow
 from analysis.statistics.hypotheses import holm
@@ -22,55 +22,10 @@ from analysis.statistics.hypotheses import holm
 if TYPE_CHECKING:
     from analysis.study import Study
 
-
-class _Kind(NamedTuple):
-    """A table of one task."""
-
-    id: str
-    title: str
-    shows: str
-    """What signatures of the register name as their table."""
-    note: str = ""
-
-
-_KINDS = (
-    _Kind("main-signatures", "Main signatures", "main-signatures"),
-    _Kind("further-goals", "Signatures at further goals", "main-signatures"),
-    _Kind(
-        "hands",
-        "Hands",
-        "hands",
-        "Hand sequences with the number of runs; ticks less those of the corrective process "
-        "alone with each run's own hands, which is what a sacrifice is judged by; and by goal, "
-        "the share of runs that hit it with the hand that is quickest for it by itself.",
-    ),
-    _Kind(
-        "other-arm",
-        "The arm that is not chosen",
-        "other-arm",
-        "How much nearer the waiting hand is to its next goal than in the initial solution when "
-        "each goal is hit (a ratio; 1: there already): in all; seen from the base, which leaves "
-        "out what a base does that moved otherwise than in the initial solution; and by what the "
-        "arm did since its own last hit, 0 where it keeps still while it waits.",
-    ),
-    _Kind("travel", "Travel of the arm that is not chosen", "travel"),
-    _Kind(
-        "synergy",
-        "Synergy, ΔV z",
-        "synergy",
-        "ΔV z at each goal, over the runs with a method's commonest hand sequence; p of the test "
-        "against its neutral value, ½ ln(d_ucm/d_ort). **It is above neutral nearly everywhere, "
-        "and says little**: a hit confines the hand to a disc of the task's radius, so that runs "
-        "cannot differ much in directions that move it, whatever the method.",
-    ),
-    _Kind(
-        "variance",
-        "Synergy, V_ucm, V_ort and ΔV",
-        "variance",
-        "Variance over runs per dimension within (V_ucm) and orthogonal to (V_ort) the "
-        "uncontrolled manifold, squared units, and ΔV, their difference over the total.",
-    ),
-)
+_MAIN, _FURTHER = "main-signatures", "further-goals"
+"""Tables of the same signatures: at the first goal or none, and at the others."""
+_KINDS = (_MAIN, _FURTHER, "hands", "other-arm", "travel", "synergy", "variance")
+_SHORT = (_MAIN, "other-arm")
 
 
 class Spot(NamedTuple):
@@ -97,28 +52,26 @@ class Spot(NamedTuple):
 
 
 def signatures_tables(study: Study, task: str, *, short: bool = False) -> list[DataTable]:
-    """The signatures of all methods on one task; all but the main ones folded.
+    """The signatures of all methods on one task.
 
     ``short``: the main ones and those of the other arm alone.
     """
     rows = [row for row in study.signature_rows if row.task == task]
-    found = []
-    for kind in _KINDS:
-        main = kind.id in ("main-signatures", "other-arm")
-        if (short and not main) or (kind.id == "hands" and len(study.tasks[task].hands) < 2):
-            continue
-        made = _of_task(study, task, kind, rows)
-        if made is not None:
-            found.append(replace(made, folded=not main))
-    return found
+    kinds = [
+        kind
+        for kind in (_SHORT if short else _KINDS)
+        if kind != "hands" or len(study.tasks[task].hands) > 1
+    ]
+    return list(filter(None, (_of_task(study, task, kind, rows) for kind in kinds)))
 
 
 def _of_task(
-    study: Study, task: str, kind: _Kind, every: Sequence[SignatureRow]
+    study: Study, task: str, kind: str, every: Sequence[SignatureRow]
 ) -> DataTable | None:
     """Methods by signatures and places; None where no method has a value."""
-    rows = [row for row in every if REGISTER[row.signature].table == kind.shows]
-    spots = _spots(rows, kind.id)
+    shown = _MAIN if kind == _FURTHER else kind
+    rows = [row for row in every if REGISTER[row.signature].table == shown]
+    spots = _spots(rows, kind)
     own = {(row.label, spot_of(row)): row for row in rows}
     adjusted = holm_adjusted(row for row in own.values() if spot_of(row) in spots)
     tested = {spot_of(row) for row in adjusted}
@@ -134,33 +87,27 @@ def _of_task(
         if len(lacking[label]) == len(spots):
             continue
         cells: list[Value] = [label, max(row.n for row in values.values() if row and known(row))]
-        if kind.id == "hands":
+        if kind == "hands":
             cells.append(counts(study.cells[task, label].good.hands))
         for spot, row in values.items():
             cells += cells_of(row, adjusted, spot in tested)
         found.append(Row(label, tuple(cells), ((task, label),)))
-    columns = [Column("method", "method"), runs_column()]
-    if kind.id == "hands":
-        columns.append(Column("hands", "hands", rests_on=("runs",)))
+    columns: list[Column] = []
     for number, spot in enumerate(spots):
         header = spot.header + _neutral(row for (_, at), row in own.items() if at == spot)
-        columns.append(value_column(spot.signature, spot.name, header, number < 2))
-        columns += [p_column(spot.name, "p")] if spot in tested else []
-    return table(
-        f"{kind.id}-{table_ids(study)[task]}",
-        f"{kind.title} on {escaped(task)}.",
-        tuple(columns),
-        found,
-        tuple(filter(None, (kind.note, *_reasons(lacking, len(spots))))),
-    )
+        p = "p" if spot in tested else ""
+        columns += columns_of(spot.signature, spot.name, header, p, printed=number < 2)
+    reasons = _reasons(lacking, len(spots))
+    name = table_ids(study)[task]
+    return LAYOUTS[kind].plus(columns).table(found, name, notes=reasons, task=escaped(task))
 
 
 def _spots(rows: Sequence[SignatureRow], kind: str) -> list[Spot]:
     """The columns of a table, in the order of the register; of variance goal by goal."""
     order = list(REGISTER)
     found = {spot_of(row) for row in rows if row.unit}
-    if kind in ("main-signatures", "further-goals"):
-        found = {spot for spot in found if ((spot.goal or 1) > 1) == (kind == "further-goals")}
+    if kind in (_MAIN, _FURTHER):
+        found = {spot for spot in found if ((spot.goal or 1) > 1) == (kind == _FURTHER)}
 
     def place(spot: Spot) -> tuple[int, int, int, str]:
         first = spot.goal or 0 if kind == "variance" else 0
@@ -196,20 +143,12 @@ def _reasons(lacking: Mapping[str, Sequence[str]], columns: int) -> list[str]:
     return [escaped(line) for line in lines]
 
 
-def definitions_table() -> DataTable:
+def definitions_table() -> DataTable | None:
     """What every signature says."""
-    return DataTable(
-        "signatures-explained",
-        "What the signatures say.",
-        (
-            Column("signature", "signature"),
-            Column("extent", "unit, range"),
-            Column("meaning", "what it says"),
-        ),
-        tuple(
-            Row(signature.name, (signature.name, signature.extent, signature.meaning))
-            for signature in REGISTER.values()
-        ),
+    layout = LAYOUTS["signatures-explained"]
+    return layout.table(
+        layout.row(signature.name, signature, signature=signature.name)
+        for signature in REGISTER.values()
     )
 
 
@@ -243,19 +182,19 @@ def identifier(*words: str) -> str:
     return re.sub(r"\W+", "_", text.strip())
 
 
-def runs_column(*, printed: bool = False) -> Column:
-    """Runs that went into a row."""
-    return Column("runs", "runs", "number", rests_on=("runs",), printed=printed)
-
-
-def value_column(signature: Signature, name: str, header: str, printed: bool) -> Column:
-    """Values of a signature, with its unit and decimals."""
+def columns_of(
+    signature: Signature,
+    name: str,
+    header: str,
+    p: str = "",
+    *,
+    printed: bool = True,
+    p_printed: bool = False,
+) -> Iterator[Column]:
+    """Values of a signature, then their p-values where those have a header."""
     kind: Literal["share", "number"] = "share" if signature.share else "number"
     unit = signature.unit if signature.unit in ("ticks", "bit", "rad", "pooled SD") else ""
     digits = 0 if signature.share else signature.digits
-    return Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
-
-
-def p_column(name: str, header: str, printed: bool = False) -> Column:
-    """p-values beside the values of a column."""
-    return Column(f"{name}_p", header, "p", digits=3, rests_on=("runs",), printed=printed)
+    yield Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
+    if p:
+        yield Column(f"{name}_p", p, "p", digits=3, rests_on=("runs",), printed=p_printed)

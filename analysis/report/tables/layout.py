@@ -1,0 +1,111 @@
+"""What tables say whatever their values (``tables.toml``), and how values come into their rows."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+
+from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
+from analysis.report.legends import with_legends
+
+
+class Layout(BaseModel):
+    """A section of ``tables.toml``, which says what the fields are."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    caption: str
+    reading: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    folded: bool = False
+    intervals: dict[str, str] = {}
+    columns: tuple[Column, ...]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        unknown = self.intervals.keys() - {column.name for column in self.columns}
+        if unknown:
+            raise ValueError(f"intervals of no columns: {', '.join(sorted(unknown))}")
+        return self
+
+    def plus(self, columns: Iterable[Column]) -> Layout:
+        """With further columns, which depend on what there is to be shown."""
+        return self.model_copy(update={"columns": (*self.columns, *columns)})
+
+    def read(self, **facts: Any) -> tuple[str, ...]:
+        """What is said once of the tables, in inline markup as ``facts`` are."""
+        return tuple(text.format(**facts) for text in self.reading)
+
+    def row(self, key: str, of: Any = None, cells: Iterable[CellKey] = (), **own: Value) -> Row:
+        """Values by the columns' names: its ``own``, the others are fields of ``of``.
+
+        Raises ValueError for a value of its own that no column shows.
+        """
+        unknown = own.keys() - {column.name for column in self.columns}
+        if unknown:
+            raise ValueError(f"table {self.name} has no columns {', '.join(sorted(unknown))}")
+        values = (own[c.name] if c.name in own else self._field(of, c.name) for c in self.columns)
+        return Row(key, tuple(values), tuple(cells))
+
+    def _field(self, of: Any, name: str) -> Value:
+        value = getattr(of, name)
+        if name in self.intervals:
+            ends = (getattr(of, f"{self.intervals[name]}{end}") for end in ("low", "high"))
+            return with_interval(value, *ends)
+        if isinstance(value, float):
+            return finite(value)
+        return None if value == "" else value
+
+    def table(
+        self, rows: Iterable[Row], *of: str, notes: Sequence[str] = (), **facts: Any
+    ) -> DataTable | None:
+        """The table with the meaning of its marks, or None where it would have no rows.
+
+        ``of``: what the id adds to the name of the section; ``notes``: further ones; ``facts``:
+        what is filled into caption and notes, in inline markup.
+        """
+        found = DataTable(
+            "-".join((self.name, *of)),
+            self.caption.format(**facts),
+            self.columns,
+            tuple(rows),
+            (*(note.format(**facts) for note in self.notes), *notes),
+            self.folded,
+        )
+        return with_legends(found) if found.rows else None
+
+
+def with_interval(value: float, low: float, high: float) -> Value:
+    """A value with its interval where it has one; None for NaN."""
+    ends = () if math.isnan(low) else (float(low), float(high))
+    return None if math.isnan(value) else Estimate(float(value), None, *ends)
+
+
+def finite(value: float) -> float | None:
+    """None for NaN."""
+    return None if math.isnan(value) else float(value)
+
+
+def _read() -> dict[str, Layout]:
+    text = (Path(__file__).parent / "tables.toml").read_text(encoding="utf-8")
+    found = {}
+    for name, said in tomllib.loads(text).items():
+        columns = [_column(*column) for column in said["columns"].items()]
+        found[name] = {**said, "name": name, "columns": columns}
+    return TypeAdapter(dict[str, Layout]).validate_python(found)
+
+
+def _column(name: str, said: dict[str, Any]) -> dict[str, Any]:
+    number = said.get("kind", "text") != "text"
+    rests_on = {"rests_on": ["runs"]} if number else {}
+    return {"name": name, "header": name.replace("_", " "), **rests_on, **said}
+
+
+LAYOUTS = _read()
+"""All tables by name, in the order of the file."""

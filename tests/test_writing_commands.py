@@ -1,0 +1,83 @@
+"""Commands that write files: what they say when they are interrupted, and where they do not."""
+
+import os
+import signal
+
+import pytest
+
+from analysis.report.document import Document
+from analysis.report.write import write_report
+from benchmarks.run import run_suite
+from coartic import CoarticError
+from tests.support.commands import call
+
+BEFORE = "nothing is written in {}"
+WITHIN = "{} holds old files beside new ones until the same command has ended"
+
+
+def interrupt(*_, **__):
+    """Ctrl-C, while this is called."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.fixture
+def interrupted(monkeypatch, capsys):
+    """What a command says on standard error, and that it ends as Ctrl-C ends a process."""
+
+    def end(number):
+        raise SystemExit(-number)
+
+    def said(*arguments):
+        monkeypatch.setattr(signal, "raise_signal", end)
+        code, out, error = call(monkeypatch, capsys, *arguments)
+        assert (code, out) == (-signal.SIGINT, "")
+        return error
+
+    return said
+
+
+@pytest.mark.parametrize("command", ["analyse", "report"])
+def test_interrupted_before_it_writes(command, interrupted, monkeypatch, tmp_path):
+    monkeypatch.setattr("analysis.study.load", interrupt)
+    out = tmp_path / "report" if command == "report" else tmp_path
+    assert interrupted(command, tmp_path) == f"interrupted; {BEFORE.format(out)}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupted_while_it_writes(interrupted, monkeypatch, tmp_path):
+    monkeypatch.setattr("analysis.study.load", lambda folder: None)
+    monkeypatch.setattr("analysis.report.analyses.analyse", lambda study: {"claims.md": b""})
+    monkeypatch.setattr("coartic.files.publish", interrupt)
+    assert interrupted("analyse", tmp_path) == f"interrupted; {WITHIN.format(tmp_path)}\n"
+
+    def write(made, study, out, *, begin):
+        begin()
+        interrupt()
+
+    monkeypatch.setattr("analysis.report.build.build", lambda *_: None)
+    monkeypatch.setattr("analysis.report.build.write", write)
+    out = tmp_path / "report"
+    assert interrupted("report", tmp_path) == f"interrupted; {WITHIN.format(out)}\n"
+
+
+def test_a_report_begins_to_be_written_when_all_is_made(tmp_path):
+    out, seen = tmp_path / "report", []
+
+    def render(plot):
+        seen.append("made")
+        return {}
+
+    write_report(
+        Document("t", ()), [None], out, render=render,
+        begin=lambda: seen.append(("begun", out.exists())),
+    )  # fmt: skip
+    assert seen == ["made", ("begun", False)]
+    assert (out / "report.html").exists()
+
+
+def test_no_results_in_the_folder_of_a_report(tmp_path):
+    write_report(Document("t", ()), [], tmp_path, render=lambda plot: {})
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(CoarticError, match="holds a report, and nothing else is written there"):
+        run_suite("quick", tmp_path)
+    assert sorted(tmp_path.rglob("*")) == before
