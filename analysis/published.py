@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,11 @@ class SequenceResult:
 
     hands: str
     summary: Summary
-    runs: int | None
+
+    @property
+    def runs(self) -> int | None:
+        """Printed number of runs that learned it."""
+        return self.summary.runs if self.summary.runs_printed else None
 
 
 @dataclass(frozen=True)
@@ -46,15 +51,13 @@ class PublishedCell:
 def published_initial(task: str) -> tuple[str, int, bool] | None:
     """Hands, reward and whether derived, of a task's initial solution."""
     entry = _printed(task, "initial")
-    if entry is None:
-        return None
-    return entry["hands"], entry["reward"], entry.get("derived", False)
+    return entry and (entry["hands"], entry["reward"], entry.get("derived", False))
 
 
 def published_exhaustive(task: str) -> tuple[str, int] | None:
     """Best hands and reward of the corrective process alone over all sequences."""
     entry = _printed(task, "exhaustive")
-    return None if entry is None else (entry["hands"], entry["reward"])
+    return entry and (entry["hands"], entry["reward"])
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
@@ -63,20 +66,12 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
     if entry is None:
         return None
     sequences = tuple(
-        SequenceResult(
-            item["hands"],
-            Summary(
-                item["reward"], item.get("sd"), item.get("runs", RUNS), runs_printed="runs" in item
-            ),
-            item.get("runs"),
-        )
+        SequenceResult(item["hands"], _summary(item, runs_printed="runs" in item))
         for item in entry.get("sequences", ())
     )
     remark = f"higher than {entry['better_than']}" if "better_than" in entry else ""
-    if "reward" in entry:
-        return PublishedCell(Summary(entry["reward"], entry.get("sd"), RUNS), sequences, remark)
-    known = [sequence.summary for sequence in sequences]
-    return PublishedCell(pooled(known), sequences, remark)
+    whole = _summary(entry) if "reward" in entry else pooled([s.summary for s in sequences])
+    return PublishedCell(whole, sequences, remark)
 
 
 def pooled(parts: list[Summary]) -> Summary | None:
@@ -96,9 +91,15 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-_PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
+_PUBLISHED: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("published.toml").read_text("utf-8")
+)
 
 
-def _printed(task: str, what: str) -> dict[str, Any] | None:
-    entry: dict[str, Any] | None = _PUBLISHED.get(task, {}).get(what)
-    return entry
+def _printed(task: str, what: str) -> Any:
+    return _PUBLISHED.get(task, {}).get(what)
+
+
+def _summary(entry: Mapping[str, Any], *, runs_printed: bool = True) -> Summary:
+    runs = entry.get("runs", RUNS)
+    return Summary(entry["reward"], entry.get("sd"), runs, runs_printed=runs_printed)
