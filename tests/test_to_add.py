@@ -33,11 +33,12 @@ table = "main-signatures"
 CLAIM = """
 ["One-armed tasks".all-goals-hit]
 statement = "Every goal is hit."
+test = "counted"
 place = "Method"
 """
 JUDGE = """
 
-@decides("all-goals-hit", "counted")
+@decides("all-goals-hit")
 def _all_hit(data: Data) -> Finding:
     runs = data.cell(ASCENDING, "nearest-hand").runs
     return Finding(all(len(run.hits) == 3 for run in runs), f"all goals hit in {len(runs)} run")
@@ -131,7 +132,7 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     # A signature: a function, a row.
     append("analysis/signatures/within.py", MEASURE)
     append("analysis/signatures/register.toml", SIGNATURE)
-    # A claim: its words, a judge.
+    # A claim: its words and its test, a judge.
     append("analysis/claims/claims.toml", CLAIM)
     append("analysis/claims/one_armed.py", JUDGE)
     # A figure: a file, an import and a row.

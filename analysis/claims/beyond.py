@@ -7,13 +7,14 @@ import math
 from dataclasses import replace
 
 from analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
-from analysis.claims.evidence import Arm, by_optimum, estimate_of, measured, of_either_optimum
+from analysis.claims.evidence import by_optimum, estimate_of, measured, of_either_optimum
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import Summary, published_cell
 from analysis.report.document import Column, RestsOn, Row
+from analysis.results.optima import OtherArm
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import SEED, difference_of_means, mean
 from analysis.words import NONE, interval
@@ -24,12 +25,7 @@ _EQUIVALENT = f"within ± {MARGIN:.0%}"
 _CELL = (Column("task", "task"), Column("condition", "condition"))
 
 
-@decides(
-    "learned-rewards-as-printed",
-    f"95 % interval of the difference of means (Welch's) within ± {MARGIN:.0%} of the printed "
-    "reward: equivalent, outside: different. EC2 is printed by hand sequence, from which the "
-    "mean over all its runs follows",
-)
+@decides("learned-rewards-as-printed")
 def _as_printed(data: Data) -> Finding:
     rows, verdicts = [], []
     for task, condition in CELLS:
@@ -70,15 +66,12 @@ def _as_printed(data: Data) -> Finding:
     return measured("learned-rewards-as-printed", evidence, title, columns, rows)
 
 
-@decides(
-    "distance-to-optimum",
-    "mean gap with BCa interval; the optimum is the condition's own (other arm free or still)",
-)
+@decides("distance-to-optimum")
 def _to_the_optimum(data: Data) -> Finding:
     rows, shares = [], []
     for task, condition in CELLS:
         reward = mean(data.rewards(task, condition), seed=SEED)
-        arm: Arm = "free" if condition in ("EC2", "EC4") else "still"
+        arm: OtherArm = "free" if condition in ("EC2", "EC4") else "still"
         best = data.study.optima.get((task, arm))
         if best is None:
             raise MissingError(f"no optimum of {task} is known")
@@ -110,7 +103,7 @@ _PROPOSALS = {
 """The paper's proposals for the learner, by what they add to a condition's name."""
 
 
-@decides("proposals", "difference of mean learned rewards with BCa interval")
+@decides("proposals")
 def _proposals(data: Data) -> Finding:
     rows, gains = [], []
     for (task, condition), (proposal, change) in itertools.product(BEST, _PROPOSALS.items()):
@@ -131,18 +124,17 @@ def _proposals(data: Data) -> Finding:
     return measured("proposals", "; ".join(gains), "Proposals", columns, rows)
 
 
-@decides(
-    "absent-without-looking-ahead",
-    "context distance at goal 1, and ticks against the initial solution (ascending)",
-)
+@decides("absent-without-looking-ahead")
 def _absent_without_looking_ahead(data: Data) -> Finding:
     parts = []
     for method in (f"{LEARNER}EC1", *CONTROLS):
-        apart, change = context_distance(data, method), sacrifice(data, method)
-        if apart is None or change is None:
-            raise MissingError(f"this folder lacks runs of {method} on ascending and descending")
+        try:
+            apart, (first, total) = context_distance(data, method), sacrifice(data, method)
+        except MissingError:
+            words = f"this folder lacks runs of {method} on ascending and descending"
+            raise MissingError(words) from None
         parts.append(
-            f"{method}: postures at goal 1 {apart:.2f} apart, first movement {change[0]:+.1f} and "
-            f"all {change[1]:+.1f} ticks against the initial solution"
+            f"{method}: postures at goal 1 {apart:.2f} apart, first movement {first:+.1f} and "
+            f"all {total:+.1f} ticks against the initial solution"
         )
     return Finding(None, "; ".join(parts))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pandas as pd
@@ -10,14 +11,15 @@ import pandas as pd
 from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     beyond,
     coarticulation,
-    conditions,
     general,
     one_armed,
     two_armed,
 )
-from analysis.claims.judges import costs, presence, resemblance  # noqa: F401
-from analysis.claims.register import Claim, Judged, judge_claims
+from analysis.claims.data import Data, MissingError
+from analysis.claims.judges import costs, hands, presence, resemblance  # noqa: F401
+from analysis.claims.register import Claim, Finding, Judged
 from analysis.claims.statements import JUDGED, STATEMENTS
+from analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -31,23 +33,38 @@ _COLUMNS = (
 
 
 def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
-    """Every claim with its verdict; see :func:`analysis.claims.register.judge_claims`."""
-    return judge_claims(study, claims)
+    """Every claim with its verdict, p-values corrected over all of them (Holm)."""
+    data = Data(study)
+    found = [_seen(claim, data) for claim in claims]
+    adjusted = holm([entry.p for entry in found]), holm([entry.contrary_p for entry in found])
+    return [
+        replace(entry, adjusted_p=p, adjusted_contrary_p=contrary)
+        for entry, p, contrary in zip(found, *adjusted, strict=True)
+    ]
+
+
+def _seen(claim: Claim, data: Data) -> Judged:
+    data.forget()
+    try:
+        finding = claim.judge(data)
+    except MissingError as missing:
+        lacking = Finding(None, f"not judged: {missing}")
+        return Judged(**vars(lacking), claim=claim, run_ids=(), sources=())
+    return Judged(**vars(finding), claim=claim, run_ids=data.run_ids, sources=data.others)
 
 
 def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
-    """One row per claim.
+    """One row per claim, its columns attributes of :class:`Claim` and :class:`Judged`.
 
-    Columns: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence``, ``test``,
-    ``p`` (largest of the claim's tests), ``adjusted_p`` (Holm), ``contrary_p`` (smallest of the
-    contrary's tests, times their number), ``adjusted_contrary_p``, ``place``, ``quote``,
-    ``figure`` (of the paper), ``runs`` (ids, space-separated), ``sources`` (what else it rests
-    on).
+    ``runs``: ids, space-separated.
     """
     rows = [
         {
             **vars(entry.claim),
             **vars(entry),
+            "verdict": entry.verdict,
+            "p": entry.p,
+            "contrary_p": entry.contrary_p,
             "runs": " ".join(entry.run_ids),
             "sources": ", ".join(entry.sources),
         }

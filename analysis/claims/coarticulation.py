@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
+
 import numpy as np
 
 from analysis.claims.data import ONE, Data, MissingError
+from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
 from analysis.signatures.recruitment import isolated_agreement
 from analysis.signatures.trajectories import Trajectories
-from analysis.statistics.estimates import FEWEST, SEED, mean
-from analysis.statistics.hypotheses import bootstrap_test, share_test
-from analysis.words import interval
+from analysis.statistics.estimates import FEWEST
+from analysis.statistics.hypotheses import share_test
 from coartic.robot import Array
 
 _CONTROLS = ("corrective-alone/every", "posture-based/one-goal hands=every, other_arm=free")
 """Methods that do not look beyond the current goal."""
 
 
-@decides(
-    "hand-coarticulation",
-    "exact binomial tests that more than half the runs do so; the quicker hand is that of the "
-    "corrective process from the same posture",
-)
+@decides("hand-coarticulation")
 def _hand_coarticulation(data: Data) -> Finding:
     tests, against, parts = [], [], []
     for condition in ("EC3", "EC4"):
@@ -36,9 +35,7 @@ def _hand_coarticulation(data: Data) -> Finding:
         against.append(share_test(away, total, 0.5, "less"))
         goals = ", ".join(f"goal {k} {n}" for k, n in enumerate((~agrees).sum(axis=0), 1) if n)
         parts.append(f"{condition}: {away} of {total} runs ({goals or 'no goal'})")
-    return Finding(
-        all(test.estimate > 0 for test in tests), "; ".join(parts), tuple(tests), tuple(against)
-    )
+    return replace(all_hold(tests, parts), against=tuple(against))
 
 
 def prepared_by_waiting(cell: Trajectories) -> Array:
@@ -68,31 +65,23 @@ def _goals(values: Array) -> str:
     return ", ".join(f"goal {k} {row.mean():+.2f}" for k, row in known if len(row))
 
 
-@decides(
-    "other-arm-coarticulation",
-    "one-tailed bootstrap test that preshaping since the arm's last hit (0 where it keeps "
-    "still) is above 0, mean over the goals of a run; controls that do not look beyond the "
-    "current goal stand beside it",
-)
+@decides("other-arm-coarticulation")
 def _other_arm_prepares(data: Data) -> Finding:
     moving, still = (data.cell(ONE, LEARNER + condition) for condition in ("EC4", "EC3"))
     own = prepared_by_waiting(moving)
     if len(own) < FEWEST:
         raise MissingError(f"fewer than {FEWEST} runs of EC4 on {ONE} use both hands")
-    test = bootstrap_test(own, 0.0, seed=SEED)
     parts = [
         f"what the waiting arm does under EC4 brings its hand nearer by "
-        f"{interval(mean(own, seed=SEED), '.2f')} of the initial distance "
+        f"{shown(own, '.2f')} of the initial distance "
         f"({_goals(_by_goal(moving, since_hit=True))})",
         "with the base and the posture that its last hit left, it is nearer than in the initial "
         f"solution by {_goals(_by_goal(moving, since_hit=False))} under EC4, by "
         f"{_goals(_by_goal(still, since_hit=False))} under EC3, where that arm cannot move",
     ]
     for label in _CONTROLS:
-        try:
+        with suppress(MissingError):
             control = prepared_by_waiting(data.cell(ONE, label))
-        except MissingError:
-            continue
-        if len(control):
-            parts.append(f"{label}, by waiting: {control.mean():.2f}")
-    return Finding(test.estimate > 0, "; ".join(parts), (test,))
+            if len(control):
+                parts.append(f"{label}, by waiting: {control.mean():.2f}")
+    return all_hold([exceeds(own, 0.0)], parts)

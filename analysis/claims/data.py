@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
@@ -105,13 +106,11 @@ class Data:
             found = None
         return found, tuple(dict.fromkeys(self._cells[before:]))
 
-    def runs(self, task: str, method: str) -> pd.DataFrame:
-        """Solved runs of a method; raises MissingError where they cannot be judged."""
-        found = self._judgeable(task, method)
-        self.note(tuple(found.run_id))
-        return found
+    def runs(self, task: str, method: str, hands: str | None = None) -> pd.DataFrame:
+        """Solved runs of a method, of ``hands`` only those that learned that sequence.
 
-    def _judgeable(self, task: str, method: str) -> pd.DataFrame:
+        Raises MissingError where they cannot be judged.
+        """
         cell = self.study.cells.get((task, method))
         if cell is None or not len(cell.runs):
             raise MissingError(f"this folder has no runs of {method} on {task}")
@@ -131,15 +130,13 @@ class Data:
             if len(cell.runs) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}")
         self._cells.append((task, method))
-        return cell.good
-
-    def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
-        """Runs of the paper's learner, of ``hands`` only those that learned that sequence."""
-        found = self._judgeable(task, LEARNER + condition)
-        if hands is not None:
-            found = found[found.hands == hands]
+        found = cell.good if hands is None else cell.good[cell.good.hands == hands]
         self.note(tuple(found.run_id))
         return found
+
+    def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
+        """:meth:`runs` of the paper's learner."""
+        return self.runs(task, LEARNER + condition, hands)
 
     def rewards(self, task: str, condition: str, hands: str | None = None) -> Array:
         """Learned rewards of runs (that learned ``hands``), shape ``(runs,)``."""
@@ -161,6 +158,14 @@ class Data:
             raise MissingError(f"a run of {condition} on {task} has no replay")
         return replays
 
+    def hands(self, task: str, condition: str) -> Counter[str]:
+        """Runs of the paper's learner by learned hand sequence."""
+        return Counter(map(str, self.learned(task, condition).hands))
+
+    def initial_reward(self, task: str, condition: str, hands: str | None = None) -> float:
+        """Of trial 0: the corrective process alone."""
+        return float(self.learned(task, condition, hands).initial_reward.iloc[0])
+
     def cell(self, task: str, method: str) -> Trajectories:
         """Executed solutions; raises MissingError where there are none."""
         self.runs(task, method)
@@ -179,10 +184,9 @@ class Data:
 
     def task(self, name: str) -> Task:
         """A task of the folder."""
-        known = self.study.results.tasks
-        if name not in known:
+        if name not in self.study.tasks:
             raise MissingError(f"this folder has no task {name}")
-        return known[name]
+        return self.study.tasks[name]
 
     def initial(self, name: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
@@ -195,7 +199,7 @@ class Data:
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""
         table = self.study.results.sequences
-        own = table[table.task == task] if len(table) else table
+        own = table[table.task == task]
         if not len(own):
             raise MissingError(
                 f"this folder has no rewards of the corrective process alone on {task}"

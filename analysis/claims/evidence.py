@@ -1,17 +1,34 @@
-"""Tables of evidence: raw values with the cells behind them."""
+"""What judges say: findings by tests, and tables of raw values with the cells behind them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 from analysis.claims.register import Finding
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
-from analysis.statistics.estimates import Inference
+from analysis.results.optima import ARMS, OtherArm
+from analysis.statistics.estimates import SEED, Inference, mean
+from analysis.statistics.hypotheses import bootstrap_test
+from analysis.words import interval
+from coartic.robot import Array
 
-Arm = Literal["free", "still"]
+
+def exceeds(values: Array, bound: Array | float) -> Inference:
+    """One-tailed bootstrap test that the mean is above a number, or above another sample's."""
+    return bootstrap_test(values, bound, seed=SEED)
+
+
+def shown(values: Array, style: str = ".1f") -> str:
+    """The mean with its BCa interval."""
+    return interval(mean(values, seed=SEED), style)
+
+
+def all_hold(tests: Sequence[Inference], parts: Sequence[str], before: str = "") -> Finding:
+    """What is seen where every test points as claimed; ``parts`` of a sentence say so."""
+    seen = all(test.estimate > 0 for test in tests)
+    return Finding(seen, before + "; ".join(parts), tuple(tests))
 
 
 def measured(
@@ -36,7 +53,6 @@ def estimate_of(found: Inference) -> Estimate:
 
 def of_either_optimum(*columns: Column) -> tuple[Column, ...]:
     """Columns for the optimum with the other arm free, then the same for that with it still."""
-    arms: tuple[Arm, ...] = ("free", "still")
     return tuple(
         replace(
             column,
@@ -44,12 +60,12 @@ def of_either_optimum(*columns: Column) -> tuple[Column, ...]:
             header=f"{column.header}, other arm {arm}",
             other_arm=arm,
         )
-        for arm in arms
+        for arm in ARMS
         for column in columns
     )
 
 
-def by_optimum(arm: Arm, *values: Value) -> tuple[Value, ...]:
+def by_optimum(arm: OtherArm, *values: Value) -> tuple[Value, ...]:
     """The values below :func:`of_either_optimum`; none for the other optimum."""
     none = (None,) * len(values)
     return (*values, *none) if arm == "free" else (*none, *values)

@@ -12,15 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
+from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.judges.reach import shortest_reach
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides_apart
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
 from analysis.signatures.subtasks import postures_before
-from analysis.statistics.estimates import SEED, mean
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.words import interval, short
+from analysis.statistics.estimates import SEED
+from analysis.words import short
 from coartic.record import SEARCH
 from coartic.task import hands_of
 
@@ -29,32 +29,19 @@ CLOSE = 0.10
 _PLAN = "trajectory-optimisation/"
 
 
-@decides_apart(
-    "learning-improves",
-    "one-tailed bootstrap tests of noiseless replays against the initial reward, a test for "
-    "each task and condition",
-    CELLS,
-)
-def _learning_improves(cells: Cells, data: Data) -> Finding:
+@decides_apart("learning-improves", CELLS)
+def _learning_improves(data: Data, cells: Cells) -> Finding:
     tests, parts = [], []
     for task, condition in cells:
-        initial = float(data.learned(task, condition).initial_reward.iloc[0])
+        initial = data.initial_reward(task, condition)
         replays = data.replays(task, condition)
-        tests.append(bootstrap_test(replays, initial, seed=SEED))
-        parts.append(f"{task} {condition} {initial:.0f} to {interval(mean(replays, seed=SEED))}")
-    return Finding(
-        all(test.estimate > 0 for test in tests),
-        "noiseless replay with the final tables: " + "; ".join(parts),
-        tuple(tests),
-    )
+        tests.append(exceeds(replays, initial))
+        parts.append(f"{task} {condition} {initial:.0f} to {shown(replays)}")
+    return all_hold(tests, parts, "noiseless replay with the final tables: ")
 
 
-@decides_apart(
-    "corrective-ensures",
-    "exact: failed trials of the learner, hand sequences without a reward",
-    CELLS,
-)
-def _corrective_ensures(cells: Cells, data: Data) -> Finding:
+@decides_apart("corrective-ensures", CELLS)
+def _corrective_ensures(data: Data, cells: Cells) -> Finding:
     trials = failed = sequences = missed = 0
     for task, condition in cells:
         runs = data.learned(task, condition)
@@ -72,13 +59,8 @@ def _corrective_ensures(cells: Cells, data: Data) -> Finding:
     )
 
 
-@decides_apart(
-    "corrective-near-shortest",
-    f"exact: no subtask of the initial solution is more than {CLOSE:.0%} longer than the "
-    "shortest way from the same posture (the shortest that a search finds)",
-    CELLS,
-)
-def _corrective_near_shortest(cells: Cells, data: Data) -> Finding:
+@decides_apart("corrective-near-shortest", CELLS)
+def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
     parts, all_excess = [], []
     for name in dict.fromkeys(task for task, _ in cells):
         task, initial = data.task(name), data.initial(name)
@@ -101,13 +83,8 @@ def _corrective_near_shortest(cells: Cells, data: Data) -> Finding:
     )
 
 
-@decides_apart(
-    "less-experience",
-    "exact: planners make no trial, are told more kinds of information, and planning the "
-    "shortest path is at least as good (letters of what is told: docs/methods.md)",
-    BEST,
-)
-def _less_experience(cells: Cells, data: Data) -> Finding:
+@decides_apart("less-experience", BEST)
+def _less_experience(data: Data, cells: Cells) -> Finding:
     parts, holds = [], True
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
@@ -128,15 +105,8 @@ def _less_experience(cells: Cells, data: Data) -> Finding:
     return Finding(holds, "; ".join(parts))
 
 
-@decides_apart(
-    "low-computation",
-    "evaluations of forward kinematics and Jacobian beside those of every informed method "
-    "with default parameters: supported where a run of the learner takes fewer than any, not "
-    "supported where one of its trials takes as many as all. Not counted: solver iterations, "
-    "gradients and Hessians of costs, quadratic programs",
-    BEST,
-)
-def _low_computation(cells: Cells, data: Data) -> Finding:
+@decides_apart("low-computation", BEST)
+def _low_computation(data: Data, cells: Cells) -> Finding:
     parts, below, above = [], [], []
     for task, condition in cells:
         data.runs(task, LEARNER + condition)
@@ -176,23 +146,18 @@ def _informed(data: Data, task: str) -> list[str]:
     ]
 
 
-@decides_apart(
-    "beats-inaccurate",
-    "one-tailed bootstrap tests against plans for smoothness (free times); at least one "
-    "holds, the smallest p times their number (Bonferroni)",
-    BEST,
-)
-def _beats_inaccurate(cells: Cells, data: Data) -> Finding:
+@decides_apart("beats-inaccurate", BEST)
+def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
     tests, parts = [], []
     for task, condition in cells:
         rewards = data.rewards(task, condition)
-        shown = []
+        plans = []
         for cost in SMOOTH:
             data.runs(task, _PLAN + cost)
             plan = data.study.method_rows[task, _PLAN + cost].reward
-            tests.append(bootstrap_test(rewards, plan, seed=SEED))
-            shown.append(f"{cost} {plan:.0f}")
-        parts.append(f"{task}: learner {interval(mean(rewards, seed=SEED))}, {', '.join(shown)}")
+            tests.append(exceeds(rewards, plan))
+            plans.append(f"{cost} {plan:.0f}")
+        parts.append(f"{task}: learner {shown(rewards)}, {', '.join(plans)}")
     holds = any(test.estimate > 0 for test in tests)
     # The claim is that there are such cases: the best of all tests, corrected for their number.
     best = min(tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from analysis.claims.data import Data, MissingError
+from analysis.claims.data import Data
 from analysis.report.document import DataTable
 from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
-from analysis.statistics.hypotheses import holm
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
 Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
@@ -51,9 +47,6 @@ class Finding:
     """Numbers that are more than a sentence can hold; its id is ``evidence-`` and the claim's."""
 
 
-Judge = Callable[[Data], Finding]
-
-
 @dataclass(frozen=True)
 class Claim:
     """One statement and how it is decided."""
@@ -63,7 +56,7 @@ class Claim:
     section: Section
     test: str
     """In inline markup."""
-    judge: Judge
+    judge: Callable[[Data], Finding]
     place: str = ""
     """Section of the paper that makes it; empty for comparisons of our own."""
     quote: str = ""
@@ -79,17 +72,44 @@ class Judged(Finding):
     """A claim with what was seen of it, and its verdict."""
 
     claim: Claim
-    verdict: Verdict
-    p: float
-    """Largest of its tests; NaN without a test, and where nothing is judged."""
-    adjusted_p: float
-    """The same, adjusted over the paper's claims (Holm)."""
-    contrary_p: float
-    """Smallest p-value of the contrary, times the number of tests."""
-    adjusted_contrary_p: float
     run_ids: tuple[str, ...]
     sources: tuple[str, ...]
     """What it rests on beside runs."""
+    adjusted_p: float = math.nan
+    """:attr:`p`, adjusted over the paper's claims (Holm)."""
+    adjusted_contrary_p: float = math.nan
+
+    @property
+    def p(self) -> float:
+        """Largest of its tests, which must all hold; NaN where nothing is tested or judged."""
+        known = [t.p for t in self.tests if not math.isnan(t.p)]
+        return max(known) if known and self.claim.place else math.nan
+
+    @property
+    def contrary_p(self) -> float:
+        """Smallest p-value of the contrary, times the number of tests (Bonferroni)."""
+        p = [
+            t.p if self.against is not None else min(1.0, 1 - t.p + 1 / (RESAMPLES + 1))
+            for t in (self.tests if self.against is None else self.against)
+            if not math.isnan(t.p)
+        ]
+        return min(1.0, min(p) * len(p)) if p and self.claim.place else math.nan
+
+    @property
+    def verdict(self) -> Verdict:
+        """By :data:`RULES`."""
+        if not self.run_ids and not self.sources:
+            return "cannot tell"
+        if not self.claim.place:
+            return "measured"
+        if self.holds is None:
+            return "cannot tell"
+        if self.holds:
+            # NaN: counted exactly, or no spread in any sample.
+            return "cannot tell" if self.adjusted_p >= LEVEL else "supported"
+        certain = not self.tests or any(t.estimate < 0 and math.isnan(t.p) for t in self.tests)
+        refuted = certain or self.adjusted_contrary_p < LEVEL
+        return "not supported" if refuted else "cannot tell"
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -102,67 +122,5 @@ class Judged(Finding):
         return self.verdict + (" †" if self.claim.fitted else "")
 
 
-def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judged]:
-    """Every claim with its verdict, p-values corrected over all of them (Holm)."""
-    data = Data(study)
-    found: list[tuple[Claim, Finding, tuple[str, ...], tuple[str, ...]]] = []
-    for claim in claims:
-        data.forget()
-        try:
-            finding = claim.judge(data)
-        except MissingError as missing:
-            found.append((claim, Finding(None, f"not judged: {missing}"), (), ()))
-        else:
-            found.append((claim, finding, data.run_ids, data.others))
-    largest = [_largest(finding) if claim.place else math.nan for claim, finding, *_ in found]
-    contrary = [_contrary(finding) if claim.place else math.nan for claim, finding, *_ in found]
-    return [
-        Judged(
-            **vars(finding),
-            claim=claim,
-            verdict=_verdict(claim, finding, adjusted, refuted, seen=bool(run_ids or sources)),
-            p=p,
-            adjusted_p=adjusted,
-            contrary_p=against,
-            adjusted_contrary_p=refuted,
-            run_ids=run_ids,
-            sources=sources,
-        )
-        for (claim, finding, run_ids, sources), p, adjusted, against, refuted in zip(
-            found, largest, holm(largest), contrary, holm(contrary), strict=True
-        )
-    ]
-
-
 def _in_words(test: Inference) -> str:
     return f"{test.method} ({test.note})" if math.isnan(test.p) and test.note else test.method
-
-
-def _largest(finding: Finding) -> float:
-    """All tests of a claim must hold: its p-value is the largest."""
-    return max((t.p for t in finding.tests if not math.isnan(t.p)), default=math.nan)
-
-
-def _contrary(finding: Finding) -> float:
-    """One contrary suffices: the smallest p-value, times their number (Bonferroni)."""
-    against = finding.against
-    p = [
-        t.p if against is not None else min(1.0, 1 - t.p + 1 / (RESAMPLES + 1))
-        for t in (finding.tests if against is None else against)
-        if not math.isnan(t.p)
-    ]
-    return min(1.0, min(p) * len(p)) if p else math.nan
-
-
-def _verdict(claim: Claim, finding: Finding, p: float, contrary: float, *, seen: bool) -> Verdict:
-    if not seen:
-        return "cannot tell"
-    if not claim.place:
-        return "measured"
-    if finding.holds is None:
-        return "cannot tell"
-    if finding.holds:
-        # NaN: counted exactly, or no spread in any sample.
-        return "cannot tell" if p >= LEVEL else "supported"
-    certain = not finding.tests or any(t.estimate < 0 and math.isnan(t.p) for t in finding.tests)
-    return "not supported" if certain or contrary < LEVEL else "cannot tell"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from analysis.claims.data import Cells, Data
-from analysis.claims.register import Claim, Finding, Judge
+from analysis.claims.data import Cells
+from analysis.claims.register import Claim, Finding
 
 _APART = ("one-armed", "two-armed")
 
@@ -33,32 +34,37 @@ def _read() -> dict[str, dict[str, Any]]:
 STATEMENTS = _read()
 JUDGED: dict[str, Claim] = {}
 """Claims by id as their judges take them up."""
+Judging = TypeVar("Judging", bound=Callable[..., Finding])
 
 
-def decides(name: str, test: str) -> Callable[[Judge], Judge]:
-    """The function judges the claim with this id, by ``test`` (in inline markup)."""
+def decides(name: str, **given: Any) -> Callable[[Judging], Judging]:
+    """The function judges the claim with this id.
 
-    def enter(judge: Judge) -> Judge:
-        JUDGED[name] = Claim(name, test=test, judge=judge, **STATEMENTS[name])
+    It is called with what judges read, and with ``given``: one function may judge claims that
+    differ in those. The claim's ``test`` may name constants of the judge's module and what the
+    judge is given, so that a threshold is said as it is tested.
+    """
+
+    def enter(judge: Judging) -> Judging:
+        said = STATEMENTS[name]
+        test = said["test"].format(**vars(sys.modules[judge.__module__]) | given)
+        JUDGED[name] = Claim(id=name, judge=partial(judge, **given), **said | {"test": test})
         return judge
 
     return enter
 
 
-JudgeOfCells = Callable[[Cells, Data], Finding]
-
-
-def decides_apart(name: str, test: str, cells: Cells) -> Callable[[JudgeOfCells], JudgeOfCells]:
+def decides_apart(name: str, cells: Cells) -> Callable[[Judging], Judging]:
     """The function judges a claim on those of ``cells`` that are one-armed, and on the others.
 
     The one-armed tasks are printed, the two-armed ones a reconstruction.
     """
 
-    def enter(judge: JudgeOfCells) -> JudgeOfCells:
+    def enter(judge: Judging) -> Judging:
         for which in _APART:
             two = which == "two-armed"
             own = tuple(cell for cell in cells if cell[0].startswith("two-armed") == two)
-            decides(f"{name}-{which}", test)(partial(judge, own))
+            decides(f"{name}-{which}", cells=own)(judge)
         return judge
 
     return enter

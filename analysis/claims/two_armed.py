@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
+from scipy import stats
 
 from analysis.claims.data import ONE, TWO, Data, MissingError, rewards_of
-from analysis.claims.judges.hands import (
-    AS_OFTEN,
-    MOST,
-    NEARLY_ALL,
-    as_often,
-    better_hands,
-    nearly_all,
-)
+from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
-from analysis.statistics.estimates import FEWEST, SEED, mean
-from analysis.statistics.hypotheses import bootstrap_test
+from analysis.statistics.estimates import (
+    FEWEST,
+    SEED,
+    Inference,
+    difference_of_means,
+    probability_of_improvement,
+)
 from analysis.words import interval, tally
 from coartic.robot import Array
 
 # Two-armed task 1: before learning
 
 
-@decides("right-hand-better", "exact: reward of the corrective process alone")
+@decides("right-hand-better")
 def _right_hand_better(data: Data) -> Finding:
     known = data.sequences(ONE)
     right, left = (known.get(hands, math.nan) for hands in ("RRRR", "LLLL"))
@@ -44,7 +42,7 @@ def _base_steps(start: Array, configurations: Array) -> Array:
     return np.diff(np.append(start[0], configurations[:, 0]))
 
 
-@decides("initial-base-reverses", "exact: base positions at the goals")
+@decides("initial-base-reverses")
 def _initial_base_reverses(data: Data) -> Finding:
     steps = _base_steps(data.task(ONE).q0, data.initial(ONE).configurations)
     return Finding(
@@ -57,21 +55,7 @@ def _initial_base_reverses(data: Data) -> Finding:
 # Two-armed task 1: exploration condition 2
 
 
-@decides("ec2-sequences", f"{AS_OFTEN}; of RRLR")
-def _ec2_sequences(data: Data) -> Finding:
-    return as_often(data, ONE, "EC2", "RRLR")
-
-
-@decides("ec2-rrlr-better", "one-tailed bootstrap test of two samples")
-def _ec2_rrlr_better(data: Data) -> Finding:
-    return better_hands(data, ONE, "EC2", "RRLR", "RRRR")
-
-
-@decides(
-    "no-reversal",
-    "exact: base positions at the goals, runs under condition 2 that learned RRLR, initial "
-    "solution",
-)
+@decides("no-reversal")
 def _no_reversal(data: Data) -> Finding:
     cell = data.cell(ONE, f"{LEARNER}EC2")
     runs = [run for run in cell.runs if run.execution.hands == "RRLR"]
@@ -87,59 +71,20 @@ def _no_reversal(data: Data) -> Finding:
     )
 
 
-@decides(
-    "ec2-improves",
-    "one-tailed bootstrap test of noiseless replays against the initial reward",
-)
+@decides("ec2-improves")
 def _ec2_improves(data: Data) -> Finding:
     replays = data.replays(ONE, "EC2", "RRRR")
     if len(replays) < FEWEST:
         raise MissingError(f"fewer than {FEWEST} runs of EC2 on {ONE} keep RRRR")
-    initial = float(data.learned(ONE, "EC2", "RRRR").initial_reward.iloc[0])
-    test = bootstrap_test(replays, initial, seed=SEED)
-    return Finding(
-        test.estimate > 0,
-        f"noiseless replay of the {len(replays)} runs with RRRR: {initial:.0f} to "
-        f"{interval(mean(replays, seed=SEED))}",
-        (test,),
-    )
-
-
-@decides(
-    "ec2-unreliable",
-    f"exact binomial test that fewer than {NEARLY_ALL:.0%} of all runs leave RRRR",
-)
-def _ec2_unreliable(data: Data) -> Finding:
-    found = Counter(data.learned(ONE, "EC2").hands)
-    seen = nearly_all(found.total() - found["RRRR"], found.total(), "less")
-    return replace(seen, evidence=f"RRRR is left in {seen.evidence}; {tally(found)}")
+    initial = data.initial_reward(ONE, "EC2", "RRRR")
+    text = f"noiseless replay of the {len(replays)} runs with RRRR: {initial:.0f} to"
+    return all_hold([exceeds(replays, initial)], [f"{text} {shown(replays)}"])
 
 
 # Two-armed task 1: exploration conditions 3 and 4
 
 
-def _lrlr_in_all(data: Data, condition: str) -> Finding:
-    found = Counter(data.learned(ONE, condition).hands)
-    seen = nearly_all(found["LRLR"], found.total())
-    others = f"; {tally(found)}" if len(found) > 1 else ""
-    return replace(seen, evidence=f"LRLR in {seen.evidence}{others}")
-
-
-@decides("ec3-alternates", MOST)
-def _ec3_alternates(data: Data) -> Finding:
-    return _lrlr_in_all(data, "EC3")
-
-
-@decides("ec4-keeps-lrlr", MOST)
-def _ec4_keeps_lrlr(data: Data) -> Finding:
-    return _lrlr_in_all(data, "EC4")
-
-
-@decides(
-    "ec3-better-than-ec2",
-    "one-tailed bootstrap test against the runs of condition 2 with its best hand sequence "
-    f"(by mean reward, at least {FEWEST} runs)",
-)
+@decides("ec3-better-than-ec2")
 def _ec3_better_than_ec2(data: Data) -> Finding:
     runs = data.learned(ONE, "EC2")
     groups = {str(h): rewards_of(g) for h, g in runs.groupby("hands") if len(g) >= FEWEST}
@@ -147,68 +92,42 @@ def _ec3_better_than_ec2(data: Data) -> Finding:
         raise MissingError(f"no hand sequence that {FEWEST} runs of EC2 on {ONE} learned")
     hands = max(groups, key=lambda name: float(groups[name].mean()))
     rewards = data.rewards(ONE, "EC3")
-    test = bootstrap_test(rewards, groups[hands], seed=SEED)
-    return Finding(
-        test.estimate > 0,
-        f"EC3 {interval(mean(rewards, seed=SEED))}; best under EC2 {hands} "
-        f"{interval(mean(groups[hands], seed=SEED))} in {len(groups[hands])} of {len(runs)} runs",
-        (test,),
-    )
+    best = groups[hands]
+    under_ec2 = f"best under EC2 {hands} {shown(best)} in {len(best)} of {len(runs)} runs"
+    return all_hold([exceeds(rewards, best)], [f"EC3 {shown(rewards)}", under_ec2])
 
 
-@decides("ec3-as-exhaustive", MOST)
-def _ec3_as_exhaustive(data: Data) -> Finding:
-    best, reward = data.best_sequences(ONE)
-    found = Counter(data.learned(ONE, "EC3").hands)
-    seen = nearly_all(sum(found[hands] for hands in best), found.total())
-    text = f"exhaustive search finds {' and '.join(best)} ({reward:.0f}); EC3 the same in"
-    return replace(seen, evidence=f"{text} {seen.evidence}")
-
-
-@decides(
-    "ec3-beats-exhaustive",
-    "one-tailed bootstrap test against the best corrective-only reward",
-)
+@decides("ec3-beats-exhaustive")
 def _ec3_beats_exhaustive(data: Data) -> Finding:
     rewards = data.rewards(ONE, "EC3")
     _, best = data.best_sequences(ONE)
     published = published_exhaustive(ONE)
     assert published is not None
-    test = bootstrap_test(rewards, best, seed=SEED)
-    return Finding(
-        test.estimate > 0,
-        f"{interval(mean(rewards, seed=SEED))} against {best:.0f} (published {published[1]})",
-        (test,),
-    )
+    text = f"{shown(rewards)} against {best:.0f} (published {published[1]})"
+    return all_hold([exceeds(rewards, best)], [text])
 
 
 # Two-armed task 2
 
 
-@decides("best-is-rrrr", "exact: rewards of all hand sequences; a tie leaves it open")
+@decides("best-is-rrrr")
 def _best_is_rrrr(data: Data) -> Finding:
     best, reward = data.best_sequences(TWO)
     printed = published_exhaustive(TWO)
     assert printed is not None
-    shown = f"{' and '.join(best)} {reward:.0f} (published {printed[0]} {printed[1]})"
-    text = f"best of the corrective process alone: {shown}"
+    text = (
+        f"best of the corrective process alone: {' and '.join(best)} {reward:.0f} (published "
+        f"{printed[0]} {printed[1]})"
+    )
     if "RRRR" not in best:
         return Finding(False, text)
     return Finding(True, text) if len(best) == 1 else Finding(None, f"{text}: a tie")
 
 
-@decides("half-choose-rlrr", f"{AS_OFTEN}; of RLRR")
-def _half_choose_rlrr(data: Data) -> Finding:
-    return as_often(data, TWO, "EC3", "RLRR")
-
-
-@decides(
-    "ec3-departs",
-    "exact: runs with a hand sequence that is not among the best of the corrective process",
-)
+@decides("ec3-departs")
 def _ec3_departs(data: Data) -> Finding:
     best, reward = data.best_sequences(TWO)
-    found = Counter(data.learned(TWO, "EC3").hands)
+    found = data.hands(TWO, "EC3")
     away = sum(count for hands, count in found.items() if hands not in best)
     text = (
         f"{tally(found)}; best of the corrective process alone {' and '.join(best)} "
@@ -221,12 +140,61 @@ def _ec3_departs(data: Data) -> Finding:
     return Finding(False, text)
 
 
-@decides("rlrr-better", "one-tailed bootstrap test of two samples")
-def _rlrr_better(data: Data) -> Finding:
-    return better_hands(data, TWO, "EC3", "RLRR", "RRRR")
-
-
-@decides("ec4-mixed", "exact: more than one hand sequence")
+@decides("ec4-mixed")
 def _ec4_mixed(data: Data) -> Finding:
-    found = Counter(data.learned(TWO, "EC4").hands)
+    found = data.hands(TWO, "EC4")
     return Finding(len(found) > 1, f"{tally(found)} of {found.total()} runs")
+
+
+# Exploration conditions beside each other, on both tasks
+
+
+@decides("ec4-beats-ec3")
+def _ec4_beats_ec3(data: Data) -> Finding:
+    tests, parts = [], []
+    for task in (ONE, TWO):
+        a, b = data.rewards(task, "EC4"), data.rewards(task, "EC3")
+        tests.append(exceeds(a, b))
+        better = probability_of_improvement(a, b, seed=SEED)
+        parts.append(
+            f"{task}: EC4 − EC3 = {interval(difference_of_means(a, b, seed=SEED))}, "
+            f"P(improvement) {interval(better, '.2f')}"
+        )
+    return all_hold(tests, parts)
+
+
+@decides("proficiency-rises")
+def _proficiency_rises(data: Data) -> Finding:
+    tests, parts = [], []
+    for task, conditions in ((ONE, ("EC2", "EC3", "EC4")), (TWO, ("EC3", "EC4"))):
+        initial = data.initial_reward(task, conditions[0])
+        rewards = [data.rewards(task, condition) for condition in conditions]
+        lower: list[Array | float] = [initial, *rewards[:-1]]
+        tests += list(map(exceeds, rewards, lower))
+        means = ", ".join(f"{c} {r.mean():.1f}" for c, r in zip(conditions, rewards, strict=True))
+        parts.append(f"{task}: initial {initial:.0f}, {means}")
+    return all_hold(tests, parts)
+
+
+@decides("sequences-change")
+def _sequences_change(data: Data) -> Finding:
+    tests, parts = [], []
+    for task, pair in ((ONE, ("EC2", "EC3")), (TWO, ("EC3", "EC4"))):
+        found = [data.hands(task, condition) for condition in pair]
+        hands = sorted(set(found[0]) | set(found[1]))
+        table = np.array([[count[h] for h in hands] for count in found])
+        method = stats.MonteCarloMethod(rng=np.random.default_rng(SEED))
+        p = float(stats.fisher_exact(table, method=method).pvalue) if len(hands) > 1 else 1.0
+        tests.append(
+            Inference(
+                float(np.abs(np.diff(table / table.sum(axis=1, keepdims=True), axis=0)).sum() / 2),
+                tuple(int(n) for n in table.sum(axis=1)),
+                "Fisher's test of hand sequences by condition, Monte Carlo",
+                p=p,
+            )
+        )
+        tallies = ", ".join(f"{c} {tally(n)}" for c, n in zip(pair, found, strict=True))
+        parts.append(f"{task}: {tallies}")
+    seen = all_hold(tests, parts)
+    # Fisher's test has no contrary side: no difference leaves it open.
+    return replace(seen, holds=seen.holds or None, against=())

@@ -21,10 +21,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from analysis.figures.robot import MARKERS
+from analysis.figures.robot import MARKERS, box
 from coartic import CoarticError, Trajectory
 from coartic.files import check_outputs, write_outputs
-from coartic.robot import Array
 
 FORMATS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -34,7 +33,6 @@ HOLD_S = 2.0
 RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
 _HIT = "0.55"  # of a goal; not black, which is the right hand
-_MARGIN = 0.4  # length unit around what moves
 _LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
 
 
@@ -173,40 +171,30 @@ class _Scene:
 def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
     movements = [panel.trajectory for panel in panels]
-    corners = np.array([_box(movement) for movement in movements])
+    corners = np.array([box(movement.task, movement.configurations) for movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
     inches, count = width / _DPI, len(panels)
-    height = (inches / count - _LEFT) * up / across + _ABOVE + _BELOW
-    size = inches, 2 * round(height * _DPI / 2) / _DPI  # even in pixels, as MP4 wants it
-    wide, tall = 1 / count - (_LEFT + _RIGHT) / inches, 1 - (_ABOVE + _BELOW) / size[1]
-    places = [
-        (index / count + _LEFT / inches, _BELOW / size[1], wide, tall) for index in range(count)
-    ]
-    backdrop, figure = _empty(size, places, low, high), _empty(size, places, low, high)
-    for axes, panel in zip(backdrop.axes, panels, strict=True):
-        _dress(axes, panel)
-    canvas: Any = FigureCanvasAgg(backdrop)
-    canvas.draw()
-    # Axes take most of the time of drawing: they are drawn once, as a picture.
-    figure.figimage(np.asarray(canvas.buffer_rgba()), zorder=-1)
-    for axes in figure.axes:
-        axes.set_axis_off()
-    return figure, [_Scene(*of) for of in zip(figure.axes, movements, strict=True)]
-
-
-def _empty(
-    size: tuple[float, float],
-    places: Sequence[tuple[float, float, float, float]],
-    low: Array,
-    high: Array,
-) -> Figure:
-    figure = Figure(figsize=size, dpi=_DPI)
-    for place in places:
-        axes = figure.add_axes(place, aspect="equal")
+    wide = inches / count - _LEFT - _RIGHT
+    # Even in pixels, as MP4 wants it.
+    height = 2 * round((wide * up / across + _ABOVE + _BELOW) * _DPI / 2) / _DPI
+    figure = Figure(figsize=(inches, height), dpi=_DPI)
+    for index, panel in enumerate(panels):
+        left, tall = index / count + _LEFT / inches, 1 - (_ABOVE + _BELOW) / height
+        axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-    return figure
+        _dress(axes, panel)
+    # What stands still takes most of the time of drawing: it is drawn once, as a picture.
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    figure.figimage(np.array(canvas.buffer_rgba()), zorder=-1)
+    for axes in figure.axes:
+        axes.set_axis_off()
+        axes.set_title("", loc="left")
+        for text in list(axes.texts):
+            text.remove()
+    return figure, [_Scene(*of) for of in zip(figure.axes, movements, strict=True)]
 
 
 def _dress(axes: Axes, panel: Panel) -> None:
@@ -218,15 +206,6 @@ def _dress(axes: Axes, panel: Panel) -> None:
     axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
     axes.tick_params(labelsize=8)
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _box(trajectory: Trajectory) -> tuple[Array, Array]:
-    """Corners of everything that the robot sweeps, with the goals and a margin."""
-    task, q = trajectory.task, trajectory.configurations
-    parts = [task.robot.base_outline(q), task.goal_array]
-    parts += [task.robot.joint_positions(q, hand) for hand in task.hands]
-    cloud = np.concatenate([part.reshape(-1, 2) for part in parts])
-    return cloud.min(axis=0) - _MARGIN, cloud.max(axis=0) + _MARGIN
 
 
 def _writer(path: Path, timed: Timing) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,33 +13,20 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from analysis.comparisons.paper import published_of
+from analysis.figures import style
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot, spoken
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import CONDITIONS, has, missing, rewards_of, solved
-from analysis.figures.style import (
-    GREY,
-    INK,
-    PAPER,
-    column_width,
-    dagger,
-    heading,
-    letters,
-    looks,
-    percent,
-    styled,
-)
 from analysis.methods import LEARNER, short_name
 from analysis.published import Summary, published_cell, published_initial
 from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
 from analysis.statistics.hypotheses import bootstrap_test, holm
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 
 
-@styled
+@style.styled
 def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Mean learned reward of each method, as a bar from the initial solution up.
 
@@ -62,31 +49,23 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     data = data.assign(p_holm=adjusted).reset_index(drop=True)
     # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
-    width = column_width(0.5 + 0.58 * sum(counts))
+    width = style.column_width(0.5 + 0.58 * sum(counts))
     figure = Figure(figsize=(width, 2.6), layout="constrained")
     panels = figure.subplots(1, len(labels), width_ratios=counts, squeeze=False)[0]
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
-        axes.set_title(heading(study.tasks[name]))
+        axes.set_title(style.heading(study.tasks[name]))
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
-    letters(panels)
-    return Plot(
-        id="learned-reward",
-        title="Learned reward by condition",
-        caption=(
-            "Mean learned reward (−1 a control tick) as a bar that rises from the initial "
-            f"solution, with its {percent(CONFIDENCE)} BCa interval over runs; grey dots: runs. "
-            "Open diamonds: published mean with its 95 % interval where an SD is printed (of all "
-            "runs, pooled where the paper reports hand sequences apart). Brackets: one-tailed "
-            "bootstrap test that the mean is higher than what stands to the left "
-            f"({RESAMPLES} resamples, seed {SEED}), Holm-adjusted over the figure: "
-            "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant, – no test. After "
-            f"Figure 8 of Shah, Barto & Fagg (2013).{dagger(study.tasks[name] for name in labels)}"
-        ),
-        alt=f"Bars of mean learned reward with intervals. {spoken(data, 'reward', 1)}.",
-        figure=figure,
-        data=data,
+    style.letters(panels)
+    return worded(
+        "learned-reward",
+        figure,
+        data,
+        [study.tasks[name] for name in labels],
+        resamples=RESAMPLES,
+        seed=SEED,
+        means=spoken(data, "reward", 1),
     )
 
 
@@ -140,23 +119,23 @@ def _half(summary: Summary | None) -> float:
 
 def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     initial = float(rows.reward.iloc[0])
-    style = looks(rows.method[1:])
-    axes.axhline(initial, color=INK, linewidth=0.7, zorder=1)
-    bar: Any = {"bottom": initial, "edgecolor": INK, "linewidth": 0.5, "zorder": 1}
-    dot: Any = {"markersize": 1.6, "color": INK, "alpha": 0.55, "markeredgewidth": 0, "zorder": 3}
-    diamond: Any = {"markersize": 3.4, "color": INK, "markerfacecolor": PAPER, "zorder": 4}
+    look_of = style.looks(rows.method[1:])
+    axes.axhline(initial, color=style.INK, linewidth=0.7, zorder=1)
+    bar: Any = {"bottom": initial, "edgecolor": style.INK, "linewidth": 0.5, "zorder": 1}
+    dot: Any = {"markersize": 1.6, "alpha": 0.55, "markeredgewidth": 0, "zorder": 3}
+    diamond: Any = {"markersize": 3.4, "markerfacecolor": style.PAPER, "zorder": 4}
     for place, row in enumerate(rows.to_dict("records")):
         if place:
-            color = style[row["method"]].color
+            color = look_of[row["method"]].color
             axes.bar(place, row["reward"] - initial, 0.62, color=color, **bar)
             _interval(axes, place - 0.16, row["reward"], row["low"], row["high"])
             rewards = np.sort(runs[row["method"]])
             offsets = 0.06 + 0.05 * (np.arange(len(rewards)) % 5)
-            axes.plot(place + offsets, rewards, "o", **dot)
+            axes.plot(place + offsets, rewards, "o", color=style.INK, **dot)
         if not math.isnan(row["published"]):
             x = place + (0.42 if place else 0.0)
             _interval(axes, x, row["published"], row["published_low"], row["published_high"])
-            axes.plot(x, row["published"], "D", **diamond)
+            axes.plot(x, row["published"], "D", color=style.INK, **diamond)
     _brackets(axes, rows, runs)
     names = ["initial", *(short_name(label) for label in rows.method[1:])]
     axes.set_xticks(range(len(rows)), names)
@@ -172,8 +151,8 @@ def _interval(axes: Axes, x: float, value: float, low: float, high: float) -> No
     if math.isnan(low):
         return
     ends = [[value - low], [high - value]]
-    line: Any = {"color": INK, "linewidth": 0.8, "capsize": 1.8, "capthick": 0.8, "zorder": 3}
-    axes.errorbar(x, value, ends, **line)
+    line: Any = {"linewidth": 0.8, "capsize": 1.8, "capthick": 0.8, "zorder": 3}
+    axes.errorbar(x, value, ends, color=style.INK, **line)
 
 
 def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
@@ -189,8 +168,8 @@ def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
         level = max(tops[place - 1], tops[place], level) + 1.6 * step
         left, right, foot = place - 0.95, place - 0.05, level - 0.4 * step
         ends = [left, left, right, right], [foot, level, level, foot]
-        axes.plot(*ends, color=INK, linewidth=0.7)
-        color = INK if stars(p).startswith("*") else GREY
+        axes.plot(*ends, color=style.INK, linewidth=0.7)
+        color = style.INK if stars(p).startswith("*") else style.GREY
         axes.text(place - 0.5, level, stars(p), ha="center", va="bottom", color=color)
     axes.set_ylim(bottom - 1.2 * step, level + 2.2 * step)
 

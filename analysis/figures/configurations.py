@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,19 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.figures.plot import Plot
+from analysis.figures import style
+from analysis.figures.plot import Plot, worded
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from analysis.figures.selection import CONDITIONS, missing, solved
-from analysis.figures.style import GREY, INK, NORMAL, SMALL, TWO, dagger, entry, number, styled
 from analysis.methods import short_name
 from analysis.signatures.trajectories import Trajectories
-from coartic import Execution, Task, execute
+from analysis.study import Study
+from coartic import Execution, Task
 from coartic.robot import Array
-from coartic.rows import movements_from
 from coartic.task import hands_of
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 Rows = Sequence[tuple[str, Sequence[str]]]
 PAPER: dict[str, tuple[str, Rows]] = {
@@ -75,10 +72,10 @@ def initial_solution(study: Study, task: str) -> Solution:
 
     Raises CoarticError where that does not complete the task.
     """
-    execution = Trajectories(study.results.tasks[task], "", "", ()).initial
+    execution = Trajectories(study.tasks[task], "", "", ()).initial
     if execution is None:
         raise missing(study, f"the corrective process alone does not complete {task}")
-    return Solution(study.results.tasks[task], "", "", execution)
+    return Solution(study.tasks[task], "", "", execution)
 
 
 def common_sequences(study: Study, task: str, label: str, most: int) -> list[str]:
@@ -110,25 +107,18 @@ def typical_run(study: Study, task: str, label: str, hands: str | None = None) -
 
 
 def learned_solution(study: Study, task: str, label: str, run_id: str) -> Solution:
-    """A stored run's solution, executed again.
-
-    Raises CoarticError for a run that is not a solved one of the cell.
-    """
+    """A stored run's solution. Raises CoarticError for a run that is no solved one of the cell."""
     good = solved(study, task, label).good
-    if run_id not in set(good.run_id):
+    ids = good.run_id.tolist()
+    if run_id not in ids:
         raise missing(study, f"{run_id} is no solved run of {label} on {task}")
-    solutions, paths = study.results.solutions(), study.results.paths()
-    own = study.results.tasks[task]
-    movements = movements_from(
-        own, solutions[solutions.run_id == run_id], paths[paths.run_id == run_id]
-    )
-    execution = execute(own, movements)
+    execution = study.trajectories[task, label].runs[ids.index(run_id)].execution
     alike = int((good.hands == execution.hands).sum())
     share = f"{alike} of {len(good)}" if len(good) > 1 else ""
-    return Solution(own, label, run_id, execution, share)
+    return Solution(study.tasks[task], label, run_id, execution, share)
 
 
-@styled
+@style.styled
 def configurations(
     study: Study,
     rows: Rows,
@@ -167,24 +157,12 @@ def configurations(
         if solution.method
     )
     totals = "; ".join(
-        f"{s.task.label}, {s.name}, total {number(-s.execution.ticks)}" for s in shown
+        f"{s.task.label}, {s.name}, total {style.number(-s.execution.ticks)}" for s in shown
     )
-    return Plot(
-        id=id,
-        title="Configurations at each goal: " + ", ".join(t.label for t in tasks.values()),
-        caption=(
-            "Configuration when each goal was hit (black; joints of the chosen arm marked: "
-            "open squares left, closed circles right) and the one before (grey). Above each "
-            "panel goal, chosen hand and reward of the movement (−1 a control tick), at the "
-            f"row's end the total. {_TYPICAL if sequences == 1 else _BY_SEQUENCE}, unless "
-            "another was asked for; in brackets in how many of the method's runs the sequence "
-            f"was found: {named}. After {like} of Shah, Barto & Fagg (2013)."
-            f"{dagger(tasks.values())}"
-        ),
-        alt=f"Robot configurations at every goal. {totals}.",
-        figure=figure,
-        data=_data(shown),
-    )
+    labels = ", ".join(task.label for task in tasks.values())
+    of = {"tasks": labels, "which": _TYPICAL if sequences == 1 else _BY_SEQUENCE, "like": like}
+    of |= {"named": named, "totals": totals}
+    return worded("configurations", figure, _data(shown), tasks.values(), id=id, **of)
 
 
 def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | None = None) -> Plot:
@@ -206,7 +184,7 @@ def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | No
 
 def _draw(shown: Sequence[Solution]) -> Figure:
     end, gap, head, foot = 0.46, 0.08, 0.34, 0.3  # inches
-    wide = (TWO - end) / max(len(solution.task.goals) for solution in shown)
+    wide = (style.TWO - end) / max(len(solution.task.goals) for solution in shown)
     postures: dict[str, list[Array]] = {}
     for s in shown:
         postures.setdefault(s.task.name, [s.task.q0]).extend(s.execution.configurations)
@@ -215,28 +193,30 @@ def _draw(shown: Sequence[Solution]) -> Figure:
     scale = (wide - gap) / max(extent[0] for extent in extents.values())
     sizes = [scale * extents[s.task.name] for s in shown]
     height = sum(size[1] for size in sizes) + head * len(shown) + foot
-    figure = Figure(figsize=(TWO, height))
+    figure = Figure(figsize=(style.TWO, height))
     top = height
-    bold: Any = {"va": "top", "fontsize": NORMAL, "weight": "bold"}
+    bold: Any = {"va": "top", "fontsize": style.NORMAL, "weight": "bold"}
     for solution, (width, tall) in zip(shown, sizes, strict=True):
         task = solution.task
         title = f"{task.label}: {solution.name}" if len(extents) > 1 else solution.name
         figure.text(0.004, (top - 0.03) / height, title, **bold)
         top -= head + tall
         panels = [
-            figure.add_axes(((k * wide + gap / 2) / TWO, top / height, width / TWO, tall / height))
+            figure.add_axes(
+                ((k * wide + gap / 2) / style.TWO, top / height, width / style.TWO, tall / height)
+            )
             for k in range(len(task.goals))
         ]
         _panels(panels, solution, *corners[task.name])
-        total = f"total\n{number(-solution.execution.ticks)}"
-        place = 1 - 0.02 / TWO, (top + tall / 2) / height
-        figure.text(*place, total, ha="right", va="center", fontsize=NORMAL)
-    before = entry("before", color=GREY, linewidth=0.9)
+        total = f"total\n{style.number(-solution.execution.ticks)}"
+        place = 1 - 0.02 / style.TWO, (top + tall / 2) / height
+        figure.text(*place, total, ha="right", va="center", fontsize=style.NORMAL)
+    before = style.entry("before", color=style.GREY, linewidth=0.9)
     handles = legend_entries(hand for solution in shown for hand in solution.task.hands)
     figure.legend(handles=[*handles, before], loc="lower center", ncols=4, borderaxespad=0.2)
-    bar = np.array([0.08, 0.08 + scale]) / TWO
-    figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=INK, linewidth=1.2))
-    figure.text(bar[1] + 0.04 / TWO, 0.13 / height, "1 length unit", va="center")
+    bar = np.array([0.08, 0.08 + scale]) / style.TWO
+    figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=style.INK, linewidth=1.2))
+    figure.text(bar[1] + 0.04 / style.TWO, 0.13 / height, "1 length unit", va="center")
     return figure
 
 
@@ -249,10 +229,12 @@ def _panels(panels: Sequence[Axes], solution: Solution, low: Array, high: Array)
         axes.set_axis_off()
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        draw_robot(axes, task, before, color=GREY)
+        draw_robot(axes, task, before, color=style.GREY)
         draw_goals(axes, task, current=k + 1)
         draw_robot(axes, task, q, marked=(hands[k],))
-        axes.set_title(f"goal {k + 1}: {hands[k]}, {number(-ticks[k])}", fontsize=SMALL, pad=1)
+        axes.set_title(
+            f"goal {k + 1}: {hands[k]}, {style.number(-ticks[k])}", fontsize=style.SMALL, pad=1
+        )
         before = q
 
 

@@ -5,41 +5,27 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.figures import style
 from analysis.figures.bars import stars
-from analysis.figures.plot import Plot
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import chosen, missing
-from analysis.figures.style import (
-    BLUE,
-    GREY,
-    ONE,
-    PAPER,
-    TALLEST,
-    VERMILLION,
-    entry,
-    legend,
-    letters,
-    name_rows,
-    styled,
-)
 from analysis.methods import short_name
 from analysis.statistics.hypotheses import holm
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 MOST = 6
-_OPEN: Any = {"marker": "s", "color": VERMILLION, "markerfacecolor": PAPER}
+_OPEN: Any = {"marker": "s", "color": style.VERMILLION, "markerfacecolor": style.PAPER}
 _PARTS = {"motor-equivalent part": "equivalent", "non-motor-equivalent part": "other"}
 
 
-@styled
+@style.styled
 def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Motor-equivalent and non-motor-equivalent part of the difference between contexts.
 
@@ -52,7 +38,9 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     if len(places) > MOST:
         raise missing(study, f"{len(places)} pairs of tasks share a goal, more than {MOST}")
     rows = sum(len(group) + 4 for _, group in places)
-    figure = Figure(figsize=(ONE, min(0.5 + 0.16 * rows, TALLEST)), layout="constrained")
+    figure = Figure(
+        figsize=(style.ONE, min(0.5 + 0.16 * rows, style.TALLEST)), layout="constrained"
+    )
     heights = [len(group) + 1 for _, group in places]
     panels = figure.subplots(
         len(places), squeeze=False, sharex=True, height_ratios=heights
@@ -64,32 +52,17 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         axes.set_title(textwrap.fill(f"{task}: {where}", 31))
     panels[-1].set_xlabel("difference per root of dimension\n(length unit, rad)")
     if len(places) > 1:
-        letters(panels)
+        style.letters(panels)
     handles = [
-        entry("motor-equivalent", linestyle="", marker="o", color=BLUE),
-        entry("moves the hand", linestyle="", **_OPEN),
+        style.entry("motor-equivalent", linestyle="", marker="o", color=style.BLUE),
+        style.entry("moves the hand", linestyle="", **_OPEN),
     ]
-    legend(figure, handles, 2)
+    style.legend(figure, handles, 2)
     words = "; ".join(
         f"{short_name(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
         for row in data.to_dict("records")
     )
-    return Plot(
-        id="context",
-        title="Context dependence at the shared goal",
-        caption=(
-            "Difference between the mean configurations at the same goal before different "
-            "successors, divided into the part that leaves the hand in place (motor-equivalent) "
-            "and the part that moves it, each per root of the dimension of its space. A hit "
-            "confines the hand to the goal's disc, so the second part is bounded. Stars: "
-            "permutation test over runs, Holm-adjusted over the figure (*** p < 0.001, "
-            "** p < 0.01, * p < 0.05, n.s. not significant), of the motor-equivalent part; "
-            "methods that are run once have none."
-        ),
-        alt=f"Motor-equivalent and non-motor-equivalent part by method: {words}.",
-        figure=figure,
-        data=data,
-    )
+    return worded("context", figure, data, parts=words)
 
 
 def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:
@@ -122,12 +95,12 @@ def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:
 def _panel(axes: Axes, data: pd.DataFrame) -> None:
     for place, row in enumerate(data.to_dict("records")):
         values = [row["other"], row["equivalent"]]
-        axes.plot(values, [-place, -place], color=GREY, linewidth=0.8, zorder=1)
+        axes.plot(values, [-place, -place], color=style.GREY, linewidth=0.8, zorder=1)
         axes.plot(row["other"], -place, linestyle="", markersize=4, clip_on=False, **_OPEN)
-        axes.plot(row["equivalent"], -place, "o", color=BLUE, markersize=4, clip_on=False)
+        axes.plot(row["equivalent"], -place, "o", color=style.BLUE, markersize=4, clip_on=False)
         if not math.isnan(row["p_equivalent"]):
             mark, end = stars(row["holm_equivalent"]), (max(values), -place)
             axes.annotate(mark, end, (5, -0.5), textcoords="offset points", va="center")
-    name_rows(axes, [short_name(method) for method in data.method])
+    style.name_rows(axes, [short_name(method) for method in data.method])
     axes.set_ylim(-len(data) + 0.4, 0.6)
-    axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.4)
+    axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.4)

@@ -4,34 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.comparisons.progress import SPENDS
-from analysis.figures.plot import Plot, spoken
+from analysis.figures import style
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import chosen, missing
-from analysis.figures.style import (
-    INK,
-    OPTIMUM,
-    dagger,
-    entry,
-    legend,
-    log_axis,
-    looks,
-    percent,
-    styled,
-    task_panels,
-)
 from analysis.methods import short_name
-from analysis.statistics.estimates import CONFIDENCE
+from analysis.study import Study
 from coartic import Task
 from coartic.record import SEARCH
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 NAMES = {
     "trials": "physical trials",
@@ -39,11 +25,11 @@ NAMES = {
     "forward_kinematics": "forward-kinematics evaluations",
     "solve_s": "solve time (s)",
 }
-_MARK: Any = {"markersize": 4, "markeredgewidth": 0.4, "markeredgecolor": INK}
-_RING: Any = {"color": INK, "markerfacecolor": "none"}
+_MARK: Any = {"markersize": 4, "markeredgewidth": 0.4, "markeredgecolor": style.INK}
+_RING: Any = {"color": style.INK, "markerfacecolor": "none"}
 
 
-@styled
+@style.styled
 def frontier(study: Study, *, methods: Sequence[str] | None = None) -> list[Plot]:
     """Best reward so far against each spend, one figure a spend, one panel a task.
 
@@ -73,7 +59,7 @@ def _plot(
 ) -> Plot:
     present = [label for label in labels if label in set(data.method)]
     below = 0.25 + 0.15 * math.ceil((len(present) + 2) / 4)
-    figure, panels = task_panels(
+    figure, panels = style.task_panels(
         tasks.values(), 2.1, below, NAMES[spend], "best reward so far (ticks)", sharex=True
     )
     positive = data.budget[data.budget > 0]
@@ -84,30 +70,22 @@ def _plot(
         _panel(axes, data[data.task == task], present, edge, optimum.reward if optimum else None)
     panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
     _legend(figure, data, present)
-    ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "mean")
-    return Plot(
+    return worded(
+        "frontier",
+        figure,
+        data,
+        tasks.values(),
         id=f"frontier-{spend.replace('_', '-')}",
-        title=f"Reward against {NAMES[spend]}",
-        caption=(
-            f"Best reward so far against {NAMES[spend]}: mean over runs with its "
-            f"{percent(CONFIDENCE)} bootstrap interval, pointwise, from where every run has "
-            "a solution. Single marks: methods that do not learn by trial, at the median spend of "
-            "a whole run, at the left edge where they spend nothing. Ringed: on the Pareto front "
-            "of mean reward and spend of all methods of the folder, shown here or not. Dotted: "
-            "optimum with all joints free. Rewards far below are cut off, marks there stand at "
-            f"the lower edge.{dagger(tasks.values())}"
-        ),
-        alt=f"Curves of reward against {NAMES[spend]}. Last means: {ends}.",
-        figure=figure,
-        data=data,
+        spend=NAMES[spend],
+        ends=spoken(data.groupby(["task", "method"], sort=False).tail(1), "mean"),
     )
 
 
 def _panel(
     axes: Axes, data: pd.DataFrame, labels: Sequence[str], edge: float, optimum: float | None
 ) -> None:
-    style = looks(labels)
-    log_axis(axes)
+    look_of = style.looks(labels)
+    style.log_axis(axes)
     ends = data.groupby("method", sort=False)["mean"].last()
     top = max(data["mean"].max(), optimum if optimum is not None else -math.inf)
     # The worst quarter of the methods does not decide the scale.
@@ -116,35 +94,31 @@ def _panel(
     low -= 0.5 * (top - low)
     axes.set_ylim(low, top + 0.08 * (top - low))
     for label, rows in data.groupby("method", sort=False):
-        look = style[str(label)]
+        look = look_of[str(label)]
         if rows.kind.iloc[0] == "curve":
-            axes.step(
-                rows.budget, rows["mean"], where="post", color=look.color, linestyle=look.dash
-            )
+            axes.step(rows.budget, rows["mean"], where="post", **look.line)
             band: Any = {"step": "post", "color": look.color, "alpha": 0.2, "linewidth": 0}
             axes.fill_between(rows.budget, rows.low, rows.high, **band)
         last = rows.iloc[-1]
         x, y = max(last.budget, edge), max(last["mean"], low)
         axes.plot(x, y, look.marker, color=look.color, clip_on=False, zorder=4, **_MARK)
         if last.front:
-            axes.plot(
-                x, y, "o", markersize=8, markeredgewidth=0.7, clip_on=False, zorder=5, **_RING
-            )
+            ring: Any = {**_RING, "markersize": 8, "markeredgewidth": 0.7}
+            axes.plot(x, y, "o", clip_on=False, zorder=5, **ring)
     if optimum is not None:
-        axes.axhline(optimum, **OPTIMUM)
+        axes.axhline(optimum, **style.OPTIMUM)
 
 
 def _legend(figure: Figure, data: pd.DataFrame, labels: Sequence[str]) -> None:
     curves = set(data[data.kind == "curve"].method)
     handles = [
-        entry(
+        style.entry(
             short_name(label),
-            color=look.color,
-            linestyle=look.dash if label in curves else "",
             marker=look.marker,
+            **look.line | ({} if label in curves else {"linestyle": ""}),
             **_MARK,
         )
-        for label, look in looks(labels).items()
+        for label, look in style.looks(labels).items()
     ]
-    ring = entry("Pareto front", linestyle="", marker="o", markersize=7, **_RING)
-    legend(figure, [*handles, ring, entry("optimum", **OPTIMUM)], 4)
+    ring = style.entry("Pareto front", linestyle="", marker="o", markersize=7, **_RING)
+    style.legend(figure, [*handles, ring, style.entry("optimum", **style.OPTIMUM)], 4)

@@ -3,33 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from analysis.figures import style
 from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot, spoken
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import CONDITIONS, has, missing
-from analysis.figures.style import (
-    INITIAL,
-    OPTIMUM,
-    dagger,
-    entry,
-    legend,
-    log_axis,
-    looks,
-    styled,
-    task_panels,
-)
 from analysis.methods import short_name
+from analysis.study import Study
 from coartic import CoarticError, Task
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 WINDOW = 100
 """Trials over which the reward of trials is averaged."""
@@ -37,7 +23,7 @@ POINTS = 120
 _DEFAULT = (*CONDITIONS, "random-search/climbing", "cma-es/bandit")
 
 
-@styled
+@style.styled
 def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Reward of methods that learn by trial, one panel a task.
 
@@ -59,25 +45,17 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
     shown = {name: study.tasks[name] for name in data.task.unique()}
     asked = list(methods or _DEFAULT)
     labels = sorted(data.method.unique(), key=asked.index)
-    figure, panels = task_panels(shown.values(), 2.15, 0.45, "trial", "reward (ticks)")
+    figure, panels = style.task_panels(shown.values(), 2.15, 0.45, "trial", "reward (ticks)")
     for axes, task in zip(panels, shown.values(), strict=True):
         _panel(axes, study, task, data[data.task == task.name], labels)
-    _legend(figure, labels)
+    handles = [
+        style.entry(short_name(label), linewidth=1.3, **look.line)
+        for label, look in style.looks(labels).items()
+    ]
+    handles += [style.entry("initial", **style.INITIAL), style.entry("optimum", **style.OPTIMUM)]
+    style.legend(figure, handles, min(len(handles), 4))
     ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "best")
-    return Plot(
-        id="learning-curves",
-        title="Learning curves",
-        caption=(
-            "Best reward so far (thick; mean over runs, band: middle half of the runs) and "
-            "reward of the trials themselves (thin; mean over runs, averaged over the last "
-            f"{WINDOW} trials, fewer at the start; failed trials are left out). Dash-dotted: "
-            "initial solution; dotted: optimum with all joints free. Axes are cut below where "
-            f"trials fall far short of the initial solution.{dagger(shown.values())}"
-        ),
-        alt=f"Curves of reward against trial. Mean best reward at the end: {ends}.",
-        figure=figure,
-        data=data,
-    )
+    return worded("learning-curves", figure, data, shown.values(), window=WINDOW, ends=ends)
 
 
 def _default(study: Study, task: str) -> list[str]:
@@ -96,18 +74,17 @@ def _curves(study: Study, task: str, label: str, by_run: dict[str, pd.DataFrame]
     runs = [by_run[run].reward.to_numpy(dtype=np.float64, na_value=np.nan) for run in ids]
     length = min(map(len, runs))
     rewards = np.array([run[:length] for run in runs])
-    best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards), axis=1)
-    best[np.isinf(best)] = np.nan
     at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
-    # Until every run has a solution there is no mean of them.
-    low, high = np.quantile(best[:, at - 1], [0.25, 0.75], axis=0)
+    # Until every run has a solution (NaN before) there is no mean of them.
+    best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
+    low, high = np.quantile(best, [0.25, 0.75], axis=0)
     return pd.DataFrame(
         {
             "task": task,
             "method": label,
             "runs": len(ids),
             "trial": at,
-            "best": best[:, at - 1].mean(axis=0),
+            "best": best.mean(axis=0),
             "best_low": low,
             "best_high": high,
             "trials": _running(rewards)[at - 1],
@@ -127,36 +104,27 @@ def _running(rewards: Array) -> Array:
 def _panel(
     axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
 ) -> None:
-    style = looks(labels)
+    look_of = style.looks(labels)
     for label, rows in data.groupby("method", sort=False):
-        look = style[str(label)]
+        look = look_of[str(label)]
         axes.fill_between(
             rows.trial, rows.best_low, rows.best_high, color=look.color, alpha=0.22, linewidth=0
         )
-        axes.plot(rows.trial, rows.best, color=look.color, linestyle=look.dash, linewidth=1.3)
-        axes.plot(rows.trial, rows.trials, color=look.color, linestyle=look.dash, linewidth=0.6)
+        axes.plot(rows.trial, rows.best, linewidth=1.3, **look.line)
+        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look.line)
     floor, top = data.best.min(), data.best_high.max()
     try:
         initial = -initial_solution(study, task.name).execution.ticks
     except CoarticError:
         initial = None
     if initial is not None:
-        axes.axhline(initial, **INITIAL)
+        axes.axhline(initial, **style.INITIAL)
         floor, top = initial, max(top, initial)
     optimum = study.optima.get((task.name, "free"))
     if optimum is not None:
-        axes.axhline(optimum.reward, **OPTIMUM)
+        axes.axhline(optimum.reward, **style.OPTIMUM)
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
-    log_axis(axes)
+    style.log_axis(axes)
     axes.set_xlim(1, max(2, data.trial.max()))
-
-
-def _legend(figure: Figure, labels: Sequence[str]) -> None:
-    handles = [
-        entry(short_name(label), color=look.color, linestyle=look.dash, linewidth=1.3)
-        for label, look in looks(labels).items()
-    ]
-    handles += [entry("initial", **INITIAL), entry("optimum", **OPTIMUM)]
-    legend(figure, handles, min(len(handles), 4))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Collection
+import tomllib
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from analysis.figures.style import GREY, INK, PAPER, RC
+from analysis.figures.style import CONFIDENCE, GREY, INK, PAPER, RC, dagger
 from analysis.figures.svg import compact
 from analysis.methods import short_name
-from coartic import CoarticError
+from coartic import CoarticError, Task
 from coartic.files import write_atomically
 from coartic.text import one_line, printed
 
@@ -32,6 +33,9 @@ _NO_DATE = {
 }
 _COLOURS = 256
 _FAMILY = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
+_WORDS: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
+)
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 
@@ -48,6 +52,25 @@ class Plot:
     figure: Figure
     data: pd.DataFrame
     """What is drawn, tidy: enough to draw it again."""
+
+
+def worded(
+    name: str,
+    figure: Figure,
+    data: pd.DataFrame,
+    of_tasks: Iterable[Task] = (),
+    *,
+    id: str | None = None,  # noqa: A002
+    **of: object,
+) -> Plot:
+    """A figure with its words from ``words.toml``, names in them filled in.
+
+    ``of_tasks``: what a dagger means is said where one of them is reconstructed; ``id``: where it
+    is not ``name``.
+    """
+    words = {part: text.format(confidence=CONFIDENCE, **of) for part, text in _WORDS[name].items()}
+    words["caption"] += dagger(of_tasks)
+    return Plot(id or name, figure=figure, data=data, **words)
 
 
 def spoken(rows: pd.DataFrame, value: str, digits: int = 0) -> str:

@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.comparisons.overall import REACHED, by_task, normalised_scores
-from analysis.figures.plot import Plot
+from analysis.figures import style
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
-from analysis.figures.style import (
-    TWO,
-    Look,
-    entry,
-    legend,
-    letters,
-    looks,
-    percent,
-    styled,
-)
 from analysis.methods import short_name
 from analysis.statistics.across_tasks import profile
-from analysis.statistics.estimates import CONFIDENCE, SEED
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.statistics.estimates import SEED
+from analysis.study import Study
 
 LEARNER = "learner"
 """The paper's learner on all tasks: EC1 where there is one hand, EC4 where there are two."""
@@ -45,7 +34,7 @@ _FARTHEST = {"score": 1.0, "gap": 0.16}
 """Right end of the score profile, and of the performance profile (gap to the optimum)."""
 
 
-@styled
+@style.styled
 def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Share of runs, each task counting the same, by normalised score and by gap.
 
@@ -82,26 +71,13 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     words = "; ".join(
         f"{_name(row['method'])}: {row['share']:.0%}" for row in ends.to_dict("records")
     )
-    return Plot(
-        id="profiles",
-        title="Profiles over all tasks",
-        caption=(
-            f"Tasks {names}, each counting the same. a: share of runs with a normalised score "
-            "above the threshold, 0 the initial solution, 1 the optimum with all joints free "
-            "(score profile, Agarwal et al. 2021). b: share of runs whose gap to that optimum is "
-            "at most the threshold (after the performance profiles of Dolan & Moré 2002, the "
-            f"optimum in the place of the best solver). Bands: {percent(CONFIDENCE)} intervals, "
-            f"pointwise, runs resampled within tasks (seed {SEED}). Learner: EC1 on tasks with "
-            "one hand, EC4 on those with two."
-            + (f" Not run on every task: {', '.join(absent)}." if absent else "")
-        ),
-        alt=f"Profiles over tasks. Share of runs within 5 % of the optimum: {words}.",
-        figure=_draw(data, everywhere),
-        data=data,
-    )
+    elsewhere = f" Not run on every task: {', '.join(absent)}." if absent else ""
+    figure = _draw(data, everywhere)
+    return worded("profiles", figure, data, tasks=names, seed=SEED, absent=elsewhere, shares=words)
 
 
 def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
+    """Both curves of a method: shares of runs at thresholds, with their intervals."""
     parts = []
     for kind, farthest in _FARTHEST.items():
         levels = np.linspace(0.0, farthest, POINTS)
@@ -109,30 +85,23 @@ def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
         curve = {"share": found.share, "low": found.low, "high": found.high}
         named = {"method": label, "kind": kind, "threshold": levels}
         parts.append(pd.DataFrame({**named, **curve, "runs": sum(found.n)}))
-    return pd.concat(parts, ignore_index=True)
+    return pd.concat(parts)
 
 
 def _name(label: str) -> str:
     return "learner (EC1, EC4)" if label == LEARNER else short_name(label)
 
 
-def _looks(labels: Sequence[str]) -> dict[str, Look]:
-    """The learner looks as its fourth condition does."""
-    found = looks([CONDITIONS[3], *(label for label in labels if label != LEARNER)])
-    return {LEARNER: found.pop(CONDITIONS[3]), **found}
-
-
 def _draw(data: pd.DataFrame, labels: Sequence[str]) -> Figure:
+    # The learner looks as its fourth condition does.
+    alike = {label: CONDITIONS[3] if label == LEARNER else label for label in labels}
+    looks = style.looks(alike.values())
     lines: dict[str, Any] = {
-        label: {
-            "color": look.color,
-            "linestyle": look.dash,
-            "linewidth": 1.6 if label == LEARNER else 0.9,
-        }
-        for label, look in _looks(labels).items()
+        label: {**looks[like].line, "linewidth": 1.6 if label == LEARNER else 0.9}
+        for label, like in alike.items()
     }
     rows = -(-len(labels) // 3)
-    figure = Figure(figsize=(TWO, 2.35 + 0.15 * rows), layout="constrained")
+    figure = Figure(figsize=(style.TWO, 2.35 + 0.15 * rows), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, (kind, curves) in zip(panels, data.groupby("kind", sort=False), strict=True):
         for label, own in curves.groupby("method", sort=False):
@@ -148,6 +117,6 @@ def _draw(data: pd.DataFrame, labels: Sequence[str]) -> Figure:
     panels[0].set_xlabel("normalised score above")
     panels[1].set_xlabel("gap to the optimum at most")
     panels[1].set_xticks([0, 0.05, 0.1, 0.15], ["0", "5 %", "10 %", "15 %"])
-    letters(panels)
-    legend(figure, [entry(_name(label), **lines[label]) for label in labels], 3)
+    style.letters(panels)
+    style.legend(figure, [style.entry(_name(label), **lines[label]) for label in labels], 3)
     return figure

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -11,35 +11,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from analysis.comparisons.paper import published_of
-from analysis.figures.plot import Plot
+from analysis.figures import style
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import chosen, has, missing, solved
-from analysis.figures.style import (
-    GREY,
-    INK,
-    PALETTE,
-    TWO,
-    dagger,
-    heading,
-    legend,
-    letters,
-    name_rows,
-    on,
-    styled,
-)
 from analysis.methods import short_name
 from analysis.published import RUNS
+from analysis.study import Study
 from coartic import Task
 
-if TYPE_CHECKING:
-    from analysis.study import Study
-
-MOST = len(PALETTE)
+MOST = len(style.PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""
 OTHERS = "others"
-_EDGE: Any = {"edgecolor": INK, "linewidth": 0.4}
+_EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
 
 
-@styled
+@style.styled
 def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Shares of hand sequences of each method, one panel a task with two hands.
 
@@ -57,29 +43,18 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     common = shares.sort_values(ascending=False, kind="stable").index
     order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
     bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
-    figure = Figure(figsize=(TWO, 0.75 + 0.155 * max(bars)), layout="constrained")
+    figure = Figure(figsize=(style.TWO, 0.75 + 0.155 * max(bars)), layout="constrained")
     panels = figure.subplots(1, len(found), squeeze=False)[0]
     for axes, task in zip(panels, found.values(), strict=True):
         _panel(axes, task, data[data.task == task.name], order)
-    letters(panels)
+    style.letters(panels)
     _legend(figure, order)
     words = "; ".join(
         f"{task}, {short_name(str(label))}{'' if source == 'ours' else ', published'}: "
         + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
         for (task, label, source), rows in data.groupby(["task", "method", "source"], sort=False)
     )
-    return Plot(
-        id="recruitment",
-        title="Hand sequences",
-        caption=(
-            "Share of runs by hand sequence (L left, R right, goal by goal); the number is that "
-            f"of runs. Hatched: published. Rare sequences are grey."
-            f"{dagger(found.values())}"
-        ),
-        alt=f"Stacked bars of hand sequences. {words}.",
-        figure=figure,
-        data=data,
-    )
+    return worded("recruitment", figure, data, found.values(), shares=words)
 
 
 def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
@@ -107,27 +82,27 @@ def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None
         ours, left = source == "ours", 0.0
         names.append(short_name(str(label)) if ours else "published")
         for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["hands"])):
-            color, share = colors.get(row["hands"], GREY), row["share"]
+            color, share = colors.get(row["hands"], style.GREY), row["share"]
             hatch = "" if ours else "//////"
             axes.barh(-place, share, 0.78, left=left, color=color, hatch=hatch, **_EDGE)
             if share >= 0.08 and ours:
                 middle = left + share / 2, -place, str(row["runs"])
-                axes.text(*middle, ha="center", va="center", fontsize=6, color=on(color))
+                axes.text(*middle, ha="center", va="center", fontsize=6, color=style.on(color))
             left += share
-    name_rows(axes, names)
+    style.name_rows(axes, names)
     axes.set_ylim(-len(names) + 0.5, 0.5)
     axes.set_xlim(0, 1)
     axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
     axes.set_xlabel("share of runs")
     axes.spines["left"].set_visible(False)
-    axes.set_title(heading(task))
+    axes.set_title(style.heading(task))
 
 
 def _colors(order: Sequence[str]) -> dict[str, str]:
-    return dict(zip(order[:MOST], PALETTE, strict=False))
+    return dict(zip(order[:MOST], style.PALETTE, strict=False))
 
 
 def _legend(figure: Figure, order: Sequence[str]) -> None:
-    colors = _colors(order) | ({OTHERS: GREY} if len(order) > MOST else {})
+    colors = _colors(order) | ({OTHERS: style.GREY} if len(order) > MOST else {})
     handles = [Patch(facecolor=colors[hands], label=hands, **_EDGE) for hands in colors]
-    legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)
+    style.legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -20,11 +20,9 @@ from analysis.figures.recruitment import recruitment
 from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_of
+from analysis.study import Study
 from coartic import CoarticError
 from coartic.text import did_you_mean
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 Section = Literal[
     "tasks-drawn", "paper", "movements", "learning", "methods", "cost", "coarticulation"
@@ -84,8 +82,7 @@ class Figures(Mapping[str, Figure]):
         if methods is not None:
             known_methods(study, methods)
         self._study, self._methods, self._most = study, methods, most_tasks
-        self._drawn: dict[str, list[Plot]] = {}
-        self._skipped: dict[str, str] = {}
+        self._drawn: dict[str, list[Plot] | CoarticError] = {}
 
     @property
     def plots(self) -> list[Plot]:
@@ -95,8 +92,8 @@ class Figures(Mapping[str, Figure]):
     @property
     def skipped(self) -> dict[str, str]:
         """Why there is none, by what would have been drawn."""
-        self.plots  # noqa: B018
-        return self._skipped
+        found = {entry.name: self._found(entry) for entry in REGISTER}
+        return {name: str(why) for name, why in found.items() if isinstance(why, CoarticError)}
 
     def of_section(self, section: str) -> list[Plot]:
         """Figures of one section of a report."""
@@ -111,11 +108,12 @@ class Figures(Mapping[str, Figure]):
         """A figure with its words and numbers, by its id; KeyError where there is none."""
         for entry in REGISTER:
             if str(name).startswith(entry.name):
-                for plot in self._of(entry):
+                found = self._found(entry)
+                if isinstance(found, CoarticError):
+                    raise KeyError(f"no figure {name!r}: {found}")
+                for plot in found:
                     if plot.id == name:
                         return plot
-                if entry.name in self._skipped:
-                    raise KeyError(f"no figure {name!r}: {self._skipped[entry.name]}")
         hint = did_you_mean(str(name), self) or f"; there are {', '.join(self)}"
         raise KeyError(f"no figure {name!r}{hint}")
 
@@ -135,11 +133,16 @@ class Figures(Mapping[str, Figure]):
         return len(self.plots)
 
     def _of(self, entry: Entry) -> list[Plot]:
+        found = self._found(entry)
+        return [] if isinstance(found, CoarticError) else found
+
+    def _found(self, entry: Entry) -> list[Plot] | CoarticError:
+        """The figures of a row, drawn once, or why there are none."""
         if entry.name not in self._drawn:
             try:
                 self._drawn[entry.name] = self._draw(entry)
             except CoarticError as error:
-                self._drawn[entry.name], self._skipped[entry.name] = [], str(error)
+                self._drawn[entry.name] = error
         return self._drawn[entry.name]
 
     def _draw(self, entry: Entry) -> list[Plot]:

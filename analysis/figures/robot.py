@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
+from numpy.typing import ArrayLike
 
 from analysis.figures.style import GREY, INK, PAPER, entry
 from coartic import Hand, Task
@@ -69,11 +70,12 @@ def legend_entries(hands: Iterable[Hand]) -> list[Line2D]:
     return [*arms, entry("goal", linestyle="", color=INK, **goal)]
 
 
-def box(task: Task, postures: Iterable[Array]) -> tuple[Array, Array]:
-    """Corners of what shows a task with the robot in all these configurations, with a margin."""
-    points = [task.goal_array + np.array([0, 2 * task.radius])]
-    for q in postures:
-        points.append(task.robot.base_outline(q))
-        points += [task.robot.joint_positions(q, hand) for hand in task.hands]
-    cloud = np.concatenate(points)
+def box(task: Task, postures: ArrayLike) -> tuple[Array, Array]:
+    """Corners of what shows a task with the robot in all these configurations, with a margin.
+
+    ``postures``: shape ``(n, dof)``.
+    """
+    points = [task.goal_array + np.array([0, 2 * task.radius]), task.robot.base_outline(postures)]
+    points += [task.robot.joint_positions(postures, hand) for hand in task.hands]
+    cloud = np.concatenate([part.reshape(-1, 2) for part in points])
     return cloud.min(axis=0) - MARGIN, cloud.max(axis=0) + MARGIN

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 from analysis.methods import LEARNER, METHODS
 from analysis.results.folder import CellRuns
+from analysis.study import Study
 from coartic import CoarticError
 from coartic.robot import Array
 from coartic.text import did_you_mean
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in range(1, 5))
 HEADLINES = tuple(name for name, row in METHODS.items() if row.headline)

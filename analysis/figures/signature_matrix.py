@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,16 +13,14 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from analysis.figures.plot import Plot
+from analysis.figures import style
+from analysis.figures.plot import Plot, worded
 from analysis.figures.selection import chosen, has, missing
-from analysis.figures.style import GREY, TWO, column_width, dagger, number, on, styled
 from analysis.methods import short_name
 from analysis.signatures.register import REGISTER
+from analysis.study import Study
 from analysis.words import slugs
 from coartic import Task
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 SIGNATURES = {
     signature.name: signature.matrix for signature in REGISTER.values() if signature.matrix
@@ -33,7 +30,7 @@ LIMIT = 2.0  # standard deviations at which colours saturate
 _MAP = "PuOr_r"
 
 
-@styled
+@style.styled
 def signature_matrix(study: Study, *, methods: Sequence[str] | None = None) -> list[Plot]:
     """One matrix a task: a row a method, a column a signature that some method has there.
 
@@ -90,32 +87,18 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
     columns = [name for name in SIGNATURES if name in known]
     labels = list(data.method.unique())
     shown = data[data.signature.isin(columns)].reset_index(drop=True)
-    return Plot(
-        id=f"signatures-{slug}",
-        title=f"Signatures of coarticulation: {task.label}",
-        caption=(
-            f"{task.label}: signatures (docs/signatures.md), each the mean over its goals or "
-            "coordinates and over runs. Colour: the value standardised over the methods shown, "
-            f"signature by signature, purple low, orange high, from −{LIMIT:.0f} to "
-            f"+{LIMIT:.0f} SD; neither is good in itself. "
-            "First subtask and total: ticks more than in the initial solution. Hatched: does not "
-            f"apply, or there are too few runs.{dagger([task])}"
-        ),
-        alt=(
-            f"Matrix of {len(labels)} methods ({', '.join(map(short_name, labels))}) by "
-            f"{len(columns)} signatures on {task.label}; its numbers are in the table."
-        ),
-        figure=_matrix(shown, labels, columns),
-        data=shown,
-    )
+    of = {"task": task.label, "limit": LIMIT, "rows": len(labels), "columns": len(columns)}
+    of["methods"] = ", ".join(map(short_name, labels))
+    figure = _matrix(shown, labels, columns)
+    return worded("signatures", figure, shown, [task], id=f"signatures-{slug}", **of)
 
 
 def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -> Figure:
     """The figure: labels by columns, as large as they need."""
-    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), TWO / 2)
+    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), style.TWO / 2)
     above, right, below, tall = 1.38, 0.7, 0.06, 0.19  # inches
-    side = min((TWO - left - right) / len(columns), 0.6)
-    width = column_width(left + side * len(columns) + right)
+    side = min((style.TWO - left - right) / len(columns), 0.6)
+    width = style.column_width(left + side * len(columns) + right)
     side = (width - left - right) / len(columns)
     height = above + tall * len(labels) + below
     figure = Figure(figsize=(width, height))
@@ -141,7 +124,7 @@ def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -
 def _draw_cell(axes: Axes, x: int, y: int, value: float, standardised: float) -> None:
     """A value on its colour; hatched where there is none."""
     if math.isnan(value):
-        empty = Rectangle((x, y), 1, 1, facecolor="none", edgecolor=GREY, linewidth=0)
+        empty = Rectangle((x, y), 1, 1, facecolor="none", edgecolor=style.GREY, linewidth=0)
         empty.set_hatch("/////")
         axes.add_patch(empty)
         return
@@ -149,12 +132,12 @@ def _draw_cell(axes: Axes, x: int, y: int, value: float, standardised: float) ->
     color = to_hex(colormaps[_MAP](min(max(shade, 0.0), 1.0)))
     axes.add_patch(Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3))
     text = axes.text(x + 0.5, y + 0.52, _figures(value), ha="center", va="center")
-    text.set(fontsize=6, color=on(color))
+    text.set(fontsize=6, color=style.on(color))
 
 
 def _figures(value: float) -> str:
     """Three figures at most."""
     size = abs(value)
     digits = 0 if size >= 99.5 else 1 if size >= 9.95 else 2 if size >= 0.0995 or not size else 3
-    text = number(value, digits)
+    text = style.number(value, digits)
     return text.lstrip("−") if float(f"{value:.{digits}f}") == 0 else text

@@ -19,6 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from analysis.methods import METHODS, Color, Dash
+from analysis.statistics import estimates
 from coartic import Task
 
 amount = EngFormatter(sep="")
@@ -31,6 +32,8 @@ TWO = 178 / INCH
 TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
 SMALL, NORMAL = 7.0, 8.0  # pt
+CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
+"""Of all intervals, for captions."""
 PAPER = "#ffffff"
 _COLORS: Mapping[Color, str] = {
     "blue": "#0072b2",
@@ -101,6 +104,11 @@ class Look(NamedTuple):
     dash: Any
     marker: str
 
+    @property
+    def line(self) -> dict[str, Any]:
+        """Keywords of a line."""
+        return {"color": self.color, "linestyle": self.dash}
+
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Colour, dash and mark of each method: the project's own look the same in all figures."""
@@ -144,11 +152,6 @@ def column_width(inches: float) -> float:
 def number(value: float, digits: int = 0) -> str:
     """A number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")
-
-
-def percent(share: float) -> str:
-    """A share in whole per cent."""
-    return f"{share:.0%}".replace("%", " %")
 
 
 def grid(panels: int) -> tuple[int, int]:

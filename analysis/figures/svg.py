@@ -7,13 +7,10 @@ of 6.0 MB; with nothing but rounded coordinates they would take 4.4 MB.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 _FINE, _COARSE, _MANY = 100, 10, 120
 """Coordinates are whole multiples of 1/100 pt, of curves with many numbers 1/10 pt."""
-_PATH = re.compile(r"[A-Za-z]|-?(?:\d+\.?\d*|\.\d+)(?:e-?\d+)?")
-_POINTS = {"M": 1, "L": 1, "Q": 2, "C": 3}
-_FONT = re.compile(r"font: (?:(bold|\d00) )?([\d.]+)px [^;\"]*")
+_COMMAND = re.compile(r"([MLQCz])([^MLQCz]*)")
 _DIGITS = re.compile(r"-?\d+\.\d{3,}")
 _DRAWN = re.compile(r"<(?:use|text)\b[^>]*>")
 
@@ -25,7 +22,6 @@ def compact(text: str) -> str:
     from the root.
     """
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    text = _FONT.sub(_sized, text)
     text = re.sub(r' d="([^"]*)"', lambda m: f' d="{relative(m[1])}"', text, flags=re.DOTALL)
     text = re.sub(r"; font-family: [^;\"]*", "", text)
     text = _DRAWN.sub(_rounded, text)
@@ -45,76 +41,44 @@ def relative(path: str) -> str:
 
     Errors do not add up: differences are taken between rounded points.
     """
-    found = _PATH.findall(path)
-    steps = _FINE if len(found) <= _MANY else _COARSE
-    tokens = iter(found)
-    out: list[str] = []
-    at, start, run = (0, 0), (0, 0), (0, 0)  # run: a straight stretch not yet written
-    last = ""
-
-    def write(command: str, *numbers: int) -> None:
-        nonlocal last
-        # A minus separates as well as a space.
-        words = " ".join(_decimal(number, steps) for number in numbers).replace(" -", "-")
+    steps = _FINE if len(path.split()) <= _MANY else _COARSE
+    at = start = (0, 0)
+    pieces: list[tuple[str, list[int]]] = []
+    for command, text in _COMMAND.findall(path):
+        numbers = [round(float(number) * steps) for number in text.split()]
+        moved = [number - at[k % 2] for k, number in enumerate(numbers)]
+        if command == "L" and pieces[-1][0] == "l" and _ahead(pieces[-1][1], moved):
+            pieces[-1] = ("l", [sum(both) for both in zip(pieces[-1][1], moved, strict=True)])
+        else:
+            pieces.append((command.lower() if pieces else "M", moved))
+        at = (numbers[-2], numbers[-1]) if numbers else start
+        if command == "M":
+            start = at
+    out = last = ""
+    for command, moved in pieces:
+        if command == "l":
+            if not any(moved):
+                continue
+            if not all(moved):  # along an axis
+                command, moved = ("h", moved[:1]) if moved[0] else ("v", moved[1:])
+        words = " ".join(_decimal(number, steps) for number in moved)
         if command == last and command not in "mz":  # said once for several
-            out.append(words if words.startswith("-") else f" {words}")
+            out += f" {words}"
         else:
-            out.append(command + words)
+            out += command + words
         last = command
-
-    def flush() -> None:
-        nonlocal run
-        if run[0] and run[1]:
-            write("l", *run)
-        elif run[0]:
-            write("h", run[0])
-        elif run[1]:
-            write("v", run[1])
-        run = (0, 0)
-
-    for command in tokens:
-        if command == "z":
-            flush()
-            write("z")
-            at = start
-            continue
-        points = [
-            (round(float(next(tokens)) * steps), round(float(next(tokens)) * steps))
-            for _ in range(_POINTS[command])
-        ]
-        if command == "L":
-            step = (points[0][0] - at[0], points[0][1] - at[1])
-            if not _ahead(run, step):
-                flush()
-            run = (run[0] + step[0], run[1] + step[1])
-        elif command == "M":
-            flush()
-            write("m" if out else "M", *_from(at if out else (0, 0), points))
-            start = points[0]
-        else:
-            flush()
-            write(command.lower(), *_from(at, points))
-        at = points[-1]
-    flush()
-    return "".join(out)
+    return out.replace(" -", "-")  # a minus separates as well
 
 
-def _ahead(run: tuple[int, int], step: tuple[int, int]) -> bool:
-    """Whether a step goes on in the direction of a stretch, exactly."""
-    across = run[0] * step[1] - run[1] * step[0]
-    return across == 0 and run[0] * step[0] + run[1] * step[1] >= 0
-
-
-def _from(at: tuple[int, int], points: list[tuple[int, int]]) -> Iterator[int]:
-    for x, y in points:
-        yield x - at[0]
-        yield y - at[1]
+def _ahead(stretch: list[int], step: list[int]) -> bool:
+    """Whether a step goes on in the direction of a straight stretch, exactly."""
+    (x, y), (right, up) = stretch, step
+    return x * up == y * right and x * right + y * up >= 0
 
 
 def _decimal(number: int, steps: int = _FINE) -> str:
     """So many steps without idle zeros."""
-    text = f"{number / steps:.{len(str(steps)) - 1}f}".rstrip("0").rstrip(".")
-    return re.sub(r"^(-?)0(?=\.)", r"\1", text)
+    return re.sub(r"^(-?)0(?=\.)", r"\1", f"{number / steps:.9g}")
 
 
 def _rounded(match: re.Match[str]) -> str:
@@ -128,11 +92,6 @@ def _rounded(match: re.Match[str]) -> str:
 
 def _hundredths(match: re.Match[str]) -> str:
     return _decimal(round(float(match[0]) * _FINE))
-
-
-def _sized(match: re.Match[str]) -> str:
-    weight = f"font-weight:{match[1]};" if match[1] else ""
-    return f"{weight}font-size:{match[2]}px"
 
 
 def _marks_alone(text: str) -> str:

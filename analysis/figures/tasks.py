@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures.plot import Plot
+from analysis.figures import style
+from analysis.figures.plot import Plot, worded
 from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.figures.style import TALLEST, TWO, column_width, grid, legend, styled
+from analysis.study import Study
 from coartic import Task
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 
 def tasks_of(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
@@ -22,7 +19,7 @@ def tasks_of(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     return tasks_plot(list(study.tasks.values()))
 
 
-@styled
+@style.styled
 def tasks_plot(tasks: Sequence[Task]) -> Plot:
     """Start configuration and goals of each task in one panel each.
 
@@ -32,13 +29,15 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         raise ValueError("no task to draw")
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
-    rows, columns = grid(len(tasks))
+    rows, columns = style.grid(len(tasks))
     above, around = 0.62, 0.55  # inches of a panel for title and axes
     scale = min(
-        (TWO / columns - around) / width, (TALLEST - 0.3 - rows * above) / rows / height, 0.42
+        (style.TWO / columns - around) / width,
+        (style.TALLEST - 0.3 - rows * above) / rows / height,
+        0.42,
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    figure = Figure(figsize=(column_width(size[0]), size[1]), layout="constrained")
+    figure = Figure(figsize=(style.column_width(size[0]), size[1]), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, task, corners in zip(panels, tasks, boxes, strict=False):
         draw_robot(axes, task, task.q0, marked=task.hands)
@@ -54,20 +53,9 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         axes.set_ylabel("y (length unit)")
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()
-    legend(figure, legend_entries(hand for task in tasks for hand in task.hands), 3)
+    style.legend(figure, legend_entries(hand for task in tasks for hand in task.hands), 3)
     names = ", ".join(task.name for task in tasks)
-    return Plot(
-        id="tasks",
-        title="Tasks",
-        caption=(
-            "Start configuration and goals of each task. Open squares: left arm; closed "
-            "circles: right arm; open circles, to scale: goals, hit in the order of their "
-            "numbers. After Figure 4 of Shah, Barto & Fagg (2013)."
-        ),
-        alt=f"Schematics of the tasks {names}: robot in its start configuration, goals.",
-        figure=figure,
-        data=_data(tasks),
-    )
+    return worded("tasks", figure, _data(tasks), tasks=names)
 
 
 def _title(task: Task, name: str) -> str:

@@ -71,11 +71,7 @@ def _beside(
     return found
 
 
-@decides(
-    "reward-by-experience",
-    f"trials to come within {NEAR:.0%} of the optimum: Kaplan-Meier median, runs that never "
-    "do counted as censored",
-)
+@decides("reward-by-experience")
 def _experience(data: Data) -> Finding:
     """Trials until methods that are told no more than the learner come near the optimum."""
     targets = data.study.targets
@@ -112,7 +108,7 @@ def _experience(data: Data) -> Finding:
     )
 
 
-@decides("computation", "forward kinematics and Jacobians")
+@decides("computation")
 def _computation(data: Data) -> Finding:
     """Kinematics that uninformed methods evaluate, and informed ones in their default form."""
     _learners_runs(data)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Literal
 
 from scipy import stats
 
-from analysis.claims.data import Data
+from analysis.claims.data import ONE, TWO, Data
+from analysis.claims.evidence import exceeds, shown
 from analysis.claims.register import Finding
+from analysis.claims.statements import decides
 from analysis.published import published_cell
 from analysis.statistics.equivalence import shares
-from analysis.statistics.estimates import SEED, Inference, difference_of_means, mean
-from analysis.statistics.hypotheses import bootstrap_test, share_test
+from analysis.statistics.estimates import SEED, Inference, difference_of_means
+from analysis.statistics.hypotheses import share_test
 from analysis.words import interval, tally
 
 MARGIN = 0.25
@@ -30,9 +33,11 @@ AS_OFTEN = (
 MOST = f"exact binomial test that more than {NEARLY_ALL:.0%} of all runs do"
 
 
-def as_often(data: Data, task: str, condition: str, hands: str) -> Finding:
+@decides("ec2-sequences", task=ONE, condition="EC2", hands="RRLR")
+@decides("half-choose-rlrr", task=TWO, condition="EC3", hands="RLRR")
+def _as_often(data: Data, task: str, condition: str, hands: str) -> Finding:
     """Whether runs find a hand sequence about as often as in the paper."""
-    found = Counter(map(str, data.learned(task, condition).hands))
+    found = data.hands(task, condition)
     printed = published_cell(task, condition)
     assert printed is not None
     known = {s.hands: s.runs or 0 for s in printed.sequences}
@@ -52,8 +57,8 @@ def as_often(data: Data, task: str, condition: str, hands: str) -> Finding:
     )
 
 
-def nearly_all(
-    count: int, total: int, alternative: Literal["greater", "less"] = "greater"
+def _nearly_all(
+    before: str, count: int, total: int, alternative: Literal["greater", "less"] = "greater"
 ) -> Finding:
     """Whether something happens in nearly all runs; ``less``: whether it does not."""
     greater = alternative == "greater"
@@ -61,23 +66,48 @@ def nearly_all(
     bound = f"at least {found.low:.0%}" if greater else f"at most {found.high:.0%}"
     return Finding(
         count > NEARLY_ALL * total if greater else count < NEARLY_ALL * total,
-        f"{count} of {total} runs, {bound} of all (95 %)",
+        f"{before} {count} of {total} runs, {bound} of all (95 %)",
         (share_test(count, total, NEARLY_ALL, alternative),),
         (share_test(count, total, NEARLY_ALL, "less" if greater else "greater"),),
     )
 
 
-def better_hands(data: Data, task: str, condition: str, better: str, worse: str) -> Finding:
+@decides("ec3-alternates", condition="EC3")
+@decides("ec4-keeps-lrlr", condition="EC4")
+def _lrlr_in_all(data: Data, condition: str) -> Finding:
+    found = data.hands(ONE, condition)
+    seen = _nearly_all("LRLR in", found["LRLR"], found.total())
+    return replace(seen, evidence=f"{seen.evidence}; {tally(found)}") if len(found) > 1 else seen
+
+
+@decides("ec3-as-exhaustive")
+def _ec3_as_exhaustive(data: Data) -> Finding:
+    best, reward = data.best_sequences(ONE)
+    found = data.hands(ONE, "EC3")
+    text = f"exhaustive search finds {' and '.join(best)} ({reward:.0f}); EC3 the same in"
+    return _nearly_all(text, sum(found[hands] for hands in best), found.total())
+
+
+@decides("ec2-unreliable")
+def _ec2_unreliable(data: Data) -> Finding:
+    found = data.hands(ONE, "EC2")
+    away = found.total() - found["RRRR"]
+    seen = _nearly_all("RRRR is left in", away, found.total(), "less")
+    return replace(seen, evidence=f"{seen.evidence}; {tally(found)}")
+
+
+@decides("ec2-rrlr-better", task=ONE, condition="EC2", better="RRLR")
+@decides("rlrr-better", task=TWO, condition="EC3", better="RLRR")
+def _better_than_rrrr(data: Data, task: str, condition: str, better: str) -> Finding:
     """Test of the learned rewards of the runs that learned the one and the other."""
-    a, b = (data.rewards(task, condition, hands) for hands in (better, worse))
-    test = bootstrap_test(a, b, seed=SEED)
+    a, b = (data.rewards(task, condition, hands) for hands in (better, "RRRR"))
+    test = exceeds(a, b)
     printed = published_cell(task, condition)
     assert printed is not None
     known = {s.hands: s.summary.mean for s in printed.sequences if s.summary is not None}
     parts = [
-        f"{hands} {interval(mean(values, seed=SEED))} in {len(values)} runs (published "
-        f"{known[hands]:g})"
-        for hands, values in ((better, a), (worse, b))
+        f"{hands} {shown(values)} in {len(values)} runs (published {known[hands]:g})"
+        for hands, values in ((better, a), ("RRRR", b))
     ]
     apart = interval(difference_of_means(a, b, seed=SEED))
     return Finding(test.estimate > 0, f"{', '.join(parts)}: {apart}", (test,))

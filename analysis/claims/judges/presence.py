@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import NamedTuple
 
 from analysis.claims.coarticulation import prepared_by_waiting
@@ -34,63 +35,41 @@ STEP_APART = 0.1
 """Ten steps of movement: postures (length unit, rad) or shares of a way this far apart count."""
 TURN_APART = 0.05
 """Turning angles this far apart count, rad."""
-PRESENCE = (
-    "presence: *context*, mean postures at goal 1 of the ascending and the descending task "
-    "lie more than 0.1 apart (ten steps), with p < 5 % where there are several runs; "
-    "*sacrifice*, most runs sacrifice the first subtask of the ascending task (Wilson's interval "
-    "lies above one half, where there are several), shown are the mean ticks of the first "
-    "movement and of all against the corrective process with the same hands; "
-    "*motor-equivalent*, context is present and its motor-equivalent part (per root of dimension) "
-    "exceeds the other; *preshaping*, on two-armed task 1 the waiting arm brings its hand nearer "
-    "to its next goal, since its own last hit, by more than 0.1 of the initial distance, mean "
-    "over goals and runs; *lead*, the contexts are "
-    "distinguishable before goal 1 is hit; *turning*, the turning angles of the ascending task "
-    "sum to at least 0.05 rad less than the initial solution's. A dash: cannot be said of the "
-    "runs in this folder, and not judged where that is so of every method"
-)
-
-
 _INITIAL = "corrective-alone/given"
 """Whose solution of the one-armed tasks is the initial one."""
 
-Seen = tuple[bool, tuple[float, ...]] | None
-"""Whether a method shows a signature, and the numbers that say so; None: cannot be said."""
+Seen = tuple[bool, tuple[float, ...]]
+"""Whether a method shows a signature, and the numbers that say so."""
 
 
 def _context(data: Data, label: str) -> Seen:
-    apart = context_distance(data, label)
-    if apart is None:
-        return None
-    try:
+    apart, p = context_distance(data, label), math.nan
+    with suppress(MissingError):
         p = data.signature(ASCENDING, label, "context dependence", 1).p
-    except MissingError:
-        p = math.nan
     return apart > STEP_APART and not p >= LEVEL, (apart,)
 
 
 def _sacrifice(data: Data, label: str) -> Seen:
     runs = data.signature(ASCENDING, label, "first subtask sacrificed")
-    ticks = sacrifice(data, label)
-    assert ticks is not None
     low = runs.value if math.isnan(runs.low) else runs.low
-    return low > 0.5, ticks
+    return low > 0.5, sacrifice(data, label)
 
 
 def _equivalence(data: Data, label: str) -> Seen:
-    context = _context(data, label)
-    if context is None:
-        return None
+    present, _ = _context(data, label)
     same, other = (
         data.signature(ASCENDING, label, name, 1).value
         for name in ("motor-equivalent part", "non-motor-equivalent part")
     )
-    return context[0] and same > other, (same, other)
+    return present and same > other, (same, other)
 
 
 def _preshaping(data: Data, label: str) -> Seen:
     own = prepared_by_waiting(data.cell(ONE, label))
-    nearer = float(own.mean()) if len(own) else math.nan
-    return None if math.isnan(nearer) else (nearer > STEP_APART, (nearer,))
+    if not len(own):
+        raise MissingError(f"no run of {label} on {ONE} uses both hands")
+    nearer = float(own.mean())
+    return nearer > STEP_APART, (nearer,)
 
 
 def _lead(data: Data, label: str) -> Seen:
@@ -99,8 +78,10 @@ def _lead(data: Data, label: str) -> Seen:
     try:
         lead = data.signature(ASCENDING, label, "lead time", 1).value
     except MissingError:
-        known = several and context_distance(data, label) is not None
-        return (False, (math.nan,)) if known else None
+        if not several:
+            raise
+        context_distance(data, label)  # without one there is nothing to be led
+        return False, (math.nan,)
     return lead > 0, (lead,)
 
 
@@ -158,7 +139,7 @@ _SIGNS = (
 )
 
 
-@decides("shared-signatures", PRESENCE)
+@decides("shared-signatures")
 def _shared_signatures(data: Data) -> Finding:
     """Every representative that the folder has, with every signature."""
     data.runs(ASCENDING, f"{LEARNER}EC1")

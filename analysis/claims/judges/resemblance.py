@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from analysis.claims.data import SMOOTH, Data, MissingError
+from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
+from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
-from analysis.statistics.estimates import SEED, mean
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.words import interval
 from coartic.robot import Array
 
 SHARE = 0.5
 """Of the initial solution's distance to the plan; ``claims.toml`` says half."""
-_TEST = (
+RATIO_TEST = (
     "one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to the "
     "plan, learned over initial, is below 0.5; BCa interval of the ratio"
 )
 _OPTIMUM = "optimum/dynamic-programming"
 
 
-def _resembles(cost: str, data: Data) -> Finding:
+@decides("resembles-squared-changes", cost="squared-changes")
+@decides("resembles-acceleration", cost="acceleration")
+@decides("resembles-jerk", cost="jerk")
+def _resembles(data: Data, cost: str) -> Finding:
     """Whether learned postures resemble the plan of one smoothness cost."""
     tests, parts = [], []
-    for task in ("ascending", "descending"):
+    for task in (ASCENDING, DESCENDING):
         learner, initial = data.cell(task, f"{LEARNER}EC1"), data.initial(task)
         (plan,) = data.cell(task, f"trajectory-optimisation/{cost}").runs
         planned = plan.execution.configurations
@@ -36,18 +36,13 @@ def _resembles(cost: str, data: Data) -> Finding:
         ratios = np.array(
             [_apart(run.execution.configurations, planned) / before for run in learner.runs]
         )
-        test = bootstrap_test(-ratios, -SHARE, seed=SEED)
+        test = exceeds(-ratios, -SHARE)
         tests.append(replace(test, method=f"{test.method}, sign turned"))
         parts.append(
             f"{task}: initial {before:.2f} from the plan, learned "
-            f"{interval(mean(ratios, seed=SEED), '.2f')} times as far"
-            + _optimum(data, task, planned, before)
+            f"{shown(ratios, '.2f')} times as far" + _optimum(data, task, planned, before)
         )
-    return Finding(all(t.estimate > 0 for t in tests), "; ".join(parts), tuple(tests))
-
-
-for _cost in SMOOTH:
-    decides(f"resembles-{_cost}", _TEST)(partial(_resembles, _cost))
+    return all_hold(tests, parts)
 
 
 def _optimum(data: Data, task: str, planned: Array, before: float) -> str:
