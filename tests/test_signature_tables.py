@@ -189,7 +189,7 @@ def test_a_signature_is_a_measure_and_a_row(traced, monkeypatch):
     """Added to the register, it has values and a column of the table that it names."""
 
     def length(cell, signature):
-        yield within.mean_of(signature, Place(), [run.ticks for run in cell.runs])
+        yield within.mean_at(signature, Place(), [run.ticks for run in cell.runs])
 
     row = Signature(
         name="length", measure=length, unit="ticks", extent="ticks", meaning="how long",
