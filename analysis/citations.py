@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
 from analysis.methods import METHODS
+from analysis.references import Reference, references
 from analysis.words import slugs
-from coartic import CoarticError, __version__
+from coartic import __version__
 from coartic.text import one_line
 
 PAPER = "shah2013"
@@ -20,15 +19,6 @@ _STATISTICS = (
     *("clopper1934", "cohen1988"),
 )
 
-_ENTRY = re.compile(r"@([a-z]+)\{([a-z0-9-]+),\n((?:  [a-z]+ = \{.+\},\n)+)\}")
-_FIELD = re.compile(r"  ([a-z]+) = \{(.+)\},\n")
-_REQUIRED = {
-    "article": {"author", "title", "journal", "year"},
-    "book": {"author", "title", "publisher", "year"},
-    "inproceedings": {"author", "title", "booktitle", "year"},
-    "misc": {"author", "title", "year"},
-    "techreport": {"author", "title", "institution", "year"},
-}
 _SPECIAL = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
@@ -40,21 +30,6 @@ _SPECIAL = {
 
 
 @dataclass(frozen=True)
-class Reference:
-    """One entry of a bibliography."""
-
-    key: str
-    kind: str
-    """``article``, ``book``, ``inproceedings``, ``misc`` or ``techreport``."""
-    fields: Mapping[str, str]
-
-    def to_bibtex(self) -> str:
-        """The entry, one field a line."""
-        lines = [f"  {name} = {{{value}}}," for name, value in self.fields.items()]
-        return "\n".join([f"@{self.kind}{{{self.key},", *lines, "}"])
-
-
-@dataclass(frozen=True)
 class MethodSource:
     """A method as a manifest or the registry declares it."""
 
@@ -63,40 +38,6 @@ class MethodSource:
     citation: str
     """Empty where it is not known."""
     built_in: bool
-
-
-def parse(text: str, source: str) -> dict[str, Reference]:
-    """Entries by key, of a bibliography in the layout of ``references.bib``.
-
-    Comment lines come first. Raises CoarticError where anything else is in the text, an entry
-    lacks a field that its kind requires, braces do not match, or a key or field comes twice.
-    """
-    body = re.sub(r"\A(?:%.*\n)*\n*", "", text).rstrip("\n")
-    found: dict[str, Reference] = {}
-    for block in body.split("\n\n"):
-        first = block.split("\n", 1)[0]
-        entry = _ENTRY.fullmatch(block)
-        if entry is None:
-            raise CoarticError(f"{source}: {first!r}: not one `  name = {{value}},` a line")
-        kind, key, lines = entry.groups()
-        pairs = _FIELD.findall(lines)
-        fields = dict(pairs)
-        if key in found or len(fields) < len(pairs):
-            raise CoarticError(f"{source}: {key}: the key, or a field of it, is there twice")
-        missing = _REQUIRED.get(kind, {f"a known kind, not @{kind}"}) - fields.keys()
-        if missing:
-            raise CoarticError(f"{source}: {key} lacks {', '.join(sorted(missing))}")
-        for name, value in pairs:
-            if not _balanced(value):
-                raise CoarticError(f"{source}: {key}: braces of {name} do not match")
-        found[key] = Reference(key, kind, fields)
-    return found
-
-
-def references() -> dict[str, Reference]:
-    """Every entry of ``references.bib`` by key."""
-    file = resources.files("analysis") / "references.bib"
-    return parse(file.read_text(encoding="utf-8"), "references.bib")
 
 
 def software(environment: Mapping[str, Any] | None = None) -> Reference:
@@ -139,12 +80,13 @@ def bibliography(
 ) -> str:
     """BibTeX for the software, the paper and the methods, each work once.
 
-    A comment before an entry names the methods that rest on it. Of methods of others there is
-    no more than the citation that they declare: it is printed as a comment and as the note of
-    a ``@misc``. With ``analysis`` the works behind statistics and signatures follow.
-    ``environment`` is a manifest's, for :func:`software`.
+    A comment before an entry names the methods that rest on it. Of methods of others, and of
+    built-in ones without a row in ``methods.toml``, there is no more than the citation that they
+    declare: it is printed as a comment and as the note of a ``@misc``. With ``analysis`` the
+    works behind statistics and signatures follow. ``environment`` is a manifest's, for
+    :func:`software`.
     """
-    known = references()
+    known = {**references(), "coartic": software(environment)}
     reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
     others = []
     for method in methods:
@@ -157,7 +99,6 @@ def bibliography(
     if analysis:
         for key in behind_analysis():
             reasons.setdefault(key, []).append("the analysis")
-    known["coartic"] = software(environment)
     entries = [
         f"{_comment(', '.join(reason))}\n{known[key].to_bibtex()}"
         for key, reason in reasons.items()
@@ -175,7 +116,8 @@ def _other(method: MethodSource, key: str) -> str:
         "note": _escaped(citation),
     }
     entry = Reference(f"method-{key}", "misc", fields)
-    comment = _comment(f"{method.id}, a method of others, cites: {citation}")
+    whose = "built in, without a row in methods.toml" if method.built_in else "a method of others"
+    comment = _comment(f"{method.id}, {whose}, cites: {citation}")
     return f"{comment}\n{entry.to_bibtex()}"
 
 
@@ -186,12 +128,3 @@ def _comment(text: str) -> str:
 
 def _escaped(text: str) -> str:
     return "".join(_SPECIAL.get(sign, sign) for sign in one_line(text))
-
-
-def _balanced(value: str) -> bool:
-    depth = 0
-    for sign in re.sub(r"\\.", "", value):
-        depth += {"{": 1, "}": -1}.get(sign, 0)
-        if depth < 0:
-            return False
-    return depth == 0

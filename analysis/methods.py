@@ -13,6 +13,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
+from analysis.references import Key
 from coartic.learning import METHOD_PREFIX
 from coartic.text import one_line
 
@@ -35,9 +36,9 @@ class KnownMethod(BaseModel):
     """Colour, dash and matplotlib's marker in all figures; None for what is left there."""
     headline: bool = False
     """Whether it stands for its family where no methods are named."""
-    works: tuple[str, ...]
+    works: tuple[Key, ...]
     """Keys of ``references.bib``, the most telling first; none for what is this software's own."""
-    solvers: tuple[str, ...] = ()
+    solvers: tuple[Key, ...] = ()
     """Keys of the works behind what poses and solves its programmes."""
 
 

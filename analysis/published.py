@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 RUNS = 20  # runs of every experiment (printed, section *Initial Solution and Learning*)
 TRIALS = 10_000  # trials of every run (printed there too)
@@ -22,7 +24,19 @@ class Summary:
     derived: bool = False
     """Computed from other printed numbers rather than printed itself."""
     runs_printed: bool = True
-    """Whether the number of runs stands beside it; else it is the paper's general 20."""
+    """Whether the number of runs stands beside it; else we take it as the paper's general 20."""
+    digits: tuple[int, int] | None = None
+    """Decimals of mean and SD as they are printed; None for what is derived."""
+
+    @property
+    def source(self) -> Literal["paper", "derived"]:
+        """What mean and SD rest on."""
+        return "derived" if self.derived else "paper"
+
+    @property
+    def source_of_runs(self) -> Literal["paper", "derived", "ours"]:
+        """What the number of runs rests on."""
+        return self.source if self.runs_printed else "ours"
 
 
 @dataclass(frozen=True)
@@ -31,7 +45,11 @@ class SequenceResult:
 
     hands: str
     summary: Summary
-    runs: int | None
+
+    @property
+    def runs(self) -> int | None:
+        """Printed number of runs that learned it."""
+        return self.summary.runs if self.summary.runs_printed else None
 
 
 @dataclass(frozen=True)
@@ -46,15 +64,13 @@ class PublishedCell:
 def published_initial(task: str) -> tuple[str, int, bool] | None:
     """Hands, reward and whether derived, of a task's initial solution."""
     entry = _printed(task, "initial")
-    if entry is None:
-        return None
-    return entry["hands"], entry["reward"], entry.get("derived", False)
+    return entry and (entry["hands"], entry["reward"], entry.get("derived", False))
 
 
 def published_exhaustive(task: str) -> tuple[str, int] | None:
     """Best hands and reward of the corrective process alone over all sequences."""
     entry = _printed(task, "exhaustive")
-    return None if entry is None else (entry["hands"], entry["reward"])
+    return entry and (entry["hands"], entry["reward"])
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
@@ -63,20 +79,12 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
     if entry is None:
         return None
     sequences = tuple(
-        SequenceResult(
-            item["hands"],
-            Summary(
-                item["reward"], item.get("sd"), item.get("runs", RUNS), runs_printed="runs" in item
-            ),
-            item.get("runs"),
-        )
+        SequenceResult(item["hands"], _summary(item, runs_printed="runs" in item))
         for item in entry.get("sequences", ())
     )
     remark = f"higher than {entry['better_than']}" if "better_than" in entry else ""
-    if "reward" in entry:
-        return PublishedCell(Summary(entry["reward"], entry.get("sd"), RUNS), sequences, remark)
-    known = [sequence.summary for sequence in sequences]
-    return PublishedCell(pooled(known), sequences, remark)
+    whole = _summary(entry) if "reward" in entry else pooled([s.summary for s in sequences])
+    return PublishedCell(whole, sequences, remark)
 
 
 def pooled(parts: list[Summary]) -> Summary | None:
@@ -96,9 +104,24 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-_PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
+_PUBLISHED: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("published.toml").read_text("utf-8"), parse_float=Decimal
+)
 
 
-def _printed(task: str, what: str) -> dict[str, Any] | None:
-    entry: dict[str, Any] | None = _PUBLISHED.get(task, {}).get(what)
-    return entry
+def _printed(task: str, what: str) -> Any:
+    return _PUBLISHED.get(task, {}).get(what)
+
+
+def _summary(entry: Mapping[str, Any], *, runs_printed: bool = True) -> Summary:
+    mean, sd = entry["reward"], entry.get("sd")
+    known = None if sd is None else float(sd)
+    digits = _decimals(mean), _decimals(sd)
+    whole = mean if isinstance(mean, int) else float(mean)
+    runs = entry.get("runs", RUNS)
+    return Summary(whole, known, runs, runs_printed=runs_printed, digits=digits)
+
+
+def _decimals(printed: Decimal | int | None) -> int:
+    exponent = printed.as_tuple().exponent if isinstance(printed, Decimal) else 0
+    return -int(exponent)

@@ -58,8 +58,8 @@ def true_minus(text: str) -> str:
 
 def typographic(number: str) -> str:
     """A number of :func:`number_text` with a true minus and its thousands apart."""
-    comparison = "<" if number.startswith("<") else ""
-    number = number.removeprefix("<")
+    comparison = number[:1] if number[:1] in ("<", ">") else ""
+    number = number.removeprefix(comparison)
     sign = MINUS if number.startswith("-") else ""
     number = number.removeprefix("-")
     if number == "inf":

@@ -10,7 +10,7 @@ import contextlib
 import queue
 import threading
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from benchmarks.sandbox import Keeper, keeper
 
@@ -19,6 +19,7 @@ Answer = dict[str, Any]
 _LOOK_S = 0.5  # between looks at the keyboard
 
 
+@runtime_checkable
 class Executor(Protocol):
     """Performs jobs."""
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from benchmarks.executors import Executor, Local
 from benchmarks.harness import Progress, Watcher, perform_missing
@@ -42,6 +43,13 @@ class Selection:
         for name, given in vars(self).items():
             if isinstance(given, str | Path):
                 raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
+            _check(name, given, Sequence, "a list")
+
+
+def _check(name: str, given: object, kind: Any, words: str) -> None:
+    """Raises CoarticError where an argument is not of its kind."""
+    if not isinstance(given, kind):
+        raise CoarticError(f"{name} is {given!r}; it must be {words}")
 
 
 ALL_OF_IT = Selection()
@@ -102,6 +110,9 @@ class SuitePlan:
         it goes on from there. Raises CoarticError where something else is in the way in the
         folder, another suite is at work in it, it cannot be written, or runs keep getting lost.
         """
+        _check("folder", folder, str | Path, "a path")
+        if executor is not None:
+            _check("executor", executor, Executor, "one of benchmarks.executors, as Local(jobs=2)")
         folder = Path(folder)
         manifest, clock = self._manifest(), time.perf_counter()
         check_results_folder(folder)
@@ -158,7 +169,9 @@ def plan_suite(
     ``runs`` per cell, ``trials`` per run and ``limits`` are the suite's own by default. Raises
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
+    _check("select", select, Selection, "a Selection, as Selection(tasks=['ascending'])")
     if not isinstance(suite, Suite):
+        _check("suite", suite, str | Path, "a name, a path or a Suite")
         suite = load_suite(str(suite))
     cells = select_cells(
         suite,
@@ -189,8 +202,10 @@ def plan_cells(
         ("seed", seed, 0, MOST_SEED),
         ("limits.trials", limits.trials, 1, MOST_TRIALS),
     ):
-        if number is not None and not least <= number <= most:
-            raise CoarticError(f"{name} is {number}; it must be from {least} to {most:_}")
+        if number is not None:
+            _check(name, number, int, f"an int from {least} to {most:_}")
+            if not least <= number <= most:
+                raise CoarticError(f"{name} is {number}; it must be from {least} to {most:_}")
     if limits.time_s is not None and not 0 < limits.time_s <= MOST_SECONDS:
         raise CoarticError(
             f"limits.time_s is {limits.time_s:g}; it must be above 0, at most {MOST_SECONDS:_}"

@@ -10,7 +10,6 @@ from scipy import stats
 
 from analysis.comparisons.overall import by_task, normalised_scores, profiles
 from analysis.statistics import across_tasks
-from analysis.statistics import estimates as statistics
 from analysis.study import Study
 from tests.support.made_up import fake_results
 
@@ -116,13 +115,6 @@ def test_profiles_never_turn_back():
         assert (np.diff(line) >= -1e-12).all()
     assert (found.low <= found.share + 1e-12).all()
     assert (found.share <= found.high + 1e-12).all()
-
-
-def test_one_definition_of_the_interquartile_mean():
-    values = np.random.default_rng(34).normal(0, 1, 21)
-    assert across_tasks.interquartile_mean({"a": values}, seed=1).estimate == pytest.approx(
-        statistics.interquartile_mean(values, seed=1).estimate
-    )
 
 
 def test_profiles_of_scores_count_what_is_above():

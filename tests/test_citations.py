@@ -7,17 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from analysis.citations import (
-    PAPER,
-    MethodSource,
-    behind_analysis,
-    bibliography,
-    parse,
-    references,
-    software,
-)
-from analysis.methods import METHODS
+from analysis.citations import PAPER, MethodSource, behind_analysis, bibliography, software
+from analysis.methods import METHODS, KnownMethod
+from analysis.references import parse, references
 from analysis.results.laws import read_manifest
+from analysis.signatures.register import REGISTER
 from benchmarks.registry import BUILT_IN, registry
 from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
@@ -143,6 +137,14 @@ def test_what_is_no_bibliography_is_refused(text, words):
     assert words in str(caught.value)
 
 
+def test_keys_of_no_entry_are_refused_where_they_are_read():
+    signature = next(iter(REGISTER.values())).model_dump() | {"sources": ["shah2031"]}
+    row = {"short": "x", "works": ["shah2031"]}
+    for model, content in ((type(REGISTER["context distance"]), signature), (KnownMethod, row)):
+        with pytest.raises(ValueError, match="no entry 'shah2031'; did you mean 'shah2013'?"):
+            model.model_validate(content)
+
+
 def test_the_software_is_cited_by_the_facts_of_citation_cff():
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     facts = dict(re.findall(r'^(title|version|date-released): "?([^"\n]+)"?$', text, re.MULTILINE))
@@ -189,7 +191,8 @@ def test_methods_of_others_cite_themselves():
         "cma-es/bold", "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", False
     )
     silent = MethodSource("lab/silent", "Silent", "", False)
-    text = bibliography([own, silent])
+    ours = MethodSource("dual-process/EC9", "Of another version", "Ours (2030).", True)
+    text = bibliography([own, silent, ours])
     assert "hansen2016" not in text  # an id like ours makes nobody one of ours
     assert (
         r"  note = {A. B. C\_d (2020), me@here, 5 \% of "
@@ -202,6 +205,8 @@ def test_methods_of_others_cite_themselves():
     assert any("me(at)here" in comment for comment in comments)
     assert "% lab/silent: it declares no citation; ask its authors what to cite" in comments
     assert "silent," not in text
+    lacking = "dual-process/EC9, built in, without a row in methods.toml, cites: Ours (2030)."
+    assert f"% {lacking}" in comments
 
 
 def test_command(tmp_path, monkeypatch, capsys):

@@ -43,10 +43,10 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
         "methods.csv",
     }
     page = (out / "comparison.md").read_text(encoding="utf-8")
-    for words in ("| −303.0 | 2.9 | 20 |", "| −319 | −319 |", "*Reconstructed.*", "LRLR −533"):
+    for words in ("| −303 | 2.9 | 20 |", "| −319 | −319 |", "*Reconstructed.*", "LRLR −533"):
         assert words in page
     assert "*Trials.* The paper's runs have 10000 trials" in page  # here 60
-    assert "−303.0 ± 2.9" in text
+    assert "−303 ± 2.9" in text
     assert "14 runs: 0 were there, 14 done in" in text
     assert "0 failed" in text
     assert "14 of 14 runs, 0 failed" in error  # plain lines without a terminal
@@ -313,6 +313,11 @@ def test_list(monkeypatch, capsys):
     assert code == 0
     for name in ("ascending", "two-armed-2", "dual-process/EC4", "paper"):
         assert name in text
+    monkeypatch.setenv("COLUMNS", "80")
+    narrow = call(monkeypatch, capsys, "list")[1].splitlines()
+    assert max(map(len, map(str.rstrip, narrow))) <= 80
+    assert "dual-process/EC4" in narrow
+    assert "    told: corrective process, reward by trial" in map(str.rstrip, narrow)
 
 
 def test_draw(monkeypatch, capsys, tmp_path):

@@ -16,6 +16,7 @@ from analysis.published import (
 from analysis.report.comparison import comparison_document, notes_of
 from analysis.report.formats.markdown import markdown
 from analysis.report.tables.paper import published_table, sequences_table
+from analysis.report.text import parts
 from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import load_suite, select_cells
@@ -37,7 +38,10 @@ def rows_of(table):
 
 
 def test_published_numbers():
-    assert published_cell("ascending", "EC1").summary == Summary(-303, 2.9, 20)
+    assert published_cell("ascending", "EC1").summary == Summary(-303, 2.9, 20, digits=(0, 1))
+    assert published_cell("descending", "EC1").summary.digits == (0, 2)
+    assert published_cell("two-armed-2", "EC3").summary.digits == (1, 1)
+    assert published_cell("two-armed-1", "EC2").summary.digits is None  # derived
     assert published_initial("descending") == ("RRR", -333, True)
     assert published_initial("two-armed-1") == ("RRRR", -675, False)
     assert published_exhaustive("two-armed-1") == ("LRLR", -532)
@@ -96,6 +100,21 @@ def test_hand_sequences_beside_the_papers(tmp_path):
     assert (first["hands"], first["published"].value, first["ours"].value) == ("RRLR", -520, -520)
 
 
+def test_rows_of_hand_sequences_add_up_to_all_runs(tmp_path):
+    """EC4 of two-armed 1 is printed without its runs, which we take as all."""
+    hands = {"hands": ["LRLR", "LRLR", None]}
+    results = fake_results(tmp_path, MIXED | hands, method="dual-process/EC4")
+    table = sequences_table(Study(results))
+    (row,) = rows_of(table)
+    assert (row["published_runs"], row["published_as"]) == (20, "printed, runs assumed")
+    assert table.rows[0].rests_on["published_runs"] == ("ours",)
+    shown = [part.text(table.rows[0].values[part.index]) for part in parts(table)]
+    assert shown[3:7] == ["−484", "2.0", "20", "printed, runs assumed"]
+    mixed = rows_of(sequences_table(Study(fake_results(tmp_path, MIXED))))
+    assert sum(row["published_runs"] for row in mixed) == 20
+    assert sum(row["runs"] for row in mixed) == 2
+
+
 def test_the_page_says_what_failed_and_where_it_was_made(tmp_path):
     document = comparison_document(Study(fake_results(tmp_path, MIXED)))
     page = markdown(document, tables="")
@@ -135,6 +154,7 @@ def test_hands_the_paper_does_not_print(tmp_path):
     assert found == [("RLRR", None, None), ("RRRR", None, None)]
     (row,) = rows_of(published_table(study))
     assert row["published_as"] == "not printed, higher than EC3"
+    assert {row["published_as"] for row in rows_of(sequences_table(study))} == {"not printed"}
     assert row["verdict"] is row["margin"] is row["published_hands"] is None
 
 

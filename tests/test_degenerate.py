@@ -16,8 +16,8 @@ from analysis.signatures.context import context_dependence, distance, permutatio
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, synergy
 from analysis.statistics import intervals, spread
+from analysis.statistics.across_tasks import interquartile_mean
 from analysis.statistics.equivalence import bootstrap_equivalence, difference
-from analysis.statistics.estimates import interquartile_mean
 from analysis.statistics.hypotheses import bootstrap_test, permutation_test, standard_error
 from coartic import load_task
 from tests.support.commands import call
@@ -240,7 +240,7 @@ def test_samples_of_equal_values(n):
     values = np.full(n, 0.1)
     assert intervals.mean(values)[:3] == (0.1, 0.1, 0.1)
     assert standard_error((values, values[:3])) == 0
-    found = interquartile_mean(values, seed=0, resamples=99)
+    found = interquartile_mean({"task": values}, seed=0, resamples=99)
     assert found.estimate == found.low == found.high == 0.1
     assert np.isnan(bootstrap_test(values, 0.2, seed=0, resamples=99).p)
     assert permutation_test(values, values[:3], "two-sided", seed=0, resamples=99).p == 1

@@ -1,5 +1,6 @@
 """The documents: every relative link leads somewhere, and the example report is there."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -26,6 +27,14 @@ def test_links(page):
         assert target.exists(), link
         if anchor and target.suffix == ".md":
             assert anchor in anchors(target), link
+
+
+def test_figures_are_made_by_the_functions_that_are_named():
+    page = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")
+    named = re.findall(r"\| `(\w+)\.(\w+)` \|", page)
+    assert len(named) == 10
+    for module, function in named:
+        assert hasattr(importlib.import_module(f"analysis.figures.{module}"), function), function
 
 
 def test_the_example_report():

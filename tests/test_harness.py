@@ -16,7 +16,7 @@ from analysis.study import Study
 from benchmarks.declaration import declared
 from benchmarks.executors import Local
 from benchmarks.registry import CLASSES, Entry, registry
-from benchmarks.run import Selection
+from benchmarks.run import Selection, run_suite
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import (
@@ -650,3 +650,26 @@ def test_a_name_is_no_list_of_names():
         (name,) = given
         with pytest.raises(CoarticError, match=f"{name} is a list: write {name}=\\['"):
             Selection(**given)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"runs": "3"}, "runs is '3'; it must be an int from 1 to "),
+        ({"trials": 2.5}, "trials is 2.5; it must be an int from 1 to "),
+        ({"executor": 2}, "executor is 2; it must be one of benchmarks.executors"),
+        ({"select": {}}, "select is {}; it must be a Selection"),
+        ({"suite": 3}, "suite is 3; it must be a name, a path or a Suite"),
+        ({"folder": None}, "folder is None; it must be a path"),
+    ],
+)
+def test_an_argument_of_a_wrong_type_has_a_sentence(wrong, words, tmp_path):
+    with pytest.raises(CoarticError) as found:
+        run_suite(**{"suite": "quick", "folder": tmp_path / "out", "runs": 1} | wrong)
+    assert str(found.value).startswith(words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_selection_of_a_wrong_type_has_a_sentence():
+    with pytest.raises(CoarticError, match="tasks is 3; it must be a list"):
+        Selection(tasks=3)

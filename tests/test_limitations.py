@@ -114,7 +114,7 @@ def test_what_is_not_as_printed(clean):
     rows = clean.cells["ascending", "dual-process/EC1"].runs.index
     trials = changed(clean, "trials", dict.fromkeys(rows, 10_000))
     poor = changed(trials, "reward", {row: -319 - k for k, row in enumerate(rows)})
-    assert "ascending EC1: learned reward −320.5, published −303.0" in said(poor)["Not reproduced"]
+    assert "ascending EC1: learned reward −320.5, printed −303." in said(poor)["Not reproduced"]
     good = changed(trials, "reward", {row: -303 + k % 2 for k, row in enumerate(rows)})
     assert "Not reproduced" not in said(good)
     assert "Not reproduced" not in said(changed(poor, "trials", dict.fromkeys(rows, 150)))

@@ -39,7 +39,7 @@ from analysis.report.formats.terminal import terminal_table
 from analysis.report.legends import with_legends
 from analysis.report.summary import without_variants
 from analysis.report.tables.layout import LAYOUTS, Layout
-from analysis.report.text import number_text, parts
+from analysis.report.text import number_text, parts, texts
 from analysis.report.write import write_report
 from analysis.words import typographic
 from coartic.files import LISTING
@@ -146,6 +146,7 @@ def test_inline_markup(text, spans):
         (0.0385, "share", 1, "3.9", "3.9"),
         (0.0004, "p", 3, "<0.001", "<0.001"),
         (0.0006, "p", 3, "0.001", "0.001"),
+        (0.0, "p", 3, "<0.001", "<0.001"),
         (-math.inf, "number", 1, "-inf", "−∞"),
     ],
 )
@@ -153,6 +154,17 @@ def test_numbers(value, kind, digits, ascii_text, shown):
     found = number_text(value, Column("a", "a", kind, digits=digits))
     assert found == ascii_text
     assert typographic(found) == shown
+
+
+def test_numbers_of_others_keep_their_digits():
+    column = Column("a", "a", "number", digits=1)
+    printed, derived = Estimate(-314, 1.88, digits=(0, 2)), Estimate(-560.05, 47.06)
+    table = DataTable("t", "t", (column,), (Row("1", (printed,)), Row("2", (derived,))))
+    assert [texts(table, row) for row in table.rows] == [["−314 ± 1.88"], ["−560.0 ± 47.1"]]
+    censored = Estimate(math.inf, low=4430, high=math.inf, beyond=10_000)
+    late = replace(table, columns=(replace(column, digits=0),), rows=(Row("1", (censored,)),))
+    assert texts(late, late.rows[0]) == [">10\u202f000 [4430, >10\u202f000]"]
+    assert r"{$>$\num{10000}} & {[\num{4430}, $>$\num{10000}]}" in latex_table(late)
 
 
 def test_html_is_one_accessible_page():
@@ -280,7 +292,7 @@ def test_sorting_reads_the_numbers_that_the_page_writes():
     ("keys", "words", "up", "down"),
     [
         (
-            ["2", "–", "−10", "<0.001", "1\u202f000\u202f000"],
+            ["2", "–", "−10", "<0.001", ">1\u202f000\u202f000"],
             False,
             [2, 3, 0, 4, 1],
             [4, 0, 3, 2, 1],
@@ -327,7 +339,7 @@ def test_markdown():
 
 def printed(table, width):
     console = Console(width=width, file=io.StringIO(), emoji=False)
-    console.print(terminal_table(table, width))
+    console.print(terminal_table(table, width, "see a page"))
     return console.file.getvalue()
 
 
@@ -339,12 +351,15 @@ def test_a_terminal_has_the_columns_that_fit():
     assert "[optimum]" in wide
     assert "*none*" in wide
     assert NASTY[:20] in wide
-    assert "more column" not in wide
+    assert "No room" not in wide
     for width in (100, 60):
         lines = printed(TABLE, width).splitlines()
         assert max(map(len, lines)) <= width
         assert any("dual-process/EC4" in line for line in lines)  # never broken
-    assert "(1 more column, for which there is no room here)" in printed(TABLE, 120)
+    said = " ".join(" ".join(lines).split())
+    assert "No room here for ΔV; runs & more; p; remark (see a page)." in said
+    leading = tuple(replace(c, leading=c.name == "p") for c in TABLE.columns)
+    assert "<0.001" in printed(replace(TABLE, columns=leading), 80)
 
 
 def test_csv_reads_back_as_the_raw_values():

@@ -143,8 +143,12 @@ def test_contexts(traced):
     together = pd.isna(frame.value["lead time"])  # so few runs may not differ at the hit
     assert own["lead_at_most"] == (None if together else frame.longest["lead time"])
     assert own["runs"] == 8
-    (row,) = contexts_table(traced).rows
+    table = contexts_table(traced)
+    (row,) = table.rows
     assert row.cells == (("ascending", EC1), ("descending", EC1))
+    assert "methods in each by mean reward, best first: 1 row in all." in table.notes[1]
+    whys = set(frame.why_not[(frame.why_not != "") & frame.value.isna()])
+    assert all(any(why in note for note in table.notes[2:]) for why in whys)
 
 
 def test_slopes(family):
@@ -185,7 +189,7 @@ def test_a_signature_is_a_measure_and_a_row(traced, monkeypatch):
     """Added to the register, it has values and a column of the table that it names."""
 
     def length(cell, signature):
-        yield within.mean_of(signature, Place(), [run.ticks for run in cell.runs])
+        yield within.mean_at(signature, Place(), [run.ticks for run in cell.runs])
 
     row = Signature(
         name="length", measure=length, unit="ticks", extent="ticks", meaning="how long",

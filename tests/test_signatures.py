@@ -13,7 +13,7 @@ from scipy import integrate, stats
 
 from analysis.calibration import signatures as simulated
 from analysis.calibration.simulation import rate
-from analysis.citations import references
+from analysis.references import references
 from analysis.results.folder import Results
 from analysis.signatures.context import (
     context_dependence,

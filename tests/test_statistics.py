@@ -12,6 +12,7 @@ from scipy import stats
 
 from analysis.statistics import estimates as statistics
 from analysis.statistics import hypotheses
+from analysis.statistics.across_tasks import interquartile_mean
 from analysis.statistics.equivalence import difference_of_shares
 
 # Survival times of mice in days: Efron & Tibshirani (1993), table 2.1.
@@ -158,7 +159,7 @@ def test_pairs_and_known_numbers_are_one_sample():
     "estimate",
     [
         statistics.mean,
-        statistics.interquartile_mean,
+        lambda values, seed: interquartile_mean({"task": values}, seed=seed),
         lambda values, seed: statistics.difference_of_means(values, values[::-1], seed=seed),
         lambda values, seed: statistics.paired_difference(
             values, np.zeros_like(values), seed=seed
@@ -189,9 +190,9 @@ def test_shares_of_few_runs_have_no_interval_even_where_they_are_apart():
 def test_where_bca_is_not_defined_the_percentiles_stand_in():
     """All in the middle half is equal, so the jackknife sees no change."""
     values = [0.0, 1, 1, 1, 1, 1, 1, 9]
-    found = statistics.interquartile_mean(values, seed=0)
+    found = interquartile_mean({"task": values}, seed=0)
     assert found.note == "BCa is not defined for this sample"
-    assert found.method.startswith("interquartile mean, percentile")
+    assert found.method.startswith("interquartile mean over 1 tasks, stratified, percentile")
     assert found.low <= found.estimate == 1.0 <= found.high
     assert found.low < found.high
 
@@ -273,17 +274,15 @@ def test_holm_leaves_out_what_was_not_tested():
 
 @given(st.lists(st.floats(-100, 100), min_size=1, max_size=15))
 def test_middle_mean_is_the_trimmed_mean_of_any_multiple_of_4(values):
-    found = statistics.middle_mean(np.array(values))
+    found = statistics.middle_mean(np.array(values), np.ones(len(values)))
     assert found == pytest.approx(stats.trim_mean(np.repeat(values, 4), 0.25), abs=1e-9)
 
 
 def test_middle_mean_with_weights_counts_values_so_often():
     values, weights = np.array([3.0, 1.0, 8.0, 5.0]), np.array([1.0, 3.0, 2.0, 2.0])
     repeated = np.repeat(values, weights.astype(int))
-    found = statistics.middle_mean(values, weights=weights)
+    found = statistics.middle_mean(values, weights)
     assert found == pytest.approx(stats.trim_mean(repeated, 0.25))
-    with pytest.raises(ValueError, match="last axis"):
-        statistics.middle_mean(np.zeros((2, 3)), axis=0)
 
 
 @pytest.mark.parametrize(

@@ -168,7 +168,7 @@ def _intervals(*every: Population) -> Iterator[Check]:
         errs, samples = _misses(each.mean - normal.mean), (each.sample(), normal.sample())
         yield _check(subject, data, errs, estimates.difference_of_means, *samples)
         subject, errs = "BCa interval of an interquartile mean", _misses(each.middle)
-        yield _check(subject, each.name, errs, estimates.interquartile_mean, each.sample())
+        yield _check(subject, each.name, errs, _middle, each.sample())
     for theta in (0.5, 0.8, 0.95, 0.99):
         shift = math.sqrt(2) * float(stats.norm.ppf(theta))
         yield _check(
@@ -180,6 +180,10 @@ def _intervals(*every: Population) -> Iterator[Check]:
             partial(_normal, 0.0),
         )
     yield _across(every)
+
+
+def _middle(values: Array, **options: Any) -> Inference:
+    return across_tasks.interquartile_mean({"task": values}, **options)
 
 
 def _normal(mean: float, rng: np.random.Generator) -> Array:

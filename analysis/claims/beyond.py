@@ -13,7 +13,7 @@ from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import Summary, published_cell
-from analysis.report.document import Column, RestsOn, Row
+from analysis.report.document import Column, Estimate, RestsOn, Row
 from analysis.results.optima import OtherArm
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import SEED, difference_of_means, mean
@@ -42,11 +42,16 @@ def _as_printed(data: Data) -> Finding:
             verdict = None if math.isnan(apart.low) else apart.verdict
             share = apart.estimate / -summary.mean
             values = (
-                *(task, condition, name, summary.mean, summary.runs),
+                *(task, condition, name, Estimate(summary.mean, digits=summary.digits)),
+                summary.runs,
                 *(float(own.mean()), len(own), estimate_of(apart), share, verdict),
             )
             key = (task, LEARNER + condition)
-            rows.append(Row(f"{task} {condition} {name}", values, (key,)))
+            sources: dict[str, tuple[RestsOn, ...]] = {
+                "printed": (summary.source,),
+                "printed_runs": (summary.source_of_runs,),
+            }
+            rows.append(Row(f"{task} {condition} {name}", values, (key,), rests_on=sources))
             if hands is None:
                 verdicts.append(f"{task} {condition} {verdict or NONE}")
     both: tuple[RestsOn, ...] = ("runs", "paper")

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from analysis.results.folder import CellKey, CellRuns
+from analysis.results.folder import Cell, CellKey, CellRuns
 from analysis.results.optima import locks_base
 from analysis.statistics.spread import sd
 from analysis.words import tally
 from coartic.method import Information
 from coartic.record import SEARCH
-from coartic.tables import label_of
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -39,15 +38,12 @@ STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 
 
 @dataclass(frozen=True)
-class MethodRow:
+class MethodRow(Cell):
     """A method on a task; NaN is for what is not known, such as times of runs that crashed.
 
     Rewards are of runs with a solution; what was spent is the median over all runs.
     """
 
-    task: str
-    method: str
-    variant: str
     told: str
     """A letter for each kind of information (:data:`TOLD`)."""
     runs: int
@@ -80,11 +76,6 @@ class MethodRow:
     """Wall time of what is built once."""
     solve_s: float
     """:func:`solve_times`."""
-
-    @property
-    def label(self) -> str:
-        """Name of the method with its variant."""
-        return label_of(self.method, self.variant)
 
     @property
     def evaluations(self) -> float:

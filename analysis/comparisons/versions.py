@@ -193,15 +193,11 @@ def _runs(
 
 
 def _compared(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> VersionRow:
+    """With the difference of mean rewards, B less A, its interval, test and verdict."""
     if row.verdict == "not compared":
         return row
     if row.identical == len(a) == len(b):
         return replace(row, verdict="identical", paired=True, difference=0.0)
-    return _with_difference(row, a, b)
-
-
-def _with_difference(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> VersionRow:
-    """Difference of mean rewards, B less A, with interval, test and verdict."""
     before, after = paired_by_seed(a, b)
     paired = len(before) >= FEWEST
     samples: tuple[Array, Array | float] = after - before, 0.0

@@ -65,7 +65,7 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         [study.tasks[name] for name in labels],
         resamples=RESAMPLES,
         seed=SEED,
-        means=spoken(data, "reward", 1),
+        means=spoken(data, "{task}, {method}: {reward:.1f}"),
     )
 
 

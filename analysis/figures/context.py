@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures import style
 from analysis.figures.bars import stars
-from analysis.figures.plot import Plot, worded
+from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import chosen, missing
 from analysis.methods import short_name
 from analysis.statistics.hypotheses import holm
@@ -58,10 +58,7 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         style.entry("moves the hand", linestyle="", **_OPEN),
     ]
     style.legend(figure, handles, 2)
-    words = "; ".join(
-        f"{short_name(row['method'])} {row['equivalent']:.2f} and {row['other']:.2f}"
-        for row in data.to_dict("records")
-    )
+    words = spoken(data, "{method} {equivalent:.2f} and {other:.2f}")
     return worded("context", figure, data, parts=words)
 
 

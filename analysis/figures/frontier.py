@@ -70,6 +70,7 @@ def _plot(
         _panel(axes, data[data.task == task], present, edge, optimum.reward if optimum else None)
     panels[0].set_xlim(edge, max(1.5 * data.budget.max(), 10 * left))  # shared
     _legend(figure, data, present)
+    ends = data.groupby(["task", "method"], sort=False).tail(1)
     return worded(
         "frontier",
         figure,
@@ -77,7 +78,7 @@ def _plot(
         tasks.values(),
         id=f"frontier-{spend.replace('_', '-')}",
         spend=NAMES[spend],
-        ends=spoken(data.groupby(["task", "method"], sort=False).tail(1), "mean"),
+        ends=spoken(ends, "{task}, {method}: {mean:.0f}"),
     )
 
 

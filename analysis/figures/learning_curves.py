@@ -54,7 +54,9 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
     ]
     handles += [style.entry("initial", **style.INITIAL), style.entry("optimum", **style.OPTIMUM)]
     style.legend(figure, handles, min(len(handles), 4))
-    ends = spoken(data.groupby(["task", "method"], sort=False).tail(1), "best")
+    ends = spoken(
+        data.groupby(["task", "method"], sort=False).tail(1), "{task}, {method}: {best:.0f}"
+    )
     return worded("learning-curves", figure, data, shown.values(), window=WINDOW, ends=ends)
 
 

@@ -73,12 +73,10 @@ def worded(
     return Plot(id or name, figure=figure, data=data, **words)
 
 
-def spoken(rows: pd.DataFrame, value: str, digits: int = 0) -> str:
-    """Task, method and a value of each row, for an alternative text."""
-    return "; ".join(
-        f"{row['task']}, {short_name(row['method'])}: {row[value]:.{digits}f}"
-        for row in rows.to_dict("records")
-    )
+def spoken(rows: pd.DataFrame, template: str) -> str:
+    """Each row in words, for an alternative text: names in ``{}`` are columns."""
+    named = rows.assign(method=rows.method.map(short_name))
+    return "; ".join(template.format_map(row) for row in named.to_dict("records"))
 
 
 def picture(plot: Plot, ending: str) -> bytes:

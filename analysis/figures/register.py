@@ -92,8 +92,9 @@ class Figures(Mapping[str, Figure]):
     @property
     def skipped(self) -> dict[str, str]:
         """Why there is none, by what would have been drawn."""
-        found = {entry.name: self._found(entry) for entry in REGISTER}
-        return {name: str(why) for name, why in found.items() if isinstance(why, CoarticError)}
+        self.plots  # noqa: B018
+        drawn = self._drawn.items()
+        return {name: str(why) for name, why in drawn if isinstance(why, CoarticError)}
 
     def of_section(self, section: str) -> list[Plot]:
         """Figures of one section of a report."""

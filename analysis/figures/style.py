@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
 from string import ascii_lowercase
 from typing import Any, NamedTuple
 
-from matplotlib import style
+from matplotlib import rc_params_from_file, style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -31,7 +32,10 @@ TWO = 178 / INCH
 """Width of two."""
 TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
-SMALL, NORMAL = 7.0, 8.0  # pt
+_STYLE = Path(__file__).with_name("paper.mplstyle")
+RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
+"""Matplotlib's settings of all figures."""
+SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
 CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Of all intervals, for captions."""
 PAPER = "#ffffff"
@@ -58,41 +62,6 @@ SOLID, DASHED, DOTTED, DASH_DOTTED = _DASHES.values()
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": DOTTED}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": DASH_DOTTED}
 """Lines at the rewards of the optimum and of the initial solution."""
-RC: Any = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": SMALL,
-    "axes.titlesize": NORMAL,
-    "axes.titlelocation": "left",
-    "axes.labelsize": SMALL,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.formatter.use_mathtext": False,
-    "axes.unicode_minus": True,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.minor.width": 0.4,
-    "ytick.minor.width": 0.4,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
-    "xtick.minor.size": 1.5,
-    "ytick.minor.size": 1.5,
-    "lines.linewidth": 1.0,
-    "lines.markersize": 3.5,
-    "lines.markeredgewidth": 0.8,
-    "hatch.linewidth": 0.4,
-    "legend.fontsize": SMALL,
-    "legend.frameon": False,
-    "legend.handlelength": 2.4,
-    "pdf.fonttype": 42,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "coartic",
-    "text.parse_math": False,
-}
-
 styled = style.context(["default", RC])
 """A decorator: draw with this style and matplotlib's defaults, whatever the user has set."""
 

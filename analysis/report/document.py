@@ -20,9 +20,10 @@ from pydantic import ConfigDict
 
 from analysis.results.optima import OtherArm
 
-RestsOn = Literal["runs", "optimum", "paper", "text", "simulation"]
-"""What a value comes from: runs of the folder, the optimum of their tasks, the paper, words of
-ours, or a simulation that needs no runs."""
+RestsOn = Literal["runs", "optimum", "paper", "derived", "ours", "text", "simulation"]
+"""What a value comes from: runs of the folder, the optimum of their tasks, what the paper prints,
+what follows from that, a choice or an assumption of ours, words of ours, or a simulation that
+needs no runs."""
 CellKey = tuple[str, str]
 """Name of a task and label of a method with its variant, as the keys of a Study."""
 
@@ -52,6 +53,10 @@ class Estimate:
     low: float | None = None
     """Lower end of the interval; there are both ends or none."""
     high: float | None = None
+    digits: tuple[int, int] | None = None
+    """Decimals shown of value and SD, as somebody else printed them; the column's by default."""
+    beyond: float | None = None
+    """What its infinite numbers are known to exceed, where that is all that is known of them."""
 
     def __post_init__(self) -> None:
         if (self.low is None) != (self.high is None):
@@ -83,11 +88,17 @@ class Column:
     """Header of the intervals, where values have them."""
     rests_on: tuple[RestsOn, ...] = ()
     """What its values were computed from; of numbers there is always something."""
+    how: str = ""
+    """How its values were obtained, where the table's notes do not say it, in inline markup."""
+    family: str = ""
+    """Of which rows each value depends on all, not on its own alone, in words."""
     other_arm: OtherArm = "free"
     """Of the optimum that it rests on, if it does."""
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has
     first what paper has."""
+    leading: bool = False
+    """Whether it is what the table is for: a terminal has it before all but the first two."""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -106,6 +117,10 @@ class Row:
     """What the row's values were computed from."""
     cells_by_column: Mapping[str, tuple[CellKey, ...]] = field(default_factory=dict)
     """By column name, what a value was computed from where it is something else."""
+    rests_on: Mapping[str, tuple[RestsOn, ...]] = field(default_factory=dict)
+    """By column name, what a value rests on where it is not what its column does."""
+    family: str = ""
+    """Rows of one name are a family; by default all rows of a table."""
     link: str = ""
     """Address within the page that the row's name leads to."""
 
@@ -128,6 +143,8 @@ class DataTable:
     """Below the table, in inline markup."""
     folded: bool = False
     """Whether a page shows its caption alone until more is asked for."""
+    unshown: tuple[CellKey, ...] = ()
+    """Of every family, cells that have no row."""
 
     def __post_init__(self) -> None:
         names = [column.name for column in self.columns]
@@ -143,7 +160,7 @@ class DataTable:
         names = [column.name for column in self.columns]
         if len(row.values) != len(names):
             yield f"{len(row.values)} values for {len(names)} columns"
-        unknown = set(row.cells_by_column) - set(names)
+        unknown = (row.cells_by_column.keys() | row.rests_on.keys()) - set(names)
         if unknown:
             yield f"no columns {unknown}"
         for column, value in zip(self.columns, row.values, strict=True):
@@ -236,7 +253,7 @@ class Document:
             )
         for table in self.tables():
             for row in table.rows:
-                unknown = row.all_cells - self.runs.keys()
+                unknown = (row.all_cells | {*table.unshown}) - self.runs.keys()
                 if unknown:
                     raise ValueError(
                         f"table {table.id}, row {row.key!r}: the document has no run ids of "

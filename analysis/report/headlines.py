@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -17,9 +17,8 @@ from analysis.comparisons.methods import solve_times
 from analysis.methods import LEARNER
 from analysis.published import published_cell, published_initial
 from analysis.report.document import CellKey
-from analysis.report.numbers import PREFIX, Names, Number, macro_names, words
+from analysis.report.numbers import ORIGINS, PREFIX, Names, Number, macro_names, words
 from analysis.results.folder import CellRuns
-from analysis.results.optima import SHIPPED
 from analysis.signatures.register import PER_DIMENSION, REGISTER
 from analysis.signatures.rows import SignatureRow
 from analysis.statistics.estimates import (
@@ -108,20 +107,19 @@ def _tasks(study: Study, names: Names) -> Iterator[Number]:
         for arm, what in (("free", "Optimum"), ("still", "OptimumStill")):
             best = study.optima.get((task, arm))
             if best is not None:
-                origin = "" if best.cells else f"the optimum of the {SHIPPED}"
+                origin = "" if best.cells else ORIGINS["optimum"]
                 yield about.value(what, best.reward, how=best.how, cells=best.cells, origin=origin)
         printed = published_initial(task)
         if printed is not None:
-            source = _published(_INITIAL[task], derived=printed[2])
+            source = _published(_INITIAL[task], "derived" if printed[2] else "paper")
             yield about.value("PublishedInitialReward", printed[1], **source)
 
 
-def _published(condition: int, *, derived: bool) -> dict[str, Any]:
+def _published(condition: int, source: Literal["paper", "derived"]) -> dict[str, Any]:
     """How the paper gives a number, and its place there."""
-    how = "derived from other printed numbers" if derived else "printed"
     place = f"Results, Exploration Condition {condition}"
-    origin = f"published in the paper (Shah, Barto & Fagg, 2013; {place})"
-    return {"how": f"{how}; {place}", "origin": origin, "cells": ()}
+    origin = f"{ORIGINS[source]}; {place}"
+    return {"how": origin, "origin": origin, "cells": ()}
 
 
 def _cells(study: Study, names: Names) -> Iterator[Number]:
@@ -188,14 +186,24 @@ def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
         return
     initial = cell.good.initial_reward.dropna().unique()
     if len(initial) == 1:
-        yield about.value("InitialReward", float(initial[0]), how="deterministic")
+        alone: dict[str, Any] = {
+            "how": "deterministic",
+            "cells": (),
+            "origin": ORIGINS["simulation"],
+        }
+        yield about.value("InitialReward", float(initial[0]), **alone)
     condition = cell.method.removeprefix(LEARNER)
     printed = published_cell(cell.task, condition)
     if printed is not None and printed.summary is not None:
         summary = printed.summary
-        source = _published(int(condition.removeprefix("EC")), derived=summary.derived)
+        source = _published(int(condition.removeprefix("EC")), summary.source)
+        if summary.source_of_runs == "ours":
+            source["how"] += f"; its {summary.runs} runs are an assumption of ours"
         source |= {"sd": math.nan if summary.sd is None else summary.sd, "n": summary.runs}
-        yield about.value("PublishedReward", summary.mean, **source)
+        meaning, digits, unit = _KINDS["PublishedReward"]
+        if summary.digits is not None:
+            digits, source["sd_digits"] = summary.digits
+        yield about.value("PublishedReward", summary.mean, (meaning, digits, unit), **source)
 
 
 def _conditions(study: Study, names: Names) -> Iterator[Number]:

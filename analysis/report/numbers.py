@@ -14,14 +14,25 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.methods import LEARNER
-from analysis.report.document import CellKey
+from analysis.report.document import CellKey, RestsOn
 from analysis.report.formats.templates import LATEX, template
+from analysis.results.optima import SHIPPED
 from coartic.text import one_line
 
 if TYPE_CHECKING:
     from analysis.study import Study
 
 PREFIX = "coartic"
+ORIGINS: dict[RestsOn, str] = {
+    "optimum": f"the optimum of the {SHIPPED}",
+    "ours": "ours, chosen or assumed, not the paper's (Shah, Barto & Fagg, 2013)",
+    "derived": "derived from what the paper prints (Shah, Barto & Fagg, 2013)",
+    "paper": "printed in the paper (Shah, Barto & Fagg, 2013)",
+    "simulation": "computed from the corrective process alone (sequences.parquet)",
+    "runs": "computed of no runs, since none of its cells has any",
+    "text": "text",
+}
+"""What a value is that no runs are behind; the first that it rests on says it."""
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 
 
@@ -33,11 +44,13 @@ class Number:
     meaning: str
     value: float
     digits: int
-    """Decimals that are printed."""
+    """Decimals that are shown."""
     unit: str = ""
     low: float = math.nan
     high: float = math.nan
     sd: float = math.nan
+    sd_digits: int | None = None
+    """Decimals of the SD, where they are others."""
     n: int | None = None
     how: str = ""
     """How value and interval were obtained."""
@@ -46,7 +59,7 @@ class Number:
     of: str = ""
     """What the meaning is said of, such as a method on a task."""
     origin: str = ""
-    """What a value without cells is, such as published in the paper."""
+    """What a value without cells is, such as printed in the paper."""
 
     def __post_init__(self) -> None:
         if not (self.macro.isascii() and self.macro.isalpha()):
@@ -56,7 +69,7 @@ class Number:
         """What follows the macro's name, first nothing, with the text that it stands for."""
         yield "", self.text(self.value)
         if not math.isnan(self.sd):
-            yield "SD", self.text(self.sd)
+            yield "SD", self.text(self.sd, self.sd_digits)
         if not math.isnan(self.low):
             yield "Low", self.text(self.low)
             yield "High", self.text(self.high)
@@ -74,9 +87,9 @@ class Number:
             return f"{value} (no spread{f', {runs}' if runs else ''})"
         return f"{value} [{low}, {high}]{f' ({runs})' if runs else ''}"
 
-    def text(self, value: float) -> str:
-        """A value with this number's decimals; never minus zero."""
-        shown = f"{value:.{self.digits}f}"
+    def text(self, value: float, digits: int | None = None) -> str:
+        """A value with this number's decimals, or ``digits``; never minus zero."""
+        shown = f"{value:.{self.digits if digits is None else digits}f}"
         return shown.lstrip("-") if float(shown) == 0 else shown
 
 

@@ -5,7 +5,7 @@ const POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 
 /* The number a cell begins with, as text.py writes it; NaN where it begins with none. */
 function value(text) {
-  const found = text.replace(/[\u202f\u2009,](?=\d{3})/g, "").replace(/^[<[\s]+/, "").replace(/−/g, "-")
+  const found = text.replace(/[\u202f\u2009,](?=\d{3})/g, "").replace(/^[<>[\s]+/, "").replace(/−/g, "-")
     .match(/^(-?)(∞|\d+(?:\.\d+)?)(?: × 10(⁻?)([⁰¹²³⁴⁵⁶⁷⁸⁹]+))?/);
   if (!found) return NaN;
   const [, sign, size, below, power] = found;

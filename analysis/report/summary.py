@@ -15,8 +15,8 @@ from analysis.claims.register import Judged, Verdict
 from analysis.comparisons.paper import paper_rows
 from analysis.methods import LEARNER
 from analysis.published import published_cell
-from analysis.report.document import Bullets, DataTable, Estimate
-from analysis.report.tables.common import marked, mean_of
+from analysis.report.document import Bullets, DataTable
+from analysis.report.tables.common import estimate_as_printed, marked, mean_of
 from analysis.report.tables.layout import LAYOUTS
 from analysis.words import typographic
 from coartic.record import Environment
@@ -59,13 +59,14 @@ def tasks_table(study: Study) -> DataTable | None:
             initial=float(initial.iloc[0]) if len(initial) else None,
             condition=condition,
             learned=replace(learned, sd=None),
-            published=Estimate(printed.mean, printed.sd) if printed else None,
+            published=estimate_as_printed(printed),
             optimum=best.reward if best else None,
             proof=("proven" if best.proven else "best known") if best else None,
             gap=(best.reward - learned.value) / -best.reward if best and best.reward else None,
         )
         searches = dict.fromkeys(("optimum", "proof"), best.cells) if best else {}
-        rows.append(replace(row, cells_by_column=searches))
+        sources = {"published": (printed.source,)} if printed else {}
+        rows.append(replace(row, cells_by_column=searches, rests_on=sources))
     return layout.table(rows)
 
 
@@ -98,11 +99,13 @@ def unlike_printed(study: Study) -> list[str]:
     found = []
     for row in paper_rows(study):
         if row.verdict == "different" and row.paper.summary is not None:
-            ours, printed = (
-                typographic(f"{mean:.1f}") for mean in (row.rewards.mean(), row.paper.summary.mean)
-            )
+            summary = row.paper.summary
+            decimals = 1 if summary.digits is None else summary.digits[0]
+            ours = typographic(f"{row.rewards.mean():.1f}")
+            printed = typographic(f"{summary.mean:.{decimals}f}")
             name = f"{row.cell.task} {row.cell.label.removeprefix(LEARNER)}"
-            found.append(f"{name}: learned reward {ours}, published {printed}")
+            how = "derived from print" if summary.derived else "printed"
+            found.append(f"{name}: learned reward {ours}, {how} {printed}")
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from analysis.report.document import Column, DataTable, Estimate, Row, Value
@@ -47,8 +47,19 @@ class Part:
         """The numbers to show in ASCII, such as ``-12.3``; none where there is no value."""
         raw = self.raw(value)
         known = [x for x in raw if isinstance(x, int | float) and not math.isnan(x)]
-        whole = len(known) == len(raw)
-        return tuple(number_text(number, self.column) for number in known) if whole else ()
+        if len(known) < len(raw):
+            return ()
+        column, beyond = self.column, None
+        if isinstance(value, Estimate):
+            beyond = value.beyond
+            if value.digits is not None and self.kind != "interval":
+                column = replace(column, digits=value.digits[self.kind == "sd"])
+        return tuple(
+            number_text(number, column)
+            if beyond is None or math.isfinite(number)
+            else f">{number_text(beyond, column)}"
+            for number in known
+        )
 
     def point(self, value: Value) -> bool:
         """Whether it shows an interval that is a point: no spread, which is not certainty."""
@@ -121,7 +132,7 @@ def number_text(value: float, column: Column) -> str:
         digits = min(max(0, 2 - math.floor(math.log10(size))), 6) if size else 0
     shown = f"{number:.{digits}f}"
     if float(shown) == 0:
-        if column.kind == "p" and number > 0:
+        if column.kind == "p":  # never 0, which is what rounding may have left of it
             return f"<{10.0**-digits:.{digits}f}"
         return shown.removeprefix("-")
     return shown

@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from analysis.markup import words
-from analysis.report.document import CellKey, DataTable, RestsOn
+from analysis.report.document import CellKey, DataTable
 from analysis.report.formats.templates import template
+from analysis.report.numbers import ORIGINS
 from analysis.report.tables.layout import LAYOUTS
 from analysis.report.text import heads, texts
 from analysis.report.trace_file import FILE, Source, TraceFile, read_trace
-from analysis.results.optima import SHIPPED
 from coartic import CoarticError
 from coartic.record import Environment
 from coartic.stored import content_hash
@@ -25,14 +26,6 @@ _COMPANIONS = {
     "High": "upper end of the interval of: ",
     "N": "number of runs of: ",
 }
-_ORIGINS: dict[RestsOn, str] = {
-    "optimum": f"the optimum of the {SHIPPED}",
-    "paper": "published in the paper (Shah, Barto & Fagg, 2013)",
-    "simulation": "computed from the corrective process alone (sequences.parquet)",
-    "runs": "computed of no runs, since none of its cells has any",
-    "text": "text",
-}
-"""What a value is that no runs are behind; the first that it rests on says it."""
 
 
 @dataclass(frozen=True)
@@ -147,25 +140,28 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
             raise CoarticError(f"table {table.id} has no {what} {name!r}{near}")
     row, place = rows[where[0]], columns[where[1]]
     column, tasks = table.columns[place], {task for task, _ in row.cells}
+    rests_on = row.rests_on.get(column.name, column.rests_on)
     known_best = [
         (f"Optimum of {task}, other arm {arm}, {best.reward}: {best.how}.", best.cells)
         for task, arm, best in content.optima
-        if "optimum" in column.rests_on and task in tasks and arm == column.other_arm
+        if "optimum" in rests_on and task in tasks and arm == column.other_arm
     ]
     # The tables of methods share what stands above them all.
     above = LAYOUTS["methods"].read() if table.id.startswith("methods-") else ()
-    notes = dict.fromkeys(map(words, (*above, *table.notes)))
-    own = row.cells if "runs" in column.rests_on or not column.rests_on else ()
-    cells = [
-        *row.cells_by_column.get(column.name, own),
-        *(cell for _, searches in known_best for cell in searches),
-    ]
+    how = dict.fromkeys(map(words, filter(None, (column.how, *above, *table.notes))))
+    own = row.cells if "runs" in rests_on or not rests_on else ()
+    cells = [*row.cells_by_column.get(column.name, own)]
+    if column.family and row.values[place] is not None:
+        how[f"It depends on all of its family: {column.family}."] = None
+        kin = (other.cells for other in table.rows if other.family == row.family)
+        cells += [*chain.from_iterable(kin), *table.unshown]
+    cells += chain.from_iterable(searches for _, searches in known_best)
     return Trace(
         f"{table.id} [{row.key}, {column.name}]",
         texts(table, row)[place],
         table.caption,
-        " ".join([f"{heads(table)[place]}.", *notes, *(how for how, _ in known_best)]),
-        _ORIGINS[next((o for o in _ORIGINS if o in column.rests_on), "text")],
+        " ".join([f"{heads(table)[place]}.", *how, *(said for said, _ in known_best)]),
+        ORIGINS[next((o for o in ORIGINS if o in rests_on), "text")],
         tuple(dict.fromkeys(cells)),
         home,
         content,

@@ -63,6 +63,7 @@ class TraceFile(BaseModel):
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         named = {cell for table in self.tables for row in table.rows for cell in row.all_cells}
+        named.update(*(table.unshown for table in self.tables))
         named.update(*(number.cells for number in self.numbers))
         named.update(*(best.cells for *_, best in self.optima))
         if not named <= {(source.task, source.label) for source in self.sources}:

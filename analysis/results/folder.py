@@ -17,18 +17,24 @@ CellKey = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class CellRuns:
-    """One method with parameters on one task, and its runs."""
+class Cell:
+    """One method with parameters on one task."""
 
     task: str
     method: str
     variant: str
-    runs: pd.DataFrame
 
     @property
     def label(self) -> str:
         """The method with its variant."""
         return label_of(self.method, self.variant)
+
+
+@dataclass(frozen=True)
+class CellRuns(Cell):
+    """A cell and its runs."""
+
+    runs: pd.DataFrame
 
     @cached_property
     def good(self) -> pd.DataFrame:

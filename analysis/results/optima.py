@@ -22,7 +22,6 @@ from pydantic import BaseModel, ConfigDict
 
 from analysis.results.folder import Results, load_results
 from analysis.results.laws import BASE
-from analysis.signatures.context import KEPT
 from coartic import CoarticError, Task
 from coartic.files import write_atomically
 from coartic.record import SEARCH
@@ -38,6 +37,8 @@ SHIPPED = f"shipped data (analysis/results/{DATA.name})"
 OtherArm = Literal["free", "still"]
 ARMS: tuple[OtherArm, ...] = ("free", "still")
 """Whether the arm that is not chosen may move, or is kept still."""
+KEPT = ("start", "radius", "hands", "locked_base", "robot")
+"""What makes a task beside its goals."""
 
 
 class Entry(BaseModel):

@@ -15,13 +15,11 @@ from itertools import combinations
 
 import numpy as np
 
+from analysis.results.optima import KEPT
 from analysis.signatures.permutation import RESAMPLES, divisions, p_values
 from analysis.statistics.spread import mean
 from coartic import Task
 from coartic.robot import Array
-
-KEPT = ("start", "radius", "hands", "locked_base", "robot")
-"""What tasks that differ in goals alone have in common."""
 
 
 def shared_goals(first: Task, second: Task) -> int:

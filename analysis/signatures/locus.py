@@ -19,7 +19,7 @@ import numpy as np
 from scipy import stats
 from scipy.cluster.hierarchy import DisjointSet
 
-from analysis.signatures.context import KEPT
+from analysis.results.optima import KEPT
 from analysis.signatures.permutation import orders, p_values
 from analysis.statistics.intervals import Interval, student
 from analysis.statistics.spread import mean

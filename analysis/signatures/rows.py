@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ImportString
 
+from analysis.references import Key
 from coartic.tables import label_of
 
 NO_RUN = "no run has a solution"
@@ -112,7 +113,7 @@ class Signature(BaseModel):
     digits: int | None = None
     matrix: str = ""
     macro: str = ""
-    sources: tuple[str, ...] = ()
+    sources: tuple[Key, ...] = ()
 
     @property
     def share(self) -> bool:

@@ -54,8 +54,8 @@ def _changes(
     cell: Trajectories, changes: NDArray[np.int64], first: Signature, total: Signature
 ) -> Rows:
     if len(changes):
-        yield mean_of(first, Place(goal=1), changes[:, 0])
-        yield mean_of(total, Place(), changes.sum(axis=1))
+        yield mean_at(first, Place(goal=1), changes[:, 0])
+        yield mean_at(total, Place(), changes.sum(axis=1))
     else:
         yield from (signature.without(_no_reference(cell)) for signature in (first, total))
 
@@ -70,7 +70,7 @@ def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
     if not len(changes):
         yield signature.without(_no_reference(cell))
         return
-    shown = share_of(signature, Place(), [sacrifices(change) for change in changes])
+    shown = share_at(signature, Place(), [sacrifices(change) for change in changes])
     p = sacrifice_p(changes, seed=SEED)
     why = shown.why_not
     if not why and math.isnan(p):
@@ -114,7 +114,7 @@ def as_in_isolation(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that hit each goal with the hand that is quickest for it by itself."""
     by_run = map(isolated_agreement, cell.runs)
     for number, agrees in enumerate(zip(*by_run, strict=True), 1):
-        yield share_of(signature, Place(goal=number), agrees)
+        yield share_at(signature, Place(goal=number), agrees)
 
 
 @of_two_hands
@@ -123,7 +123,7 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
     best = cell.best_hands
     if best:
         agrees = [hands in best for hands in cell.sequences]
-        yield share_of(signature, Place(hands=", ".join(best)), agrees)
+        yield share_at(signature, Place(hands=", ".join(best)), agrees)
     else:
         yield signature.without("the folder's table of sequences has no reward")
 
@@ -156,7 +156,7 @@ def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
         if name in cell.task.locked_base:
             yield signature.without("the coordinate is locked", place)
         else:
-            yield mean_of(signature, place, [run[k] for run in reversals])
+            yield mean_at(signature, place, [run[k] for run in reversals])
 
 
 def turning(cell: Trajectories, signature: Signature) -> Rows:
@@ -176,7 +176,7 @@ def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Rows:
     found = [smoothness(run) for run in cell.runs]
     short = "every subtask is too short, or its path is without jerk"
     for k, signature in enumerate((sparc, jerk)):
-        yield mean_of(signature, Place(hand="chosen"), [run[k] for run in found], short)
+        yield mean_at(signature, Place(hand="chosen"), [run[k] for run in found], short)
 
 
 def synergies(
@@ -209,10 +209,10 @@ def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: 
     """Means at the first ``goals`` goals of ``values``, a row of them a run."""
     for number in range(1, goals + 1):
         own = [run[number - 1] for run in values]
-        yield mean_of(signature, Place(goal=number), own, missing)
+        yield mean_at(signature, Place(goal=number), own, missing)
 
 
-def mean_of(
+def mean_at(
     signature: Signature, place: Place, values: ArrayLike, missing: str = ""
 ) -> SignatureRow:
     """Mean over the runs that have a value, with Student's interval.
@@ -226,7 +226,7 @@ def mean_of(
     return _estimated(signature, place, intervals.mean(known), len(known))
 
 
-def share_of(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
+def share_at(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
     """Share of runs, with Wilson's interval."""
     return _estimated(signature, place, intervals.share(agrees), len(agrees))
 

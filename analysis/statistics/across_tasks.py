@@ -67,7 +67,7 @@ def interquartile_mean(
         shares = np.concatenate([np.full(v.shape[-1], 1 / v.shape[-1]) for v in strata])
         shape = np.broadcast_shapes(*(values.shape[:-1] for values in strata))
         together = [np.broadcast_to(v, (*shape, v.shape[-1])) for v in strata]
-        return middle_mean(np.concatenate(together, axis=-1), axis, shares)
+        return middle_mean(np.concatenate(together, axis=-1), shares)
 
     name = f"interquartile mean over {len(samples)} tasks, stratified"
     return bootstrap_estimate(name, samples, statistic, seed, resamples)

@@ -125,12 +125,6 @@ def paired_difference(
     return bootstrap_estimate("mean of paired differences", samples, spread.mean, seed, resamples)
 
 
-def interquartile_mean(values: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> Inference:
-    """Mean of the middle half of the values (Agarwal et al. 2021); see :func:`mean`."""
-    samples = (sample(values),)
-    return bootstrap_estimate("interquartile mean", samples, middle_mean, seed, resamples)
-
-
 def probability_of_improvement(
     first: ArrayLike, second: ArrayLike | float, *, seed: int, resamples: int = RESAMPLES
 ) -> Inference:
@@ -218,19 +212,15 @@ def bootstrap_estimate(
     return replace(found, method=method, low=low, high=high, seed=seed, note=note)
 
 
-def middle_mean(values: Array, axis: int = -1, weights: Array | None = None) -> Array:
+def middle_mean(values: Array, weights: Array) -> Array:
     """Interquartile mean over the last axis: the mean of the quantile function on [¼, ¾].
 
     The values at the quartiles count by the part that lies within, so it equals scipy's
-    ``trim_mean(values, 0.25)`` where n is a multiple of 4. ``weights`` (default: equal)
-    belong to the values.
+    ``trim_mean(values, 0.25)`` where n is a multiple of 4 and ``weights`` (n,) are equal.
     """
-    if axis not in (-1, values.ndim - 1):
-        raise ValueError("the interquartile mean is taken over the last axis")
     order = np.argsort(values, axis=-1, kind="stable")
     ordered = np.take_along_axis(values, order, axis=-1)
-    shares = np.full(values.shape[-1], 1.0) if weights is None else weights
-    ends = np.cumsum((shares / shares.sum())[order], axis=-1)
+    ends = np.cumsum((weights / weights.sum())[order], axis=-1)
     starts = np.concatenate([np.zeros_like(ends[..., :1]), ends[..., :-1]], axis=-1)
     inside = np.clip(ends, 0.25, 0.75) - np.clip(starts, 0.25, 0.75)
     return spread.within((inside * ordered).sum(axis=-1) / inside.sum(axis=-1), values, -1)

@@ -129,7 +129,7 @@ def compare(
     texts = {out: markdown(document, tables=""), csv: found.cells.to_csv(index=False)}
     written = {path: text.encode() for path, text in texts.items() if path is not None}
     write_outputs(written, replace=replace)
-    show_data(document.tables())
+    show_data(document.tables(), f"see {out}" if out else "--out PAGE.md has all")
     say(*found.summary)
     if written:
         say(f"In {' and '.join(map(str, written))}.")

@@ -85,7 +85,7 @@ class _Comparison:
         from analysis.report.formats.markdown import markdown
 
         study = load(folder)
-        self._made = comparison_document(study)
+        self._made, self._page = comparison_document(study), folder / "comparison.md"
         return {
             "comparison.md": markdown(self._made, tables="").encode(),
             "methods.csv": study.methods.to_csv(index=False).encode(),
@@ -95,7 +95,7 @@ class _Comparison:
         """Print what fits the terminal."""
         from analysis.report.comparison import notes_of
 
-        show_data(self._made.tables())
+        show_data(self._made.tables(), f"see {self._page}")
         show_lines(f"- {note}" for note in notes_of(self._made))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from benchmarks.harness import Progress
     from benchmarks.specification import RunSpec
 
-PLAIN_WIDTH = 200  # columns where the output is not a terminal
+PLAIN_WIDTH = 200  # columns where the output is not a terminal, and COLUMNS is not set
+READABLE = 24  # characters that a column of text needs
 _AS_IT_IS: Any = {"markup": False, "emoji": False, "highlight": False}
 """Names in square brackets or between colons are no markup of rich."""
 
@@ -39,49 +41,53 @@ def complain(kind: str, text: str) -> None:
 
 
 def console() -> Console:
-    """Standard output, as wide as the terminal or as :data:`PLAIN_WIDTH`."""
+    """Standard output, as wide as the terminal, as ``COLUMNS`` says or :data:`PLAIN_WIDTH`."""
     from rich.console import Console
 
-    found = Console(**_AS_IT_IS)
-    return found if found.is_terminal else Console(width=PLAIN_WIDTH, **_AS_IT_IS)
+    found, asked = Console(**_AS_IT_IS), os.environ.get("COLUMNS", "")
+    if found.is_terminal:
+        return found
+    width = int(asked) if asked.isdecimal() and int(asked) else PLAIN_WIDTH
+    return Console(width=width, **_AS_IT_IS)
 
 
-def show_table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, wrap: bool = True
-) -> int:
-    """Print a table; the number of columns left out.
+def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table of text, its first column unbroken.
 
-    Its first column is never broken. Without ``wrap`` none is: what does not fit in the
-    terminal's width is left out from the right.
+    Where the others would be too narrow to be read, each row is a list of what is in it.
     """
     from rich import box
+    from rich.padding import Padding
     from rich.table import Table
 
     out = console()
-    shown = len(columns)
-    columns, rows = tuple(map(one_line, columns)), [tuple(map(one_line, row)) for row in rows]
-    if not wrap:
-        widths = [max(map(len, column)) + 4 for column in zip(columns, *rows, strict=True)]
-        while shown > 2 and sum(widths[:shown]) > out.width:
-            shown -= 1
+    heads, *texts = (tuple(map(one_line, row)) for row in (columns, *rows))
+    first, *others = (max(map(len, column)) for column in zip(heads, *texts, strict=True))
+    if first + sum(min(width, READABLE) for width in others) + 4 * len(heads) > out.width:
+        out.print(one_line(title))
+        for name, *values in texts:
+            out.print("", name, sep="\n")
+            for head, value in zip(heads[1:], values, strict=True):
+                out.print(Padding(f"{head}: {value}", (0, 0, 0, 4)))
+        out.print()
+        return
     table = Table(
         title=one_line(title), title_justify="left", box=box.SIMPLE_HEAD, highlight=False
     )
-    for index, column in enumerate(columns[:shown]):
-        table.add_column(column, overflow="fold", no_wrap=index == 0 or not wrap)
-    for row in rows:
-        table.add_row(*row[:shown])
+    for index, column in enumerate(heads):
+        table.add_column(column, overflow="fold", no_wrap=index == 0)
+    for row in texts:
+        table.add_row(*row)
     out.print(table)
-    return len(columns) - shown
 
 
-def show_data(tables: Iterable[DataTable]) -> None:
-    """Print tables of values, as many columns of each as fit."""
+def show_data(tables: Iterable[DataTable], where: str) -> None:
+    """Print tables of values, as many columns of each as fit; ``where`` the others are."""
     from analysis.report.formats.terminal import terminal_table
 
     out = console()
     for table in tables:
-        out.print(terminal_table(table, out.width), "")
+        out.print(terminal_table(table, out.width, where), "")
 
 
 def show_lines(lines: Iterable[str]) -> None:

@@ -195,4 +195,5 @@ def _inline(number: str) -> str:
     """A number outside an S column's alignment."""
     if number.endswith("inf"):
         return f"${number.replace('inf', chr(92) + 'infty')}$"
-    return f"$<$\\num{{{number[1:]}}}" if number.startswith("<") else f"\\num{{{number}}}"
+    than = f"${number[0]}$" if number[0] in "<>" else ""
+    return f"{than}\\num{{{number.lstrip('<>')}}}"

@@ -8,37 +8,39 @@ from rich.text import Text
 
 from analysis.markup import words
 from analysis.report.document import DataTable
-from analysis.report.text import heads, texts
-from coartic.text import counted, one_line
+from analysis.report.text import by_column, texts
+from coartic.text import one_line
 
 _PADDING = 4  # characters about a column
 _SENTENCE = 30  # of a column of text, beyond which it may be broken into lines
 
 
-def terminal_table(table: DataTable, width: int) -> Table:
+def terminal_table(table: DataTable, width: int, where: str = "") -> Table:
     """The table in at most ``width`` characters, below its caption; its notes are left out.
 
     Names of rows and numbers are never broken. Columns for which there is no room are left out
-    from the right, those first that paper has no room for either, and their number is said
-    below; the first two stay. Brackets are text.
+    from the right, those first that paper has no room for either, leading ones last; the first
+    two stay. What is left out is named below, with ``where`` it is. Brackets are text.
     """
-    columns = [
-        list(map(one_line, column))
-        for column in zip(heads(table), *(texts(table, row) for row in table.rows), strict=True)
-    ]
+    heads = [[one_line(part.header) for part in own] for own in by_column(table)]
+    rows = [list(map(one_line, texts(table, row))) for row in table.rows]
+    columns = [[row[place] for row in rows] for place in range(len(heads))]
+    longest = [max(map(len, head + own)) for head, own in zip(heads, columns, strict=True)]
     least = [
-        min(longest, _SENTENCE) if column.kind == "text" and place else longest
-        for place, (column, longest) in enumerate(
-            zip(table.columns, (max(map(len, column)) for column in columns), strict=True)
-        )
+        min(longest[place], _SENTENCE) if column.kind == "text" and place else longest[place]
+        for place, column in enumerate(table.columns)
     ]
     shown = list(range(len(columns)))
-    for place in sorted(shown[2:], key=lambda place: (table.columns[place].printed, -place)):
+
+    def importance(place: int) -> tuple[bool, bool, int]:
+        return table.columns[place].leading, table.columns[place].printed, -place
+
+    for place in sorted(shown[2:], key=importance):
         if sum(least[place] + _PADDING for place in shown) <= width:
             break
         shown.remove(place)
-    hidden = len(columns) - len(shown)
-    more = f"({counted(hidden, 'more column')}, for which there is no room here)"
+    hidden = [column.header for place, column in enumerate(table.columns) if place not in shown]
+    more = f"No room here for {one_line('; '.join(hidden))}{where and f' ({where})'}."
     found = Table(
         title=Text(one_line(words(table.caption))),
         title_justify="left",
@@ -51,12 +53,12 @@ def terminal_table(table: DataTable, width: int) -> Table:
         column = table.columns[place]
         whole = place == 0 or column.kind != "text"
         found.add_column(
-            Text(columns[place][0]),
+            Text("\n".join(heads[place])),
             justify="left" if column.kind == "text" else "right",
             overflow="fold",
             no_wrap=whole,
             min_width=least[place],
         )
-    for row in zip(*(columns[place][1:] for place in shown), strict=True):
-        found.add_row(*map(Text, row))
+    for row in rows:
+        found.add_row(*(Text(row[place]) for place in shown))
     return found

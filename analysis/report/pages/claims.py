@@ -64,7 +64,8 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
     items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
     blocks: list[Block] = [Prose((escaped(claim.statement),)), Bullets(tuple(items))]
     if entry.table is not None:
-        blocks.append(with_legends(entry.table))
+        columns = tuple(replace(column, how=f"{claim.test}.") for column in entry.table.columns)
+        blocks.append(with_legends(replace(entry.table, columns=columns)))
     title = f"{claim.id}: {entry.marked}"
     return Section(f"claim-{claim.id}", title, tuple(blocks), folded=True)
 

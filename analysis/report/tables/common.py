@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from analysis.published import Summary
 from analysis.report.document import Estimate
 from analysis.report.tables.layout import finite
 from analysis.statistics.estimates import SEED, mean
@@ -29,6 +30,13 @@ def mean_of(rewards: Any) -> Estimate | None:
     found = mean(rewards, seed=SEED)
     ends = () if math.isnan(found.low) else (found.low, found.high)
     return Estimate(found.estimate, finite(sd(rewards)), *ends)
+
+
+def estimate_as_printed(published: Summary | None) -> Estimate | None:
+    """Mean with SD and the digits of the paper."""
+    if published is None:
+        return None
+    return Estimate(published.mean, published.sd, digits=published.digits)
 
 
 def counts(hands: pd.Series) -> str | None:

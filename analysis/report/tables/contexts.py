@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from analysis.markup import escaped
@@ -18,10 +20,12 @@ from analysis.report.tables.signatures import (
     identifier,
     known,
     labels_of,
+    reasons_for,
 )
 from analysis.signatures.locus import families
 from analysis.signatures.register import CONTEXTS, FAMILIES, REGISTER
 from analysis.signatures.rows import Place, SignatureRow
+from coartic.text import counted
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -33,27 +37,34 @@ _NO_SLOPE = 1e-12
 
 def contexts_table(study: Study) -> DataTable | None:
     """Postures at a shared goal before different successors; long ones are folded."""
-    found: dict[tuple[str, str, str], dict[str, SignatureRow]] = defaultdict(dict)
-    places: dict[tuple[str, str], list[SignatureRow]] = defaultdict(list)
-    for row in study.signature_rows:
-        if REGISTER[row.signature] in CONTEXTS and row.place.against and known(row):
-            at = str(replace(row.place, longest=None))
-            found[row.task, at, row.label][row.signature] = row
-            places[row.task, at].append(row)
-    adjusted = {row: p for own in places.values() for row, p in holm_adjusted(own).items()}
+    found: dict[tuple[str, Place], dict[str, list[SignatureRow]]] = {}
+    tasks = list(study.tasks)
+    for row in sorted(study.signature_rows, key=lambda row: tasks.index(row.task)):
+        if REGISTER[row.signature] in CONTEXTS and row.place.against:
+            place = row.task, replace(row.place, longest=None)
+            found.setdefault(place, {}).setdefault(row.label, []).append(row)
+    adjusted: dict[SignatureRow, float] = {}
+    for by_label in found.values():
+        adjusted |= holm_adjusted(filter(known, chain.from_iterable(by_label.values())))
     tested = {row.signature for row in adjusted}
-    rows = []
-    for (task, at, label), own in found.items():
-        values: list[Value] = [label, f"{task}, {at}", max(row.n for row in own.values())]
-        for signature in CONTEXTS:
-            values += cells_of(own.get(signature.name), adjusted, signature.name in tested)
-        values.append(max(row.place.longest or 0 for row in own.values()) or None)
-        against = next(iter(own.values())).place.against
-        cells = _cells_there(study, [(task, label), (against, label)])
-        rows.append(Row(f"{task}, {at}, {label}", tuple(values), cells))
+    rows: list[Row] = []
+    lacking: dict[str, list[str]] = defaultdict(list)
+    for (task, where), by_label in found.items():
+        at = f"{task}, {where}"
+        for label in labels_of(study, task):
+            own = {row.signature: row for row in by_label.get(label, ()) if known(row)}
+            if own:
+                lacking[label] += (row.why_not for row in by_label[label] if row.why_not)
+                values: list[Value] = [label, at, max(row.n for row in own.values())]
+                for signature in CONTEXTS:
+                    row_of_it = own.get(signature.name)
+                    values += cells_of(row_of_it, adjusted, signature.name in tested)
+                values.append(max(row.place.longest or 0 for row in own.values()) or None)
+                cells = _cells_there(study, [(task, label), (where.against, label)])
+                rows.append(Row(f"{at}, {label}", tuple(values), cells, family=at))
     layout = LAYOUTS["contexts"].plus(_columns_of_contexts(tested))
     layout = layout.model_copy(update={"folded": len(rows) > MOST_CONTEXTS})
-    return layout.table(rows, count=len(rows))
+    return layout.table(rows, notes=reasons_for(lacking), count=counted(len(rows), "row"))
 
 
 def _columns_of_contexts(tested: set[str]) -> Iterator[Column]:
@@ -62,9 +73,9 @@ def _columns_of_contexts(tested: set[str]) -> Iterator[Column]:
         p = f"p of {heading}" if name in tested else ""
         printed = name == "context dependence"
         yield from columns_of(signature, identifier(name), heading, p, p_printed=printed)
-    yield Column(
-        "lead_at_most", "at most", "number", "ticks", 0, rests_on=("runs",), printed=False
-    )
+    how = "The longest that the lead can be: ticks of the shortest movement to the goal."
+    at_most = partial(Column, kind="number", unit="ticks", digits=0, rests_on=("runs",))
+    yield at_most("lead_at_most", "at most", how=how, printed=False)
 
 
 def slopes_tables(study: Study) -> list[DataTable]:
@@ -93,7 +104,8 @@ def _slopes_at(
             if row.label == label:
                 what = row.place.joint or "norm"
                 values = (label, what, row.n, *cells_of(row, adjusted, True))
-                found.append(Row(f"{label}, {what}", values, cells))
+                kin = "joints" if row.place.joint else "norms"
+                found.append(Row(f"{label}, {what}", values, cells, family=kin))
     columns = columns_of(REGISTER["locus slope"], "slope", "slope", "p", p_printed=True)
     return (
         LAYOUTS["slopes"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -99,7 +100,11 @@ def _median(target: Target) -> Value:
     if not target.reached:
         return None
     bounded = target.runs > 1 and math.isfinite(target.low)
-    return Estimate(target.median, None, target.low, target.high) if bounded else target.median
+    if not bounded and math.isfinite(target.median):
+        return target.median
+    low, high = (target.low, target.high) if bounded else (None, None)
+    beyond = target.horizon if math.isfinite(target.horizon) else None
+    return Estimate(target.median, low=low, high=high, beyond=beyond)
 
 
 def _nearness(targets: list[Target]) -> tuple[float, ...]:
@@ -131,6 +136,7 @@ def areas_table(study: Study, task: str) -> DataTable | None:
             f"over {LABELS[spend]}" + ("" if arm == "free" else ", arm still"),
             digits=3,
             other_arm=arm,
+            family="all methods of the table, as the largest spend of one that learns is the end",
             printed=arm == "free" and spend in spends[:2],
         )
         for arm, spend in places
@@ -147,16 +153,20 @@ def pareto_table(study: Study, task: str) -> DataTable | None:
         if (own.told_share > SOMETIMES).any()
     ]
     layout = _PARETO.plus(_fronts())
-    return layout.table(rows, table_ids(study)[task], task=escaped(task))
+    made = layout.table(rows, table_ids(study)[task], task=escaped(task))
+    named = {row.key for row in rows}
+    unshown = ((task, str(method)) for method in frame.method.unique() if method not in named)
+    return made and replace(made, unshown=tuple(unshown))
 
 
 def _fronts() -> Iterator[Column]:
     """Of each spend three columns: the median, and on which fronts it is."""
-    share = partial(_number, kind="share", digits=0)
+    share, every = partial(_number, kind="share", digits=0), "all methods compared on the task"
+    less = f"{every}, of which those count that are told no more"
     for place, (spend, label) in enumerate(LABELS.items()):
         yield _number(spend, label, printed=place < 3)
-        yield share(f"{spend}_front", "on front", printed=place < 3)
-        yield share(f"{spend}_told", "of those told no more", printed=False)
+        yield share(f"{spend}_front", "on front", printed=place < 3, family=every)
+        yield share(f"{spend}_told", "of those told no more", printed=False, family=less)
 
 
 def _on_fronts(rows: pd.DataFrame) -> Iterator[Value]:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from analysis.published import (
     RUNS,
     TRIALS,
-    PublishedCell,
     Summary,
     published_exhaustive,
     published_initial,
 )
-from analysis.report.document import DataTable, Estimate, Row, Value
-from analysis.report.tables.common import counts, marked, mean_of
-from analysis.report.tables.layout import LAYOUTS, with_interval
+from analysis.report.document import DataTable, RestsOn, Row, Value
+from analysis.report.tables.common import counts, estimate_as_printed, marked, mean_of
+from analysis.report.tables.layout import LAYOUTS, Layout, with_interval
 from analysis.statistics.equivalence import MARGIN
 from analysis.words import typographic
 
@@ -83,50 +85,63 @@ def exhaustive_table(study: Study) -> DataTable | None:
 
 
 def _published_row(study: Study, row: PaperRow) -> Row:
-    cell, summary = row.cell, row.paper.summary
+    cell, remark = row.cell, row.paper.remark
     initial = cell.good.initial_reward.dropna()
     published_hands = [f"{s.hands} {s.runs or ''}".strip() for s in row.paper.sequences]
-    return _CELLS.row(
-        f"{cell.task} {cell.label}",
+    printed_initial = published_initial(cell.task) or (None, None, False)
+    return _beside(
+        study,
+        _CELLS,
         row,
-        ((cell.task, cell.label),),
-        published_runs=summary.runs if summary else None,
+        row.paper.summary,
+        {"published_initial": ("derived",)} if printed_initial[2] else {},
+        published_as=", ".join(filter(None, (_published_as(row.paper.summary), remark))),
         initial=float(initial.iloc[0]) if len(initial) else None,
-        published_initial=(published_initial(cell.task) or (None, None))[1],
+        published_initial=printed_initial[1],
         hands=counts(cell.good.hands),
         published_hands=", ".join(published_hands) or None,
-        **_beside(study, row, summary, row.paper),
     )
 
 
 def _sequence_row(study: Study, row: SequenceRow) -> Row:
-    key = row.cell.task, row.cell.label
-    own = _beside(study, row, row.published)
-    return _SEQUENCES.row(" ".join((*key, row.hands)), row, (key,), **own)
+    if row.published_runs != 0:
+        return _beside(study, _SEQUENCES, row, row.published)
+    none: dict[str, Value] = {"published_runs": 0, "published_as": "no run"}
+    return _beside(study, _SEQUENCES, row, None, {"published_runs": ("derived",)}, **none)
 
 
 def _beside(
     study: Study,
+    layout: Layout,
     row: PaperRow | SequenceRow,
     published: Summary | None,
-    cell: PublishedCell | None = None,
-) -> dict[str, Value]:
-    """What both tables have: published, ours, and the difference."""
-    apart = row.difference
-    return {
-        "task": marked(study, row.cell.task),
-        "method": row.cell.label,
-        "published": Estimate(published.mean, published.sd) if published else None,
-        "published_as": _published_as(published, cell),
+    rests_on: Mapping[str, tuple[RestsOn, ...]] = MappingProxyType({}),
+    **own: Value,
+) -> Row:
+    """A row of either table: published, ours, the difference, and what is the table's own."""
+    cell, apart = row.cell, row.difference
+    both: dict[str, Value] = {
+        "task": marked(study, cell.task),
+        "method": cell.label,
+        "published": estimate_as_printed(published),
+        "published_runs": published.runs if published else None,
+        "published_as": _published_as(published),
         "ours": mean_of(row.rewards),
         "runs": len(row.rewards),
         "difference": with_interval(apart.estimate, apart.low, apart.high) if apart else None,
     }
+    name = (cell.task, cell.label, *([row.hands] if isinstance(row, SequenceRow) else []))
+    made = layout.row(" ".join(name), row, ((cell.task, cell.label),), **both | own)
+    sources = dict(rests_on)
+    if published is not None:
+        sources["published"] = (published.source,)
+        sources["published_runs"] = (published.source_of_runs,)
+    return replace(made, rests_on=sources)
 
 
-def _published_as(summary: Summary | None, cell: PublishedCell | None) -> str | None:
+def _published_as(summary: Summary | None) -> str:
     if summary is None:
-        return ", ".join(filter(None, ("not printed", cell.remark))) if cell else None
+        return "not printed"
     if summary.derived:
         return "derived"
     return "printed" if summary.runs_printed else "printed, runs assumed"

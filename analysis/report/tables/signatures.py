@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from analysis.markup import escaped
@@ -97,7 +98,7 @@ def _of_task(
         header = spot.header + _neutral(row for (_, at), row in own.items() if at == spot)
         p = "p" if spot in tested else ""
         columns += columns_of(spot.signature, spot.name, header, p, printed=number < 2)
-    reasons = _reasons(lacking, len(spots))
+    reasons = reasons_for(lacking, len(spots))
     name = table_ids(study)[task]
     return LAYOUTS[kind].plus(columns).table(found, name, notes=reasons, task=escaped(task))
 
@@ -128,8 +129,8 @@ def _neutral(rows: Iterable[SignatureRow]) -> str:
     return f", neutral {' or '.join(known)}" if known else ""
 
 
-def _reasons(lacking: Mapping[str, Sequence[str]], columns: int) -> list[str]:
-    """Why methods have no value in some or all columns, in inline markup."""
+def reasons_for(lacking: Mapping[str, Sequence[str]], columns: int = 0) -> list[str]:
+    """Why methods have no value in some, or all, of the columns, in inline markup."""
     some: dict[str, dict[str, None]] = {}
     every: dict[str, list[str]] = {}
     for label, reasons in lacking.items():
@@ -195,6 +196,11 @@ def columns_of(
     kind: Literal["share", "number"] = "share" if signature.share else "number"
     unit = signature.unit if signature.unit in ("ticks", "bit", "rad", "pooled SD") else ""
     digits = 0 if signature.share else signature.digits
-    yield Column(name, header, kind, unit, digits, rests_on=("runs",), printed=printed)
+    of_runs = partial(Column, rests_on=("runs",))
+    how = f"{signature.name[:1].upper()}{signature.name[1:]}: {signature.meaning}."
+    yield of_runs(name, header, kind, unit, digits, how=how, printed=printed)
     if p:
-        yield Column(f"{name}_p", p, "p", digits=3, rests_on=("runs",), printed=p_printed)
+        how = "Adjusted by Holm's method; the tests are those of docs/signatures.md."
+        family = "all rows with p-values that are adjusted together"
+        p_values = partial(of_runs, kind="p", digits=3, how=how, family=family)
+        yield p_values(f"{name}_p", p, printed=p_printed)
