@@ -20,8 +20,8 @@ from analysis.calibration.simulation import Check, Draw, simulate
 from analysis.signatures.context import lead_time, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, subspaces, synergy
-from analysis.signatures.recruitment import entropy
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifice_p, sacrifices
+from analysis.signatures.trajectories import entropy
 from analysis.statistics import intervals
 from analysis.statistics.intervals import Interval
 from coartic import Movement, corrective_trial, execute, hand_sequences, load_task

@@ -21,7 +21,6 @@ from analysis.signatures.other_arm import (
     travel,
 )
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
-from analysis.signatures.recruitment import entropy, isolated_agreement
 from analysis.signatures.rows import (
     NO_INITIAL,
     NO_RUN,
@@ -33,8 +32,8 @@ from analysis.signatures.rows import (
     Signature,
     SignatureRow,
 )
-from analysis.signatures.subtasks import excess, sacrifice_p, sacrifices
-from analysis.signatures.trajectories import Trajectories, postures
+from analysis.signatures.subtasks import excess, isolated_agreement, sacrifice_p, sacrifices
+from analysis.signatures.trajectories import Trajectories, entropy, postures
 from analysis.statistics import intervals
 from analysis.statistics.estimates import SEED
 from coartic.robot import Array
