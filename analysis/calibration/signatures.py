@@ -212,7 +212,7 @@ def _context(
     scatter: Draw, shift: Array, second: int, basis: Array | None, rng: np.random.Generator
 ) -> bool:
     groups = scatter(rng, 20) + shift, scatter(rng, second)
-    return permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA
+    return bool(permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA)
 
 
 def _lead(scatter: Draw, shift: Array, rng: np.random.Generator) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from analysis.signatures.context import context_dependence, distance, lead_time, permutation_p
 from analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
 from analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from analysis.signatures.rows import Place, Rows, Signature, SignatureRow
+from analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
 from analysis.signatures.trajectories import Trajectories, last_ticks, postures
 from analysis.statistics import spread
 from analysis.statistics.estimates import SEED
@@ -141,14 +141,13 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
             continue
         if len(set(places)) < LEAST:
             why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-            yield from (signature.without(why, place, n) for signature in (slope, norm))
+            yield from without((slope, norm), why, place, n)
             continue
         q = postures(tuple(chain.from_iterable(runs.values())), goal)
         for joint, found in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
             unit = "1" if joint.startswith("base") else slope.unit
-            yield slope.at(replace(place, joint=joint), **found._asdict(), n=n, unit=unit)
-        whole = slope_norm(q, places, rng_of(norm, place))
-        yield norm.at(place, **whole._asdict(), n=n)
+            yield slope.estimated(replace(place, joint=joint), found, n, unit=unit)
+        yield norm.estimated(place, slope_norm(q, places, rng_of(norm, place)), n)
 
 
 def rng_of(signature: Signature, place: Place) -> np.random.Generator:

@@ -67,10 +67,11 @@ def _nearer(path: Trajectory, initial: Execution, configurations: Array) -> Arra
     result = np.full(len(task.goals), np.nan)
     for k, waiting in enumerate(map(other, hands)):
         if waiting in hands[k:]:
-            at = np.stack([configurations[k], initial.configurations[k]])
             goal = task.goals[hands.index(waiting, k)]
-            away = task.robot.forward_kinematics(at, waiting) - goal
-            now, initially = np.linalg.norm(away, axis=1)
+            now, initially = (
+                np.linalg.norm(task.robot.forward_kinematics(q[k], waiting) - goal)
+                for q in (configurations, initial.configurations)
+            )
             if initially > 0:
                 result[k] = 1 - now / initially
     return result
