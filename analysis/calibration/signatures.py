@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from functools import cache, partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from analysis.calibration.simulation import Check, Draw, simulate
@@ -141,12 +142,16 @@ def tests(*, planted: bool) -> list[Check]:
 
 def single() -> list[Check]:
     """The yes or no of one run where there is nothing, and where there is something."""
-    subject = "first subtask sacrificed"
-    return [
-        Check(subject, "other hands, ± a tick", _other_hands),
-        Check(subject, "no regard for later goals", _one_shortsighted),
-        Check(subject, "+7 of ± 5, -16 of ± 7 ticks", _one_sacrifice),
-    ]
+    drawn: dict[str, Callable[[np.random.Generator], ArrayLike]] = {
+        # The corrective process with hands at random, a tick more or less in every subtask.
+        "other hands, ± a tick": lambda rng: rng.integers(-1, 2, size=4),
+        "no regard for later goals": lambda rng: rng.choice(_without_regard()),
+        "+7 of ± 5, -16 of ± 7 ticks": lambda rng: np.round(
+            [7.0, -23.0] + 5.0 * rng.standard_normal(2)
+        ),
+    }
+    check = partial(Check, "first subtask sacrificed")
+    return [check(data, partial(_sacrificing, draw)) for data, draw in drawn.items()]
 
 
 def coverage() -> Iterator[Check]:
@@ -174,11 +179,7 @@ def _rejects(infer: Infer) -> Seen:
 
 
 def _holds(infer: Infer, truth: float) -> Seen:
-    def held(rng: np.random.Generator) -> bool:
-        found = infer(rng)
-        return found.low <= truth <= found.high
-
-    return held
+    return lambda rng: (found := infer(rng)).low <= truth <= found.high
 
 
 def seed_of(seed: int, number: int, check: Check) -> list[int]:
@@ -290,23 +291,13 @@ def _without_regard() -> Array:
 
 
 def _shortsighted(rng: np.random.Generator) -> bool:
-    changes = _without_regard()
-    return _sacrificed(changes[rng.integers(len(changes), size=20)], rng)
+    return _sacrificed(rng.choice(_without_regard(), 20), rng)
 
 
-def _one_shortsighted(rng: np.random.Generator) -> bool:
-    changes = _without_regard()
-    return sacrifices(changes[rng.integers(len(changes))])
-
-
-def _other_hands(rng: np.random.Generator) -> bool:
-    """The corrective process with hands at random, a tick more or less in every subtask."""
-    return sacrifices(rng.integers(-1, 2, size=4))
-
-
-def _one_sacrifice(rng: np.random.Generator) -> bool:
-    first, rest = 5.0 * rng.standard_normal(2)
-    return sacrifices(np.round([7.0 + first, -23.0 + rest]))
+def _sacrificing(
+    draw: Callable[[np.random.Generator], ArrayLike], rng: np.random.Generator
+) -> bool:
+    return sacrifices(draw(rng))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.comparisons.progress import BestSoFar, cells_by_spend
-from analysis.statistics.resampling import mean_interval
+from analysis.statistics.intervals import mean_interval
 from coartic.robot import Array
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def anytime_curves(study: Study) -> pd.DataFrame:
     A curve starts where the first run has a solution and ends where the first run ends, so
     that nothing is extrapolated. The mean is missing until every run has a solution, never
     one of the faster runs alone; the median counts a run without one as worse than any.
-    Intervals are those of :func:`analysis.statistics.resampling.mean_interval`, pointwise, not
+    Intervals are those of :func:`analysis.statistics.intervals.mean_interval`, pointwise, not
     a band around the whole curve; they are missing for a single run. A cell's rows do not depend
     on other cells. Runs whose time is not taken
     (:func:`analysis.comparisons.methods.solve_times`) have no part in the curve over time, nor

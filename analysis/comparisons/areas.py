@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.comparisons.progress import BestSoFar, cells_by_optimum, cells_by_spend
-from analysis.statistics.resampling import mean_interval
+from analysis.statistics.intervals import mean_interval
 
 if TYPE_CHECKING:
     from analysis.study import Study
@@ -46,7 +46,7 @@ def areas(study: Study) -> pd.DataFrame:
 
     Columns: those of :class:`Area`. ``other_arm``: which optimum; ``area`` is the mean over
     ``runs`` with its interval ``low`` to ``high``
-    (:func:`analysis.statistics.resampling.mean_interval`). Tasks without a known optimum, spends
+    (:func:`analysis.statistics.intervals.mean_interval`). Tasks without a known optimum, spends
     without a run that learns, and methods with a base that a parameter locks have no rows; of
     the optimum with the other arm still neither have methods that move that arm.
     """

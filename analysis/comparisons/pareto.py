@@ -13,7 +13,7 @@ from analysis.comparisons.methods import solve_times
 from analysis.comparisons.progress import LABELS
 from analysis.results.folder import CellRuns
 from analysis.results.optima import locks_base
-from analysis.statistics.resampling import resampled
+from analysis.statistics.intervals import resampled
 from coartic.record import SEARCH
 from coartic.robot import Array
 
@@ -40,7 +40,7 @@ def pareto_sets(study: Study) -> pd.DataFrame:
     ``solved``, mean ``reward``, ``spend`` (:data:`~analysis.comparisons.progress.LABELS`;
     ``information`` is the number of kinds of information told, which does not weigh them),
     ``amount`` (median over runs), ``front``, ``front_share`` (of
-    :data:`~analysis.statistics.resampling.RESAMPLES` bootstrap resamples, in how many it is on
+    :data:`~analysis.statistics.intervals.RESAMPLES` bootstrap resamples, in how many it is on
     the front), and ``front_told`` and ``told_share``: the same among methods that were told
     nothing that it was not.
 

@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 from analysis.comparisons.progress import BestSoFar, cells_by_optimum
 from analysis.results.folder import CellRuns
 from analysis.statistics.estimates import CONFIDENCE
-from analysis.statistics.survival import kaplan_meier_median
+from analysis.statistics.intervals import kaplan_meier_median
 from coartic.robot import Array
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def targets(study: Study, *, shares: Sequence[float] = SHARES) -> pd.DataFrame:
     ``target`` (the reward that this takes), ``runs``, ``reached`` (how many runs),
     ``reached_low`` and ``reached_high`` (exact 95 % interval of the probability to reach it,
     Clopper & Pearson, 1934), ``median`` spend to reach it with the interval ``low`` to ``high``
-    (:func:`analysis.statistics.survival.kaplan_meier_median`), and ``horizon``.
+    (:func:`analysis.statistics.intervals.kaplan_meier_median`), and ``horizon``.
 
     The median is over all runs, infinite where half of them did not reach the target; so
     are limits that the runs do not bound. Runs that could have gone on are right-censored,

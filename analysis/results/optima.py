@@ -79,7 +79,7 @@ class Optimum:
     hands: str
     bound: int | None
     """Reward that no solution exceeds; None where nothing is proven."""
-    searches: tuple[tuple[str, int], ...] = ()
+    searches: Mapping[str, int]
     """Reward that each search found, by method."""
     source: str = ""
     """The runs that give the reward and its bound, in words."""
@@ -111,8 +111,8 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
             candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
             entry = _shipped().get((essence(task), arm))
             if entry is not None and entry.reward is not None:
-                best = tuple(entry.searches.items())
-                candidates.append(Optimum(entry.reward, entry.hands, entry.bound, best))
+                kept = Optimum(entry.reward, entry.hands, entry.bound, entry.searches)
+                candidates.append(kept)
             if candidates:
                 stored = f"{SHIPPED}, runs {', '.join(entry.run_ids if entry else ())}"
                 found[name, arm] = _best(candidates, searches, stored)
@@ -159,13 +159,8 @@ def collect(results: Results) -> list[Entry]:
             best = _from_runs(good)
             first = good.iloc[int(good.reward.astype(int).argmax())].run_id
             rows = movements[movements.run_id == first].drop(columns="run_id")
-            facts = {
-                "reward": best.reward,
-                "hands": best.hands,
-                "bound": best.bound,
-                "searches": dict(best.searches),
-                "solution": rows.to_dict("records"),
-            }
+            facts = {key: getattr(best, key) for key in ("reward", "hands", "bound", "searches")}
+            facts["solution"] = rows.to_dict("records")
         entry = Entry(
             task=name,
             essence=essence(results.tasks[name]),
@@ -214,7 +209,7 @@ def _from_runs(runs: pd.DataFrame) -> Optimum:
         reward=int(best.reward),
         hands=str(best.hands),
         bound=int(bounds.min()) if len(bounds) else None,
-        searches=tuple((str(method), int(reward)) for method, reward in searches.items()),
+        searches={str(method): int(reward) for method, reward in searches.items()},
     )
 
 

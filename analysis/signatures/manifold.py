@@ -96,24 +96,18 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     """
     null, complement = subspaces(jacobian)
     free, bound = null.shape[1], complement.shape[1]
-    nan = math.nan
-    nothing = Synergy(nan, nan, nan, nan, Interval(nan))
     n = len(configurations)
-    if n < 2 or not free or not bound:
-        return nothing
-    # From a run, not from the mean, which rounding takes off the line that two postures make.
-    lines = int(np.linalg.matrix_rank(configurations - configurations[0]))
-    if not lines:
-        return nothing
     parts = [configurations @ basis for basis in (null, complement)]
     sums = [float(((part - part.mean(axis=0)) ** 2).sum()) for part in parts]
     if min(sums) <= _PROJECTED:
-        return nothing
+        return Synergy(math.nan, math.nan, math.nan, math.nan, Interval(math.nan))
     within, orthogonal = sums[0] / (n - 1) / free, sums[1] / (n - 1) / bound
     delta = (within - orthogonal) * (free + bound) / (free * within + bound * orthogonal)
     z = 0.5 * math.log(sums[0] / sums[1])
     neutral = 0.5 * math.log(free / bound)
     untested = Synergy(within, orthogonal, delta, neutral, Interval(z))
+    # From a run, not from the mean, which rounding takes off the line that two postures make.
+    lines = np.linalg.matrix_rank(configurations - configurations[0])
     left = [_leave_one_out(part, total) for part, total in zip(parts, sums, strict=True)]
     if lines < 2 or min(map(np.min, left)) <= _PROJECTED:
         return untested

@@ -31,21 +31,16 @@ def base_reversals(positions: Array) -> int:
     ``positions`` has shape ``(ticks,)``, length unit. A change of sign counts once the base
     has gone back by more than :data:`REVERSAL`; what is smaller is jitter.
     """
-    reversals = 0
-    direction = 0
-    turn = low = high = float(positions[0])
-    for x in positions[1:].tolist():
-        if direction == 0:
-            low, high = min(low, x), max(high, x)
-            if high - low > REVERSAL:
-                direction = 1 if x == high else -1
-                turn = x
-        elif (x - turn) * direction > 0:
-            turn = x
-        elif (turn - x) * direction > REVERSAL:
-            reversals += 1
-            direction = -direction
-            turn = x
+    reversals = direction = 0
+    low = high = float(positions[0])
+    for x in positions.tolist():
+        low, high = min(low, x), max(high, x)
+        if direction <= 0 and x - low > REVERSAL:
+            reversals -= direction
+            direction, high = 1, x
+        elif direction >= 0 and high - x > REVERSAL:
+            reversals += direction
+            direction, low = -1, x
     return reversals
 
 

@@ -130,7 +130,8 @@ class Signature(BaseModel):
 
     def estimated(self, place: Place, found: Interval, n: int, **values: Any) -> SignatureRow:
         """The same of a value with its interval or test, over so many runs."""
-        return self.at(place, **found._asdict(), n=n, **values)
+        why = ONE_RUN if n == 1 else ""
+        return self.at(place, **{"why_not": why, "n": n, **found._asdict(), **values})
 
 
 def without(of: Iterable[Signature], why: str, place: Place = _NOWHERE, n: int = 0) -> Rows:

@@ -25,7 +25,6 @@ from analysis.signatures.rows import (
     NO_INITIAL,
     NO_RUN,
     ONE_HAND,
-    ONE_RUN,
     Measure,
     Place,
     Rows,
@@ -68,10 +67,8 @@ def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
         return
     shown = share_at(signature, Place(), [*map(sacrifices, changes)])
     p = sacrifice_p(changes, seed=SEED)
-    why = shown.why_not
-    if not why and math.isnan(p):
-        why = "no test: the first subtask or the whole takes the same ticks in every run"
-    yield replace(shown, p=p, why_not=why)
+    untested = "no test: the first subtask or the whole takes the same ticks in every run"
+    yield replace(shown, p=p, why_not=shown.why_not or (untested if math.isnan(p) else ""))
 
 
 def against_isolated_reach(cell: Trajectories, signature: Signature) -> Rows:
@@ -216,15 +213,11 @@ def mean_at(
     """
     given = np.asarray(values, dtype=np.float64)
     known = given[np.isfinite(given)]
-    n = len(known)
-    if not n:
+    if not len(known):
         return signature.at(place, why_not=missing if len(given) else NO_RUN)
-    why = ONE_RUN if n == 1 else ""
-    return signature.estimated(place, intervals.mean(known), n, why_not=why)
+    return signature.estimated(place, intervals.mean(known), len(known))
 
 
 def share_at(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
     """Share of runs, with Wilson's interval."""
-    n = len(agrees)
-    why = ONE_RUN if n == 1 else ""
-    return signature.estimated(place, intervals.share(agrees), n, why_not=why)
+    return signature.estimated(place, intervals.share(agrees), len(agrees))
