@@ -79,7 +79,7 @@ class Optimum:
     hands: str
     bound: int | None
     """Reward that no solution exceeds; None where nothing is proven."""
-    searches: Mapping[str, int]
+    searches: tuple[tuple[str, int], ...] = ()
     """Reward that each search found, by method."""
     source: str = ""
     """The runs that give the reward and its bound, in words."""
@@ -111,8 +111,8 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
             candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
             entry = _shipped().get((essence(task), arm))
             if entry is not None and entry.reward is not None:
-                kept = Optimum(entry.reward, entry.hands, entry.bound, entry.searches)
-                candidates.append(kept)
+                best = tuple(entry.searches.items())
+                candidates.append(Optimum(entry.reward, entry.hands, entry.bound, best))
             if candidates:
                 stored = f"{SHIPPED}, runs {', '.join(entry.run_ids if entry else ())}"
                 found[name, arm] = _best(candidates, searches, stored)
@@ -159,8 +159,8 @@ def collect(results: Results) -> list[Entry]:
             best = _from_runs(good)
             first = good.iloc[int(good.reward.astype(int).argmax())].run_id
             rows = movements[movements.run_id == first].drop(columns="run_id")
-            facts = {key: getattr(best, key) for key in ("reward", "hands", "bound", "searches")}
-            facts["solution"] = rows.to_dict("records")
+            facts = {key: getattr(best, key) for key in ("reward", "hands", "bound")}
+            facts |= {"searches": dict(best.searches), "solution": rows.to_dict("records")}
         entry = Entry(
             task=name,
             essence=essence(results.tasks[name]),
@@ -209,14 +209,12 @@ def _from_runs(runs: pd.DataFrame) -> Optimum:
         reward=int(best.reward),
         hands=str(best.hands),
         bound=int(bounds.min()) if len(bounds) else None,
-        searches={str(method): int(reward) for method, reward in searches.items()},
+        searches=tuple((str(method), int(reward)) for method, reward in searches.items()),
     )
 
 
 def _best(
-    candidates: list[Optimum],
-    searches: Mapping[tuple[str, str], pd.DataFrame],
-    stored: str,
+    candidates: list[Optimum], searches: Mapping[tuple[str, str], pd.DataFrame], stored: str
 ) -> Optimum:
     """The best reward with the lowest bound of all, and where the two are from."""
     best = max(candidates, key=lambda optimum: optimum.reward)

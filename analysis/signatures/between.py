@@ -89,9 +89,8 @@ def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Rows:
     difference = spread.mean(first) - spread.mean(second)
     found = motor_equivalence(difference[joints], jacobian)
     why = "one run a context: no test" if contexts.single else ""
-    for signature, value, basis in zip(
-        (equivalent, other), found, subspaces(jacobian), strict=True
-    ):
+    signatures = equivalent, other
+    for signature, value, basis in zip(signatures, found, subspaces(jacobian), strict=True):
         wide = np.zeros((task.robot.dof, basis.shape[1]))
         wide[joints] = basis
         yield contexts.row(signature, value, why, wide)

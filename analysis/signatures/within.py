@@ -156,9 +156,8 @@ def turning(cell: Trajectories, signature: Signature) -> Rows:
     if goals < 2:
         yield from without((signature,), "the task has one goal")
         return
-    turns = [
-        turning_angles(np.vstack([run.task.q0, run.execution.configurations])) for run in cell.runs
-    ]
+    start = cell.task.q0
+    turns = [turning_angles(np.vstack([start, run.execution.configurations])) for run in cell.runs]
     yield from by_goal(signature, goals - 1, turns, "a subtask without displacement")
 
 
