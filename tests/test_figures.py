@@ -346,7 +346,7 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     own = study.cells["ascending", "dual-process/EC1"]
     cells = study.cells | {("ascending", label): own for label in labels}
     results = replace(study.results)
-    vars(results)["cells"] = cells
+    results.__dict__["cells"] = cells
     of = MadeUp(results, signatures=planted)
     plot = context(of, methods=labels)
     data = plot.data.set_index("method").loc[labels]
