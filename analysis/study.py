@@ -26,7 +26,7 @@ from analysis.comparisons.progress import best_so_far
 from analysis.comparisons.targets import targets
 from analysis.results.folder import CellKey, CellRuns, Results, load_results
 from analysis.results.optima import optima
-from analysis.signatures.study_rows import signature_rows, signatures_table
+from analysis.signatures.register import signature_rows, signatures_table
 from analysis.signatures.trajectories import all_trajectories
 from coartic import Task
 from coartic.text import counted, did_you_mean

@@ -38,7 +38,7 @@ def _as_printed(data: Data) -> Finding:
             own = rewards_of(data.learned(task, condition, hands))
             if summary is None or not len(own):
                 continue
-            apart = difference(own, summary)
+            apart = difference(own, summary.mean, summary.sd, summary.runs)
             verdict = None if math.isnan(apart.low) else apart.verdict
             share = apart.estimate / -summary.mean
             values = (

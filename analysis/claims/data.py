@@ -14,9 +14,8 @@ import pandas as pd
 from analysis.comparisons.methods import TOLD
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
-from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.rows import SignatureRow
-from analysis.signatures.trajectories import Trajectories
+from analysis.signatures.trajectories import Trajectories, best_sequences
 from analysis.statistics.estimates import FEWEST
 from coartic import Execution, Task
 from coartic.method import Information

@@ -116,4 +116,6 @@ def _rewards(cell: CellRuns) -> Array:
 
 
 def _apart(rewards: Array, published: Summary | None) -> Equivalence | None:
-    return difference(rewards, published) if published is not None and len(rewards) else None
+    if published is None or not len(rewards):
+        return None
+    return difference(rewards, published.mean, published.sd, published.runs)
