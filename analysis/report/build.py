@@ -6,7 +6,6 @@ import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -49,11 +48,9 @@ from analysis.report.tables.signatures import signatures_tables
 from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
+from analysis.study import Study
 from coartic import CoarticError
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 MOST_TASKS = 8
 """More would make a report that nobody reads."""

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,9 +29,7 @@ from analysis.statistics.estimates import (
     probability_of_improvement,
 )
 from analysis.statistics.spread import sd
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 _INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
 """Exploration condition under which the paper speaks of a task's initial solution."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,10 @@ from analysis.report.summary import unlike_printed
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.power import POWER, smallest_difference
 from analysis.statistics.spread import sd
+from analysis.study import Study
 from analysis.words import typographic
 from coartic.exploration import CONDITIONS
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _SENTENCES: dict[str, str] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")

@@ -7,7 +7,6 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,12 +17,10 @@ from analysis.published import published_cell
 from analysis.report.document import Bullets, DataTable
 from analysis.report.tables.common import estimate_as_printed, marked, mean_of
 from analysis.report.tables.layout import LAYOUTS
+from analysis.study import Study
 from analysis.words import typographic
 from coartic.record import Environment
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
 _VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell")

@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from analysis.claims.register import Judged
 from analysis.markup import code, escaped
@@ -14,10 +13,8 @@ from analysis.report.document import Block, Bullets, DataTable, Document, Prose,
 from analysis.report.legends import with_legends
 from analysis.report.summary import verdicts
 from analysis.report.tables.claims import claims_table
+from analysis.study import Study
 from analysis.words import NONE, slugs
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 
 def claims_document(study: Study) -> Document:

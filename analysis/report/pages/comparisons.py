@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from analysis.comparisons.pairs import PairRow
 from analysis.markup import code, escaped
@@ -15,10 +14,8 @@ from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.methods import overall_table
 from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.statistics.estimates import LEVEL, RESAMPLES
+from analysis.study import Study
 from coartic.record import SEARCH
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _OTHERS = {"conditions": "other conditions", "variant": "its variants", "method": "methods"}
 

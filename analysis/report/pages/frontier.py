@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from analysis.markup import escaped
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
@@ -17,10 +16,8 @@ from analysis.report.tables.cost import (
     reading_of_cost,
     targets_table,
 )
+from analysis.study import Study
 from analysis.words import typographic
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 
 def frontier_document(study: Study) -> Document:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from analysis.claims.register import FITTED, RULES
 from analysis.report.document import DataTable
 from analysis.report.tables.layout import LAYOUTS
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 
 def claims_table(study: Study) -> DataTable | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -12,10 +12,8 @@ from analysis.report.document import Estimate
 from analysis.report.tables.layout import finite
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
+from analysis.study import Study
 from analysis.words import slugs
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 
 def table_ids(study: Study) -> dict[str, str]:

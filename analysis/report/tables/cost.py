@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -19,11 +18,9 @@ from analysis.report.document import Column, DataTable, Estimate, Row, Value
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.layout import LAYOUTS, finite, with_interval
 from analysis.results.optima import OtherArm
+from analysis.study import Study
 from analysis.words import typographic
 from coartic.record import SEARCH
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 TARGET_SPENDS = ("trials", "forward_kinematics")
 """Spends whose targets have tables; ``targets.csv`` has all."""

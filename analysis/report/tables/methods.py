@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,13 +11,11 @@ from analysis.markup import escaped
 from analysis.report.document import DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table_ids
 from analysis.report.tables.layout import LAYOUTS
+from analysis.study import Study
 from analysis.words import true_minus
 from coartic.method import Information
 from coartic.record import SEARCH
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _METHODS, _OVERALL = LAYOUTS["methods"], LAYOUTS["across-tasks"]
 _WHOLE = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solver_iterations")

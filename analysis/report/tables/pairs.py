@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,8 @@ from analysis.markup import escaped
 from analysis.report.document import DataTable
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.layout import LAYOUTS, Layout
+from analysis.study import Study
 from analysis.words import typographic
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _KINDS = ("conditions", "method", "variant")
 
