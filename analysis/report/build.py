@@ -27,8 +27,9 @@ from analysis.report.formats.csv import table_csv
 from analysis.report.headlines import headline_numbers
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
-from analysis.report.pages.claims import claim_section
-from analysis.report.pages.frontier import cost_tables, optima_known
+from analysis.report.pages.claims import claim_section, claims_table
+from analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
+from analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
 from analysis.report.player import player_json
 from analysis.report.summary import (
     tasks_table,
@@ -37,12 +38,9 @@ from analysis.report.summary import (
     version_text,
     without_variants,
 )
-from analysis.report.tables.claims import claims_table
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
-from analysis.report.tables.cost import reading_of_cost
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
-from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.report.tables.paper import beside_paper
 from analysis.report.tables.signatures import signatures_tables
 from analysis.report.trace_file import FILE, trace_json
