@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, get_args
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -17,8 +18,9 @@ LATEX = {
 """Settings for templates of LaTeX, whose own are braces and per cent signs."""
 
 
+@cache
 def template(name: str, *filters: Callable[..., Any], **settings: Any) -> Template:
-    """A template of this folder: tags on lines of their own leave none.
+    """A template of this folder: tags on lines of their own leave none. Read once.
 
     Functions are ``filters`` by their names, kinds of blocks tests by theirs in small letters;
     ``settings`` are further ones of jinja2.Environment.
