@@ -105,7 +105,10 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
 
     def drawn(section: FigureSection) -> list[Block]:
         plots = [] if figures is None else figures.of_section(section)
-        return [_figure(plot) for plot in plots]
+        return [
+            FigureBlock(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot))
+            for plot in plots
+        ]
 
     sections = (
         _summary(study),
@@ -294,7 +297,3 @@ def _section(
 
 def _tables(*found: DataTable | None, folded: bool = False) -> list[Block]:
     return [replace(table, folded=folded or table.folded) for table in filter(None, found)]
-
-
-def _figure(plot: Plot) -> FigureBlock:
-    return FigureBlock(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot))

@@ -8,8 +8,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from analysis.claims.register import Judged, Verdict
 from analysis.comparisons.paper import paper_rows
 from analysis.methods import LEARNER
@@ -44,7 +42,7 @@ def tasks_table(study: Study) -> DataTable | None:
         if label is None:
             continue
         good, condition = study.cells[name, label].good, label.removeprefix(LEARNER)
-        learned = mean_of(good.reward.to_numpy(dtype=np.float64))
+        learned = mean_of(good.reward)
         assert learned is not None  # of the best of all means
         initial = good.initial_reward.dropna()
         paper, best = published_cell(name, condition), study.optima.get((name, "free"))

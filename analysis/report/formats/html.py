@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 
 from analysis.markup import inline
 from analysis.report.document import CellKey, Document, FigureBlock, PlayerBlock, Row
-from analysis.report.formats.templates import template
+from analysis.report.formats.templates import on_one_line, template
 from analysis.report.text import Part, by_column
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
@@ -47,7 +47,7 @@ def html(document: Document) -> str:
         *(inline, true_minus, by_column, small_print, cell_view, stretches, is_wide),
         *(inlined_svg, script_data),
         autoescape=True,
-        finalize=_on_one_line,
+        finalize=on_one_line,
     )
     return page.render(
         document=document,
@@ -58,10 +58,6 @@ def html(document: Document) -> str:
         most_listed=MOST_LISTED,
         most_links=MOST_LINKS,
     )
-
-
-def _on_one_line(value: object) -> object:
-    return one_line(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
 def _resource(name: str) -> str:

@@ -9,6 +9,7 @@ from typing import Any, get_args
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from analysis.report.document import Block
+from coartic.text import one_line
 
 LATEX = {
     **{"block_start_string": "<%", "block_end_string": "%>"},
@@ -38,3 +39,8 @@ def template(name: str, *filters: Callable[..., Any], **settings: Any) -> Templa
         kind.__name__.lower(): kind.__instancecheck__ for kind in get_args(Block)
     }
     return environment.get_template(name)
+
+
+def on_one_line(value: object) -> object:
+    """What is filled in as text on one line, but what is markup already."""
+    return value if hasattr(value, "__html__") else one_line(str(value))

@@ -51,18 +51,13 @@ def outcome(rows: Sequence[PairRow]) -> Iterator[str]:
             f"**Too few runs to tell anything apart: {len(tested)} permutation tests of so many "
             f"runs have an adjusted p of {min(least, 1.0):.2g} at least.**"
         )
-    groups: dict[tuple[str, str], list[PairRow]] = {}
+    groups: dict[tuple[str, str], dict[str, list[str]]] = {}
     for row in rows:
-        groups.setdefault((row.kind, row.first), []).append(row)
-    for (kind, first), own in groups.items():
-        found = {
-            verdict: [row.second for row in own if _verdict(row) == verdict]
-            for verdict in _VERDICTS
-        }
-        words = "; ".join(
-            f"{verdict} {', '.join(names)}" for verdict, names in found.items() if names
-        )
-        yield escaped(f"{first} and {_OTHERS[kind]}: {words}.")
+        own = groups.setdefault((row.kind, row.first), {verdict: [] for verdict in _VERDICTS})
+        own[_verdict(row)].append(row.second)
+    for (kind, first), found in groups.items():
+        words = (f"{verdict} {', '.join(names)}" for verdict, names in found.items() if names)
+        yield escaped(f"{first} and {_OTHERS[kind]}: {'; '.join(words)}.")
 
 
 _VERDICTS = _HIGHER, _LOWER, _NOT_APART, _UNTESTED = (

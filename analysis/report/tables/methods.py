@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.markup import escaped
 from analysis.report.document import DataTable, Row
@@ -53,9 +51,9 @@ def methods_table(study: Study, task: str) -> DataTable | None:
 
 def _method_row(study: Study, row: MethodRow) -> Row:
     key = row.task, row.label
-    rewards = study.cells[key].good.reward.to_numpy(dtype=np.float64)
+    reward = mean_of(study.cells[key].good.reward)
     whole = {name: _whole(getattr(row, name)) for name in _WHOLE}
-    return _METHODS.row(row.label, row, (key,), method=row.label, reward=mean_of(rewards), **whole)
+    return _METHODS.row(row.label, row, (key,), method=row.label, reward=reward, **whole)
 
 
 def _optimum(study: Study, task: str) -> str:
