@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 from analysis.claims.data import BEST, UNINFORMED, Data, MissingError
 from analysis.claims.evidence import by_optimum, measured, of_either_optimum
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
-from analysis.comparisons.methods import TOLD
+from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.methods import LEARNER
 from analysis.report.document import Column, RestsOn, Row, Value
 from coartic.method import Information
@@ -54,20 +55,17 @@ _BESIDE = (
 
 
 def _beside(
-    data: Data, labels: Iterable[str], values: Callable[[str, str], tuple[Value, ...] | None]
+    data: Data, labels: Iterable[str], values: Callable[[MethodRow], tuple[Value, ...] | None]
 ) -> list[Row]:
     """Each method on each task where it can be judged and has values, which follow its reward."""
     found = []
     for label, task in itertools.product(labels, _TASKS):
-        try:
-            data.runs(task, label)
-        except MissingError:
-            continue
-        own = values(task, label)
-        if own is not None:
-            row = data.study.method_rows[task, label]
-            shown = (label, task, row.told, row.reward, *own)
-            found.append(Row(f"{label} on {task}", shown, ((task, label),)))
+        with suppress(MissingError):
+            row = data.row(task, label)
+            own = values(row)
+            if own is not None:
+                shown = (label, task, row.told, row.reward, *own)
+                found.append(Row(f"{label} on {task}", shown, ((task, label),)))
     return found
 
 
@@ -80,8 +78,8 @@ def _experience(data: Data) -> Finding:
     # Methods that keep the other arm still, to the optimum with it still: their last row.
     reached = {(row.task, row.method): row for row in rows}
 
-    def values(task: str, label: str) -> tuple[Value, ...] | None:
-        row = reached.get((task, label))
+    def values(of: MethodRow) -> tuple[Value, ...] | None:
+        row = reached.get((of.task, of.label))
         if row is None:
             return None
         median = None if math.isinf(row.median) else float(row.median)
@@ -113,8 +111,7 @@ def _computation(data: Data) -> Finding:
     """Kinematics that uninformed methods evaluate, and informed ones in their default form."""
     _learners_runs(data)
 
-    def values(task: str, label: str) -> tuple[Value, ...]:
-        row = data.study.method_rows[task, label]
+    def values(row: MethodRow) -> tuple[Value, ...]:
         return (row.evaluations, row.evaluations / row.trials if row.trials > 1 else None)
 
     uninformed = _labels(data, _uninformed)
