@@ -64,7 +64,7 @@ class Study:
         """The tasks as they were run, by name."""
         return self.results.tasks
 
-    @property
+    @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
         """Rows of the runs, in the order of the plan."""
         return self.results.cells

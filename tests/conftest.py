@@ -23,19 +23,19 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 @pytest.fixture(scope="session")
-def shared(tmp_path_factory):
+def session_folder(tmp_path_factory):
     """The temporary folder of all workers of the session."""
     own = tmp_path_factory.getbasetemp()
     return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _kernels(shared):
+def _kernels(session_folder):
     """Compiled by the first worker, where they are not yet, while the others wait."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         from coartic.learning import warm_up
 
-        with FileLock(shared / "kernels.lock"):
+        with FileLock(session_folder / "kernels.lock"):
             warm_up()
 
 
@@ -60,7 +60,7 @@ def in_this_process(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def traced(shared):
+def traced(session_folder):
     """A results folder that nobody writes into: the paper's cells beside other methods.
 
     The first worker makes it for all.
@@ -68,12 +68,12 @@ def traced(shared):
     from analysis import load
     from tests.support.suites import run_and_write, traced_cells, with_environment
 
-    folder = shared / "traced" / "results"
-    with FileLock(shared / "traced.lock"):
-        if not (shared / "traced.made").exists():
+    folder = session_folder / "traced" / "results"
+    with FileLock(session_folder / "traced.lock"):
+        if not (session_folder / "traced.made").exists():
             run_and_write(folder, traced_cells(), runs=4, trials=150)
             with_environment(folder)
-            (shared / "traced.made").touch()
+            (session_folder / "traced.made").touch()
     return load(folder)
 
 

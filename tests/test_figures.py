@@ -345,7 +345,9 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     )
     own = study.cells["ascending", "dual-process/EC1"]
     cells = study.cells | {("ascending", label): own for label in labels}
-    of = MadeUp(study.results, signatures=planted, cells=cells)
+    results = replace(study.results)
+    results.__dict__["cells"] = cells
+    of = MadeUp(results, signatures=planted)
     plot = context(of, methods=labels)
     data = plot.data.set_index("method").loc[labels]
     # Smallest of six times six, the next times five, and so on, never falling.

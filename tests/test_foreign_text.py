@@ -24,7 +24,6 @@ import analysis.study
 import benchmarks.registry
 import benchmarks.reproduce
 from analysis.citations import MethodSource, bibliography
-from analysis.comparisons.methods import method_rows
 from analysis.comparisons.versions import compare_versions
 from analysis.figures.plot import svg_text
 from analysis.figures.tasks import tasks_plot
@@ -50,7 +49,7 @@ from coartic.record import Commit
 from coartic.tables import label_of
 from coartic.text import json_text, one_line, plain, printed, shell_line
 from tests.support.commands import call
-from tests.support.made_up import replanned
+from tests.support.made_up import MadeUp, replanned
 from tests.support.reports import Page
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, run_and_write, with_environment
@@ -429,13 +428,12 @@ def words_alone(source):
 SIGN = "alert(1)</script>"  # of EVIL: it must be seen as what it is
 
 
-def test_comparison_page(hostile, monkeypatch):
-    rows = [
-        replace(row, beaten=1, corrections=2, told="G")
-        for row in method_rows(Study(hostile)).values()
-    ]
-    monkeypatch.setattr("analysis.study.method_rows", lambda study: rows)
-    page = to_markdown(comparison_document(Study(hostile)), tables="")
+def test_comparison_page(hostile):
+    rows = {
+        key: replace(row, beaten=1, corrections=2, told="G")
+        for key, row in Study(hostile).method_rows.items()
+    }
+    page = to_markdown(comparison_document(MadeUp(hostile, method_rows=rows)), tables="")
     assert page.count("is better than the optimum") == len(rows)
     words_alone(page)
     text = "".join(token.content for tokens in inlines(page) for token in tokens)
@@ -475,8 +473,7 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
     )
     other.__dict__["tasks"] = hostile.tasks
     words_alone(compared(hostile, other))
-    fewer = hostile.cells[:1]
-    other.__dict__["cells"] = fewer
+    other.__dict__["cells"] = dict(list(hostile.cells.items())[:1])
     assert EVIL[:60] in MARKDOWN.render(compared(hostile, other)).replace(
         "&lt;", "<").replace("&gt;", ">")  # fmt: skip
     folders = {"a": hostile}

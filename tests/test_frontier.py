@@ -18,8 +18,12 @@ from analysis.comparisons.progress import SPENDS, by_trial
 from analysis.comparisons.targets import targets
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
-from analysis.report.pages.frontier import frontier_document
-from analysis.report.tables.cost import areas_table, pareto_table, targets_table
+from analysis.report.pages.frontier import (
+    areas_table,
+    frontier_document,
+    pareto_table,
+    targets_table,
+)
 from analysis.report.text import parts
 from analysis.results.folder import Results
 from analysis.study import Study

@@ -11,8 +11,7 @@ from analysis.comparisons.overall import WITHIN, everywhere, over_tasks, profile
 from analysis.comparisons.pairs import pairs
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
-from analysis.report.pages.comparisons import comparisons_document
-from analysis.report.tables.pairs import cost_table, pairwise_table
+from analysis.report.pages.comparisons import comparisons_document, cost_table, pairwise_table
 from analysis.results.folder import Results
 from analysis.statistics.power import power, runs_needed
 from analysis.study import Study

@@ -36,9 +36,8 @@ from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
 from analysis.report.formats.latex import PACKAGES, latex_table, latex_text
 from analysis.report.formats.markdown import markdown
 from analysis.report.formats.terminal import terminal_table
-from analysis.report.legends import with_legends
 from analysis.report.summary import without_variants
-from analysis.report.tables.layout import LAYOUTS, Layout
+from analysis.report.tables.layout import LAYOUTS, Layout, with_legends
 from analysis.report.text import number_text, parts, texts
 from analysis.report.write import write_report
 from analysis.words import typographic

@@ -19,7 +19,7 @@ MEASURE = '''
 
 def hits(cell: Trajectories, signature: Signature) -> Rows:
     """Goals that a run hits."""
-    yield mean_of(signature, Place(), [float(len(run.hits)) for run in cell.runs])
+    yield mean_at(signature, Place(), [float(len(run.hits)) for run in cell.runs])
 '''
 SIGNATURE = """
 [[within]]

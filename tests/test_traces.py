@@ -629,7 +629,7 @@ def test_runs_are_made_anew_without_files_of_the_users_own(study, tmp_path, comm
     text = trace_json(started, Document("t", (), runs=cells), [number])
     (tmp_path / FILE).write_text(text, encoding="utf-8")
     found = trace(tmp_path, "coarticX")
-    assert list(found.environment.command) == shown
+    assert list(found.file.environment.command) == shown
     assert bool(found.sources[0].command) == anew
     assert ("\nanew: coartic run" in trace_text(found)) == anew
 

@@ -13,8 +13,7 @@ import pytest
 from analysis.comparisons.versions import compare_versions, load_pair
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
-from analysis.report.pages.versions import versions_document
-from analysis.report.tables.versions import versions_table
+from analysis.report.pages.versions import versions_document, versions_table
 from analysis.results.folder import load_results
 from analysis.results.laws import read_manifest
 from analysis.statistics.equivalence import MARGIN

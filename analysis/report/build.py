@@ -6,7 +6,6 @@ import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -28,8 +27,9 @@ from analysis.report.formats.csv import table_csv
 from analysis.report.headlines import headline_numbers
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
-from analysis.report.pages.claims import claim_section
-from analysis.report.pages.frontier import cost_tables, optima_known
+from analysis.report.pages.claims import claim_section, claims_table
+from analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
+from analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
 from analysis.report.player import player_json
 from analysis.report.summary import (
     tasks_table,
@@ -38,22 +38,17 @@ from analysis.report.summary import (
     version_text,
     without_variants,
 )
-from analysis.report.tables.claims import claims_table
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
-from analysis.report.tables.cost import reading_of_cost
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
-from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.report.tables.paper import beside_paper
 from analysis.report.tables.signatures import signatures_tables
 from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
+from analysis.study import Study
 from coartic import CoarticError
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 MOST_TASKS = 8
 """More would make a report that nobody reads."""
@@ -110,7 +105,10 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
 
     def drawn(section: FigureSection) -> list[Block]:
         plots = [] if figures is None else figures.of_section(section)
-        return [_figure(plot) for plot in plots]
+        return [
+            FigureBlock(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot))
+            for plot in plots
+        ]
 
     sections = (
         _summary(study),
@@ -299,7 +297,3 @@ def _section(
 
 def _tables(*found: DataTable | None, folded: bool = False) -> list[Block]:
     return [replace(table, folded=folded or table.folded) for table in filter(None, found)]
-
-
-def _figure(plot: Plot) -> FigureBlock:
-    return FigureBlock(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot))

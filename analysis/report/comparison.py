@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from analysis.markup import code, escaped, words
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
@@ -13,10 +12,8 @@ from analysis.report.summary import version_text
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.methods import methods_table, reading_of_methods
 from analysis.report.tables.paper import beside_paper
+from analysis.study import Study
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 
 def comparison_document(study: Study) -> Document:

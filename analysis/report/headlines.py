@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from analysis.comparisons.methods import solve_times
 from analysis.methods import LEARNER
@@ -29,28 +32,15 @@ from analysis.statistics.estimates import (
     probability_of_improvement,
 )
 from analysis.statistics.spread import sd
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 _INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
 """Exploration condition under which the paper speaks of a task's initial solution."""
 Kind = tuple[str, int, str]
 """Meaning, decimals and unit."""
-_KINDS: dict[str, Kind] = {
-    "Optimum": ("best reward known, other arm free", 0, "ticks"),
-    "OptimumStill": ("best reward known, other arm still", 0, "ticks"),
-    "PublishedInitialReward": ("published reward of the initial solution", 0, "ticks"),
-    "Gap": ("gap to the optimum", 1, "ticks"),
-    "GapPercent": ("gap to the optimum", 1, "% of the optimum"),
-    "GapStill": ("gap to the optimum, other arm still", 1, "ticks"),
-    "GapStillPercent": ("gap to the optimum, other arm still", 1, "% of the optimum"),
-    "Trials": ("median of physical trials of a run", 0, "trials"),
-    "Evaluations": ("median of forward kinematics and Jacobians of a run", 0, "evaluations"),
-    "SolveSeconds": ("median of wall time of solving", 3, "s"),
-    "InitialReward": ("reward of the initial solution", 0, "ticks"),
-    "PublishedReward": ("published mean reward", 1, "ticks"),
-}
+_KINDS = TypeAdapter(dict[str, Kind]).validate_python(
+    tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+)
 """By the end of the macro's name."""
 
 
@@ -93,12 +83,18 @@ class _About:
     def value(self, what: str, value: float, kind: Kind | None = None, **known: Any) -> Number:
         """``kind``: of :data:`_KINDS` by default; ``known``: further fields of the number."""
         meaning, digits, unit = kind or _KINDS[what]
-        fields = {"cells": self.cells, "of": self.of, **known}
-        return Number(f"{PREFIX}{self.stem}{what}", meaning, value, digits, unit, **fields)
+        fields = {"digits": digits, "unit": unit, "cells": self.cells, "of": self.of, **known}
+        return Number(f"{PREFIX}{self.stem}{what}", meaning, value, **fields)
 
     def inferred(self, what: str, found: Inference, kind: Kind, **known: Any) -> Number:
         interval = {"low": found.low, "high": found.high, "n": sum(found.n), "how": _how(found)}
         return self.value(what, found.estimate, kind, **interval, **known)
+
+
+def _of(names: Names, *cells: CellKey) -> _About:
+    """What is said of the first of the cells."""
+    task, label = cells[0]
+    return _About(names.tasks[task] + names.labels[label], f"{label} on {task}", cells)
 
 
 def _tasks(study: Study, names: Names) -> Iterator[Number]:
@@ -127,8 +123,7 @@ def _cells(study: Study, names: Names) -> Iterator[Number]:
     for (task, label), cell in study.cells.items():
         if not len(cell.good):
             continue
-        stem = names.tasks[task] + names.labels[label]
-        about = _About(stem, f"{label} on {task}", ((task, label),))
+        about = _of(names, (task, label))
         reward = _reward(about, cell)
         yield reward
         if not cell.variant:
@@ -200,10 +195,9 @@ def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
         if summary.source_of_runs == "ours":
             source["how"] += f"; its {summary.runs} runs are an assumption of ours"
         source |= {"sd": math.nan if summary.sd is None else summary.sd, "n": summary.runs}
-        meaning, digits, unit = _KINDS["PublishedReward"]
         if summary.digits is not None:
-            digits, source["sd_digits"] = summary.digits
-        yield about.value("PublishedReward", summary.mean, (meaning, digits, unit), **source)
+            source["digits"], source["sd_digits"] = summary.digits
+        yield about.value("PublishedReward", summary.mean, **source)
 
 
 def _conditions(study: Study, names: Names) -> Iterator[Number]:
@@ -229,12 +223,11 @@ def _hands(study: Study, names: Names) -> Iterator[Number]:
     for (task, label), cell in study.cells.items():
         if not label.startswith(LEARNER) or cell.variant or len(study.tasks[task].hands) < 2:
             continue
-        stem = f"{names.tasks[task]}{names.labels[label]}Hands"
-        about = _About(stem, f"{label} on {task}", ((task, label),))
+        about = _of(names, (task, label))
         for hands, count in cell.good.hands.value_counts(sort=False).sort_index().items():
             kind = f"runs that learned {hands}", 0, "runs"
             how = f"of {len(cell.good)} with a solution"
-            yield about.value(words(str(hands)), float(count), kind, how=how)
+            yield about.value(f"Hands{words(str(hands))}", float(count), kind, how=how)
 
 
 def _signatures(study: Study, names: Names) -> Iterator[Number]:
@@ -249,8 +242,7 @@ def _signatures(study: Study, names: Names) -> Iterator[Number]:
         signature = REGISTER[name]
         other = (row.place.against, label)
         place = f" ({row.place})" if str(row.place) else ""
-        cells = ((task, label), *([other] if other in study.cells else []))
-        about = _About(names.tasks[task] + names.labels[label], f"{label} on {task}", cells)
+        about = _of(names, (task, label), *([other] if other in study.cells else []))
         kind = f"{name}{place}", 2, signature.unit.removesuffix(PER_DIMENSION)
         n = row.n if row.n != len(study.cells[task, label].good) else None
         known = {"low": row.low, "high": row.high, "n": n, "how": "docs/signatures.md"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,10 @@ from analysis.report.summary import unlike_printed
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.power import POWER, smallest_difference
 from analysis.statistics.spread import sd
+from analysis.study import Study
 from analysis.words import typographic
 from coartic.exploration import CONDITIONS
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _SENTENCES: dict[str, str] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
@@ -31,28 +29,21 @@ _SENTENCES: dict[str, str] = tomllib.loads(
 
 def limitations(study: Study) -> tuple[str, ...]:
     """One limitation an item, in the report's inline markup, the gravest first."""
+    unlike = escaped("; ".join(unlike_printed(study)))
     return (
-        *_unlike(study),
+        *([_said("not_reproduced", found=unlike)] if unlike else []),
         *_reconstructed(study),
         *_learned(study),
         *_failures(study),
-        *_failed_trials(study),
         *_versions(study),
         *_numbers_of_runs(study),
         *_optima(study),
-        *_timing(study),
-        *_model(study),
+        *_timing_and_model(study),
     )
 
 
 def _said(sentence: str, **facts: Any) -> str:
     return _SENTENCES[sentence].format(**facts)
-
-
-def _unlike(study: Study) -> Iterator[str]:
-    found = unlike_printed(study)
-    if found:
-        yield _said("not_reproduced", found=escaped("; ".join(found)))
 
 
 def _learned(study: Study) -> Iterator[str]:
@@ -106,9 +97,6 @@ def _failures(study: Study) -> Iterator[str]:
             reason=f"{escaped(str(own.reason.iloc[0]))}{others}",
             cells=cells,
         )
-
-
-def _failed_trials(study: Study) -> Iterator[str]:
     parts = []
     for (task, label), cell in study.cells.items():
         lost, made = int(cell.runs.failed_trials.sum()), int(cell.runs.trials.sum())
@@ -187,7 +175,7 @@ def _optima(study: Study) -> Iterator[str]:
                 yield _said("unproven", task=escaped(task), **facts)
 
 
-def _timing(study: Study) -> Iterator[str]:
+def _timing_and_model(study: Study) -> Iterator[str]:
     runs, environment = study.results.runs, study.results.manifest.environment
     cold = ~runs.warm.astype("boolean")  # unknown where it went with the process
     yield _said(
@@ -196,9 +184,6 @@ def _timing(study: Study) -> Iterator[str]:
         cores=environment.cores,
         share=_percent(int(cold.sum()) / len(runs)),
     )
-
-
-def _model(study: Study) -> Iterator[str]:
     yield _said("model")
     yield _said("one_posture")
     if any(len(task.hands) > 1 for task in study.results.tasks.values()):

@@ -9,20 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.document import CellKey
 from analysis.signatures.trajectories import Trajectories
+from analysis.study import Study
 from coartic import Robot, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS, Array
 from coartic.text import json_text
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 TOLERANCE = 0.005
 """Length unit by which a joint may be off at any tick."""

@@ -7,9 +7,6 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from analysis.claims.register import Judged, Verdict
 from analysis.comparisons.paper import paper_rows
@@ -18,12 +15,10 @@ from analysis.published import published_cell
 from analysis.report.document import Bullets, DataTable
 from analysis.report.tables.common import estimate_as_printed, marked, mean_of
 from analysis.report.tables.layout import LAYOUTS
+from analysis.study import Study
 from analysis.words import typographic
 from coartic.record import Environment
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
 _VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell")
@@ -47,7 +42,7 @@ def tasks_table(study: Study) -> DataTable | None:
         if label is None:
             continue
         good, condition = study.cells[name, label].good, label.removeprefix(LEARNER)
-        learned = mean_of(good.reward.to_numpy(dtype=np.float64))
+        learned = mean_of(good.reward)
         assert learned is not None  # of the best of all means
         initial = good.initial_reward.dropna()
         paper, best = published_cell(name, condition), study.optima.get((name, "free"))

@@ -105,13 +105,12 @@ def heads(table: DataTable) -> list[str]:
 
 def texts(table: DataTable, row: Row) -> list[str]:
     """What each column shows in a row: value, SD and interval together."""
-    return [_together(own, row.values[own[0].index]) for own in by_column(table)]
-
-
-def _together(own: list[Part], value: Value) -> str:
-    first, *others = ((part, part.text(value)) for part in own)
-    small = (f"± {t}" if part.kind == "sd" else t for part, t in others if t != NONE)
-    return " ".join([first[1], *small])
+    found = []
+    for own in by_column(table):
+        shown = {part.kind: part.text(row.values[part.index]) for part in own}
+        known = {kind: t for kind, t in shown.items() if kind == "value" or t != NONE}
+        found.append(" ".join(f"± {t}" if kind == "sd" else t for kind, t in known.items()))
+    return found
 
 
 def number_text(value: float, column: Column) -> str:

@@ -10,15 +10,14 @@ from pathlib import Path
 
 from analysis.markup import words
 from analysis.report.document import CellKey, DataTable
-from analysis.report.formats.templates import template
+from analysis.report.formats.templates import on_one_line, template
 from analysis.report.numbers import ORIGINS
 from analysis.report.tables.layout import LAYOUTS
 from analysis.report.text import heads, texts
 from analysis.report.trace_file import FILE, Source, TraceFile, read_trace
 from coartic import CoarticError
-from coartic.record import Environment
 from coartic.stored import content_hash
-from coartic.text import counted, did_you_mean, one_line, shell_line
+from coartic.text import counted, did_you_mean, shell_line
 
 _COMPANIONS = {
     "SD": "SD over runs of: ",
@@ -48,11 +47,6 @@ class Trace:
         """The runs of its cells."""
         by_cell = {(source.task, source.label): source for source in self.file.sources}
         return tuple(by_cell[cell] for cell in self.cells)
-
-    @property
-    def environment(self) -> Environment:
-        """Where, when and with what results were made."""
-        return self.file.environment
 
     @property
     def folder(self) -> Path | None:
@@ -112,17 +106,13 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
 
 def trace_text(found: Trace) -> str:
     """A trace for a terminal: one fact a line, then the runs."""
-    page = template("trace.txt.jinja", counted, shell, finalize=_on_one_line)
-    return page.render(found=found, made=found.environment, folder=found.folder).rstrip("\n")
+    page = template("trace.txt.jinja", counted, shell, finalize=on_one_line)
+    return page.render(found=found, made=found.file.environment, folder=found.folder).rstrip("\n")
 
 
 def shell(command: Iterable[str | Path]) -> str:
     """A command to paste."""
     return shell_line(*command)
-
-
-def _on_one_line(value: object) -> str:
-    return one_line(str(value))
 
 
 def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[str]) -> Trace:

@@ -47,22 +47,17 @@ def write_report(
     lost = [f.id for f in document.figures() if f"{f.id}.svg" not in figures]
     if lost:
         raise ValueError(f"figures without a file: {', '.join(lost)}")
-    texts = {**_texts(document), **(extra or {})}
-    files = {f"figures/{name}": data for name, data in figures.items()}
-    files |= {name: text.encode() for name, text in texts.items()}
-    begin()
-    publish(folder, files, owner=REPORT, alone=True)
-
-
-def _texts(document: Document) -> dict[str, str]:
-    """Every text file of the report by its path in the folder."""
     texts = {
         "report.html": html(document),
         "report.md": markdown(document),
         "tables.tex": latex_inputs(document),
         "tables/runs.csv": runs_csv(document),
+        **(extra or {}),
     }
     for table in document.tables():
         texts[f"tables/{table.id}.csv"] = table_csv(table)
         texts[f"tables/{table.id}.tex"] = latex_table(table)
-    return texts
+    files = {f"figures/{name}": data for name, data in figures.items()}
+    files |= {name: text.encode() for name, text in texts.items()}
+    begin()
+    publish(folder, files, owner=REPORT, alone=True)

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
+from coartic.robot import Array
 from coartic.tables import Manifest, label_of
 
 CellKey = tuple[str, str]
@@ -40,6 +42,11 @@ class CellRuns(Cell):
     def good(self) -> pd.DataFrame:
         """The runs that have a solution."""
         return self.runs[self.runs["status"] == "ok"]
+
+    @cached_property
+    def rewards(self) -> Array:
+        """Of those runs, shape ``(n,)``."""
+        return self.good.reward.to_numpy(dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from functools import cache
 from importlib.resources import files
 from typing import NamedTuple
 
-from jinja2 import Template
 from markupsafe import Markup, escape
 
 from analysis.markup import inline
 from analysis.report.document import CellKey, Document, FigureBlock, PlayerBlock, Row
-from analysis.report.formats.templates import template
+from analysis.report.formats.templates import on_one_line, template
 from analysis.report.text import Part, by_column
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
@@ -44,7 +42,14 @@ def html(document: Document) -> str:
     script = _resource("report.js") + f"(() => {{\n{_resource('sort.js')}}})();\n"
     if players:
         script += f"(() => {{\n{_resource('player.js')}}})();\n"
-    return _page().render(
+    page = template(
+        "page.html.jinja",
+        *(inline, true_minus, by_column, small_print, cell_view, stretches, is_wide),
+        *(inlined_svg, script_data),
+        autoescape=True,
+        finalize=on_one_line,
+    )
+    return page.render(
         document=document,
         numbers={cell: number for number, cell in enumerate(document.runs, 1)},
         styles=Markup(styles),
@@ -53,21 +58,6 @@ def html(document: Document) -> str:
         most_listed=MOST_LISTED,
         most_links=MOST_LINKS,
     )
-
-
-@cache
-def _page() -> Template:
-    return template(
-        "page.html.jinja",
-        *(inline, true_minus, by_column, small_print, cell_view, stretches, is_wide),
-        *(inlined_svg, script_data),
-        autoescape=True,
-        finalize=_on_one_line,
-    )
-
-
-def _on_one_line(value: object) -> object:
-    return one_line(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
 def _resource(name: str) -> str:

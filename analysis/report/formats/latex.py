@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import re
 import textwrap
-import unicodedata
+import tomllib
 from collections.abc import Sequence
-from functools import cache
-
-from jinja2 import Template
+from pathlib import Path
 
 from analysis.markup import inline
 from analysis.methods import short_name
@@ -24,35 +22,12 @@ from analysis.report.text import Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
 
-_MATHS = dict(
-    re.findall(
-        r"(\S) (\S+)",
-        r"""
-        − - ± \pm × \times · \cdot ÷ \div ≤ \leq ≥ \geq ≠ \neq ≈ \approx ∞ \infty
-        → \rightarrow ← \leftarrow ∈ \in √ \surd ↳ \hookrightarrow ● \bullet ◐ \odot ○ \circ
-        ◌ \oslash ∫ \int ‖ \| ¼ 1/4 ½ 1/2 ¾ 3/4 ° ^{\circ} ′ ' µ \mu
-        """,
-    )
-)
-_NAMED = {
-    **{"\\": "backslash", "^": "asciicircum", "~": "asciitilde", "`": "asciigrave"},
-    **{"–": "endash", "—": "emdash", "†": "dagger", "‡": "daggerdbl", "•": "bullet"},
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_ESCAPES: dict[str, str] = _TABLE["characters"] | {
+    character: form.replace("@", said)
+    for form, pairs in _TABLE["forms"].items()
+    for character, said in re.findall(r"(\S) (\S+)", pairs)
 }
-_ESCAPES = {
-    **{mark: f"\\{mark}" for mark in "{}$&%#_"},
-    **{mark: f"{{{mark}}}" for mark in "[*"},  # \\ would read these as its own
-    **{mark: f"${command}$" for mark, command in _MATHS.items()},
-    **{mark: f"\\text{name}{{}}" for mark, name in _NAMED.items()},
-    **{"…": r"\ldots{}", "‘": "`", "’": "'", "“": "``", "”": "''"},
-    **{"\N{NO-BREAK SPACE}": "~", "\N{NARROW NO-BREAK SPACE}": r"\,", "\N{THIN SPACE}": r"\,"},
-    **{
-        raised: f"$^{{{sign}}}$" for raised, sign in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True)
-    },
-    **{
-        lowered: f"$_{{{sign}}}$" for lowered, sign in zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True)
-    },
-}
-_GREEK = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ"
 MOST_ROWS = 35
 """Of a float; a table with more is continued on the next page."""
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
@@ -81,7 +56,7 @@ def latex_table(table: DataTable) -> str:
     shown = [part for part in parts(table) if part.column.printed]
     broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
     width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
-    return _layout().render(
+    return template("table.tex.jinja", **LATEX).render(
         id=table.id,
         caption=_spans(table.caption),
         kinds="".join(
@@ -96,11 +71,6 @@ def latex_table(table: DataTable) -> str:
         broken=broken,
         long=long,
     )
-
-
-@cache
-def _layout() -> Template:
-    return template("table.tex.jinja", **LATEX)
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
@@ -144,9 +114,6 @@ def latex_text(text: str) -> str:
 def _character(character: str) -> str:
     if character in _ESCAPES:
         return _ESCAPES[character]
-    if character in _GREEK:
-        letter = unicodedata.name(character).split()[-1].replace("LAMDA", "LAMBDA")
-        return f"$\\{letter.lower() if character.islower() else letter.capitalize()}$"
     # Letters of Latin-1 and Latin Extended-A are in T1, but for a few.
     if character.isascii() or ("À" <= character <= "ž" and character not in "ĦħĸĿŀŊŋŦŧ"):
         return character

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cache
-
-from jinja2 import Template
 
 from analysis.markup import markdown as inline_markdown
 from analysis.markup import markdown_text
@@ -21,12 +18,8 @@ def markdown(document: Document, tables: str = "tables") -> str:
     ``tables``: folder beside it with each table as CSV, which the tables name; empty where
     there is none.
     """
-    return _page().render(document=document, tables=tables).rstrip("\n") + "\n"
-
-
-@cache
-def _page() -> Template:
-    return template("page.md.jinja", markdown_text, spans, parts, shown_texts, table_line)
+    page = template("page.md.jinja", markdown_text, spans, parts, shown_texts, table_line)
+    return page.render(document=document, tables=tables).rstrip("\n") + "\n"
 
 
 def spans(text: str) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, get_args
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from analysis.report.document import Block
+from coartic.text import one_line
 
 LATEX = {
     **{"block_start_string": "<%", "block_end_string": "%>"},
@@ -17,8 +19,9 @@ LATEX = {
 """Settings for templates of LaTeX, whose own are braces and per cent signs."""
 
 
+@cache
 def template(name: str, *filters: Callable[..., Any], **settings: Any) -> Template:
-    """A template of this folder: tags on lines of their own leave none.
+    """A template of this folder: tags on lines of their own leave none. Read once.
 
     Functions are ``filters`` by their names, kinds of blocks tests by theirs in small letters;
     ``settings`` are further ones of jinja2.Environment.
@@ -36,3 +39,8 @@ def template(name: str, *filters: Callable[..., Any], **settings: Any) -> Templa
         kind.__name__.lower(): kind.__instancecheck__ for kind in get_args(Block)
     }
     return environment.get_template(name)
+
+
+def on_one_line(value: object) -> object:
+    """What is filled in as text on one line, but what is markup already."""
+    return value if hasattr(value, "__html__") else one_line(str(value))

@@ -5,22 +5,23 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from analysis.comparisons.pairs import PairRow
+from analysis.comparisons.targets import SHARES
 from analysis.markup import code, escaped
-from analysis.report.document import Block, Bullets, Document, Prose, Section
+from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from analysis.report.tables.common import marked, table_ids
-from analysis.report.tables.layout import LAYOUTS
+from analysis.report.tables.layout import LAYOUTS, Layout
 from analysis.report.tables.methods import overall_table
-from analysis.report.tables.pairs import cost_table, pairwise_table, reading_of_pairs
 from analysis.statistics.estimates import LEVEL, RESAMPLES
+from analysis.study import Study
+from analysis.words import typographic
 from coartic.record import SEARCH
 
-if TYPE_CHECKING:
-    from analysis.study import Study
-
-_OTHERS = {"conditions": "other conditions", "variant": "its variants", "method": "methods"}
+_OTHERS = {"conditions": "other conditions", "method": "methods", "variant": "its variants"}
+"""What a condition is compared with, by kind of pair, in the order of the tables."""
 
 
 def comparisons_document(study: Study) -> Document:
@@ -50,18 +51,13 @@ def outcome(rows: Sequence[PairRow]) -> Iterator[str]:
             f"**Too few runs to tell anything apart: {len(tested)} permutation tests of so many "
             f"runs have an adjusted p of {min(least, 1.0):.2g} at least.**"
         )
-    groups: dict[tuple[str, str], list[PairRow]] = {}
+    groups: dict[tuple[str, str], dict[str, list[str]]] = {}
     for row in rows:
-        groups.setdefault((row.kind, row.first), []).append(row)
-    for (kind, first), own in groups.items():
-        found = {
-            verdict: [row.second for row in own if _verdict(row) == verdict]
-            for verdict in _VERDICTS
-        }
-        words = "; ".join(
-            f"{verdict} {', '.join(names)}" for verdict, names in found.items() if names
-        )
-        yield escaped(f"{first} and {_OTHERS[kind]}: {words}.")
+        own = groups.setdefault((row.kind, row.first), {verdict: [] for verdict in _VERDICTS})
+        own[_verdict(row)].append(row.second)
+    for (kind, first), found in groups.items():
+        words = (f"{verdict} {', '.join(names)}" for verdict, names in found.items() if names)
+        yield escaped(f"{first} and {_OTHERS[kind]}: {'; '.join(words)}.")
 
 
 _VERDICTS = _HIGHER, _LOWER, _NOT_APART, _UNTESTED = (
@@ -112,3 +108,74 @@ def _across(study: Study) -> Iterator[Block]:
     left = escaped(", ".join(name for name in others if not name.startswith(SEARCH)))
     if left:
         yield Prose((f"Not run on all of these tasks: {left}.",))
+
+
+def pairwise_table(study: Study, task: str) -> DataTable | None:
+    """The learner against the others on one task: differences, tests, effect sizes."""
+    return _pairs(study, task, LAYOUTS["compared"])
+
+
+def cost_table(study: Study, task: str) -> DataTable | None:
+    """The same pairs: what the second spends and is told, and how many runs it would take."""
+    best = study.optima.get((task, "free"))
+    ticks = ", ".join(f"{abs(share * best.reward):.1f}" for share in SHARES) if best else ""
+    return _pairs(study, task, LAYOUTS["costs"], ticks=f" ({ticks} ticks)" if ticks else "")
+
+
+def reading_of_pairs(study: Study) -> tuple[str, ...]:
+    """Who is compared with whom, and what the numbers of the tables do not say."""
+    return LAYOUTS["compared"].read(pairing=_pairing(study))
+
+
+def _pairing(study: Study) -> str:
+    """What sharing seeds does to these runs."""
+    known = [row for row in study.pair_rows if row.pairs and not np.isnan(row.correlation)]
+    parts = []
+    for of_variants, text in ((True, "variants of one condition"), (False, "other pairs")):
+        rows = [row for row in known if (row.kind == "variant") == of_variants]
+        if rows:
+            paired, alone = (
+                np.array([getattr(row, f"{of}high") - getattr(row, f"{of}low") for row in rows])
+                for of in ("", "independent_")
+            )
+            median = np.median([row.correlation for row in rows])
+            correlation = typographic(f"{median:.2f}")
+            parts.append(
+                f"{text} correlate by {correlation} (median of {len(rows)}), their "
+                f"intervals are {np.nanmedian(paired / alone):.2f} times as wide as unpaired ones"
+            )
+    if not parts:
+        return ""
+    return (
+        " A shared seed gives the same random numbers, which methods that draw them differently "
+        "put to different use, so that it pairs little but variants of the learner: here "
+        f"{', '.join(parts)}. The paper's design is unpaired, and so are the tests."
+    )
+
+
+def _pairs(study: Study, task: str, layout: Layout, **facts: str) -> DataTable | None:
+    """Conditions, methods, variants; of each the best second first."""
+    pairs = sorted(
+        (row for row in study.pair_rows if row.task == task),
+        key=lambda row: (
+            list(_OTHERS).index(row.kind),
+            row.first,
+            -np.nan_to_num(row.mean_second, nan=-np.inf),
+        ),
+    )
+    rows = [
+        layout.row(
+            f"{pair.first} - {pair.second}", pair, ((task, pair.first), (task, pair.second))
+        )
+        for pair in pairs
+    ]
+    failed = escaped(", ".join(_failed(pairs)))
+    notes = (f"Runs without a solution are left out: {failed}.",) if failed else ()
+    return layout.table(rows, table_ids(study)[task], notes=notes, task=escaped(task), **facts)
+
+
+def _failed(pairs: list[PairRow]) -> Iterator[str]:
+    """Methods with runs that have no solution, each once."""
+    found = {pair.first: (pair.n_first, pair.runs_first) for pair in pairs}
+    found |= {pair.second: (pair.n_second, pair.runs_second) for pair in pairs}
+    return (f"{name} solved {n} of {runs}" for name, (n, runs) in found.items() if n < runs)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from analysis.report.document import Block, Document, Prose, Section
 from analysis.report.tables.common import marked, table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
 from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.signatures import definitions_table, signatures_tables
 from analysis.signatures.rows import NO_RUN
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 
 def signatures_document(study: Study) -> Document:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from analysis.published import Summary
@@ -12,10 +13,8 @@ from analysis.report.document import Estimate
 from analysis.report.tables.layout import finite
 from analysis.statistics.estimates import SEED, mean
 from analysis.statistics.spread import sd
+from analysis.study import Study
 from analysis.words import slugs
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 
 def table_ids(study: Study) -> dict[str, str]:
@@ -27,9 +26,10 @@ def mean_of(rewards: Any) -> Estimate | None:
     """Mean with SD and BCa interval, as far as there are any."""
     if not len(rewards):
         return None
-    found = mean(rewards, seed=SEED)
+    values = np.asarray(rewards, dtype=np.float64)
+    found = mean(values, seed=SEED)
     ends = () if math.isnan(found.low) else (found.low, found.high)
-    return Estimate(found.estimate, finite(sd(rewards)), *ends)
+    return Estimate(found.estimate, finite(sd(values)), *ends)
 
 
 def estimate_as_printed(published: Summary | None) -> Estimate | None:

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING
 
 from analysis.markup import escaped
 from analysis.report.document import CellKey, Column, DataTable, Row, Value
@@ -25,10 +24,8 @@ from analysis.report.tables.signatures import (
 from analysis.signatures.locus import families
 from analysis.signatures.register import CONTEXTS, FAMILIES, REGISTER
 from analysis.signatures.rows import Place, SignatureRow
+from analysis.study import Study
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 MOST_CONTEXTS = 120
 """Rows of a table that a page shows at once."""

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.markup import escaped
 from analysis.report.document import DataTable, Row
 from analysis.report.tables.common import marked, mean_of, table_ids
 from analysis.report.tables.layout import LAYOUTS
+from analysis.study import Study
 from analysis.words import true_minus
 from coartic.method import Information
 from coartic.record import SEARCH
 from coartic.text import counted
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _METHODS, _OVERALL = LAYOUTS["methods"], LAYOUTS["across-tasks"]
 _WHOLE = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solver_iterations")
@@ -56,9 +51,9 @@ def methods_table(study: Study, task: str) -> DataTable | None:
 
 def _method_row(study: Study, row: MethodRow) -> Row:
     key = row.task, row.label
-    rewards = study.cells[key].good.reward.to_numpy(dtype=np.float64)
+    reward = mean_of(study.cells[key].good.reward)
     whole = {name: _whole(getattr(row, name)) for name in _WHOLE}
-    return _METHODS.row(row.label, row, (key,), method=row.label, reward=mean_of(rewards), **whole)
+    return _METHODS.row(row.label, row, (key,), method=row.label, reward=reward, **whole)
 
 
 def _optimum(study: Study, task: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from analysis.published import (
@@ -19,10 +18,8 @@ from analysis.report.document import DataTable, RestsOn, Row, Value
 from analysis.report.tables.common import counts, estimate_as_printed, marked, mean_of
 from analysis.report.tables.layout import LAYOUTS, Layout, with_interval
 from analysis.statistics.equivalence import MARGIN
+from analysis.study import Study
 from analysis.words import typographic
-
-if TYPE_CHECKING:
-    from analysis.study import Study
 
 _CELLS, _SEQUENCES = LAYOUTS["published-and-ours"], LAYOUTS["by-hand-sequence"]
 

@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from analysis.markup import escaped
 from analysis.report.document import Column, DataTable, Row, Value
@@ -19,9 +19,7 @@ from analysis.report.tables.layout import LAYOUTS, with_interval
 from analysis.signatures.register import REGISTER
 from analysis.signatures.rows import Signature, SignatureRow
 from analysis.statistics.hypotheses import holm
-
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 _MAIN, _FURTHER = "main-signatures", "further-goals"
 """Tables of the same signatures: at the first goal or none, and at the others."""
