@@ -141,11 +141,9 @@ def _check_plan(path: Path, plan: Plan) -> None:
         method = plan.methods[cell.method]
         # What a suite sets: parameters of the cell, and trials, which are the suite's.
         given = {k: v for k, v in cell.complete.items() if k == "trials"} | cell.parameters
+        runs = plan.runs if method.stochastic else 1
         laws = (
-            (
-                len(cell.run_ids) == (plan.runs if method.stochastic else 1),
-                "has another number of runs",
-            ),
+            (len(cell.run_ids) == runs, "has another number of runs"),
             (cell.variant == variant_of(cell.parameters, method.defaults), "has another variant"),
             (
                 method.origin != BUILT_IN or cell.complete == method.defaults | given,

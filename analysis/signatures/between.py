@@ -121,15 +121,10 @@ class Members:
     of_task: Mapping[str, Trajectories]
     """Those that it did, in the order of the family."""
 
-    @property
-    def first(self) -> Trajectories:
-        """Those of its first task."""
-        return next(iter(self.of_task.values()))
-
 
 def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
     """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
-    family, task = members.family, members.first.task
+    family, task = members.family, next(iter(members.of_task.values())).task
     position = dict(zip(family.tasks, family.positions.tolist(), strict=True))
     beside = {family.moving - 1, family.moving + 1} & set(range(1, len(task.goals) + 1))
     for goal, hand in product(sorted(beside), HANDS):
