@@ -26,7 +26,7 @@ from analysis.comparisons.progress import best_so_far
 from analysis.comparisons.targets import targets
 from analysis.results.folder import CellKey, CellRuns, Results, load_results
 from analysis.results.optima import optima
-from analysis.signatures.study_rows import signature_rows, signatures_table
+from analysis.signatures.register import signature_rows, signatures_table
 from analysis.signatures.trajectories import all_trajectories
 from coartic import Task
 from coartic.text import counted, did_you_mean
@@ -64,7 +64,7 @@ class Study:
         """The tasks as they were run, by name."""
         return self.results.tasks
 
-    @property
+    @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
         """Rows of the runs, in the order of the plan."""
         return self.results.cells

@@ -14,9 +14,8 @@ from analysis.claims import (
     general,
     judge,
 )
-from analysis.claims.judges import reach
-from analysis.claims.judges.presence import REPRESENTATIVES
-from analysis.claims.judges.reach import shortest_reach
+from analysis.claims.general import shortest_reach
+from analysis.claims.presence import REPRESENTATIVES
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
 from analysis.report.pages.claims import claims_document
@@ -42,7 +41,7 @@ def test(p):
 
 def planted(holds, *p, place="here", ids=("r",), against=None):
     def decide(data):
-        data.note(ids)
+        data.run_ids.extend(ids)
         contrary = None if against is None else tuple(map(test, against))
         return Finding(holds, "planted", tuple(map(test, p)), contrary)
 
@@ -384,7 +383,7 @@ def test_the_shortest_reach():
 
 def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
     """Goal 2 of two-armed task 2 is 13 % off, which the sum over its subtasks would hide."""
-    monkeypatch.setattr(reach, "STARTS", 2)
+    monkeypatch.setattr(general, "STARTS", 2)
     study = Study(planted_results(seven([9, 10, 11]), tmp_path))
     claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
     assert verdict_of(claims[0], study).verdict == "supported"
@@ -729,7 +728,7 @@ def test_the_contrary_of_one_test_is_not_that_of_another():
     """Runs without spread that are as claimed say nothing against it."""
 
     def decide(data):
-        data.note(("r",))
+        data.run_ids.append("r")
         return Finding(False, "", (
             bootstrap_test([5.0, 5.0, 5.0], 0.0, seed=0), bootstrap_test([-9, 8, 0.9], 0, seed=0),
         ))  # fmt: skip

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from analysis.published import Summary
 from analysis.signatures.context import context_dependence, distance, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, synergy
@@ -246,7 +245,7 @@ def test_samples_of_equal_values(n):
     assert permutation_test(values, values[:3], "two-sided", seed=0, resamples=99).p == 1
     for agreed in (
         bootstrap_equivalence(values, 0.1, 0.01, seed=0, resamples=99),
-        difference(values, Summary(0.1, None, 20), margin=0.01),
+        difference(values, 0.1, None, 20, margin=0.01),
     ):
         assert agreed.low == agreed.high == agreed.estimate == 0
         assert agreed.verdict == "equivalent"

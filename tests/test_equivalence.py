@@ -8,14 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.published import Summary
 from analysis.statistics.equivalence import bootstrap_equivalence, difference, shares
 
 
 def test_interval_is_welchs():
     rng = np.random.default_rng(13)
     ours, theirs = rng.normal(-505, 5, 20), rng.normal(-502, 3, 15)
-    found = difference(ours, Summary(theirs.mean(), theirs.std(ddof=1), 15))
+    found = difference(ours, theirs.mean(), theirs.std(ddof=1), 15)
     expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
     assert found.estimate == pytest.approx(ours.mean() - theirs.mean())
@@ -23,7 +22,7 @@ def test_interval_is_welchs():
 
 def test_interval_against_an_exact_value_is_students():
     ours = np.random.default_rng(14).normal(-484, 4, 12)
-    found = difference(ours, Summary(-484, None, 20))
+    found = difference(ours, -484, None, 20)
     expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low + 484, expected.high + 484))
 
@@ -34,23 +33,23 @@ def test_interval_against_an_exact_value_is_students():
 )
 def test_verdicts(shift, spread, verdict):
     ours = -500 + shift + spread * np.linspace(-1, 1, 20)
-    assert difference(ours, Summary(-500, 1.0, 20)).verdict == verdict
+    assert difference(ours, -500, 1.0, 20).verdict == verdict
 
 
 def test_margin():
-    assert difference([-500.0] * 2, Summary(-500, 1.0, 20)).margin == 5.0
+    assert difference([-500.0] * 2, -500, 1.0, 20).margin == 5.0
 
 
 def test_edge_cases_of_the_difference():
-    assert difference([-500.0], Summary(-500, 1.0, 20)).verdict == "undecided"
-    same = difference([-500.0, -500.0], Summary(-500, None, 20))
+    assert difference([-500.0], -500, 1.0, 20).verdict == "undecided"
+    same = difference([-500.0, -500.0], -500, None, 20)
     assert (same.low, same.high, same.verdict) == (0.0, 0.0, "equivalent")
 
 
 def test_p_is_of_two_one_sided_tests():
     rng = np.random.default_rng(15)
     ours, theirs = rng.normal(-503, 5, 20), rng.normal(-502, 3, 15)
-    found = difference(ours, Summary(theirs.mean(), theirs.std(ddof=1), 15), margin=4.0)
+    found = difference(ours, theirs.mean(), theirs.std(ddof=1), 15, margin=4.0)
     above = stats.ttest_ind(ours + 4, theirs, equal_var=False, alternative="greater").pvalue
     below = stats.ttest_ind(ours - 4, theirs, equal_var=False, alternative="less").pvalue
     assert found.p == pytest.approx(max(above, below))
@@ -63,7 +62,7 @@ def test_bootstrap_of_many_normal_values_is_welchs():
     found = bootstrap_equivalence(a, b, 0.6, seed=1)
     expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.03)
-    published = difference(a, Summary(b.mean(), b.std(ddof=1), 150), margin=0.6)
+    published = difference(a, b.mean(), b.std(ddof=1), 150, margin=0.6)
     assert found.p == pytest.approx(published.p, abs=0.02)
 
 
@@ -104,7 +103,7 @@ def test_arguments_that_cannot_be():
     with pytest.raises(ValueError, match="margin"):
         bootstrap_equivalence([1.0, 2, 3], 0.0, 0.0, seed=0)
     with pytest.raises(ValueError, match="margin"):
-        difference([1.0, 2.0], Summary(1, 1, 20), margin=-1)
+        difference([1.0, 2.0], 1, 1, 20, margin=-1)
     with pytest.raises(ValueError, match="too few"):
         bootstrap_equivalence([1.0, 2, 3], 0.0, 1.0, seed=0, resamples=20)
 

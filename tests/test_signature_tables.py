@@ -15,7 +15,7 @@ from analysis.report.tables.contexts import contexts_table, slopes_tables
 from analysis.report.tables.layout import LAYOUTS
 from analysis.report.tables.signatures import definitions_table, signatures_tables
 from analysis.report.text import number_text
-from analysis.signatures import study_rows, within
+from analysis.signatures import register, within
 from analysis.signatures.register import REGISTER
 from analysis.signatures.rows import Place, Shown, Signature
 from analysis.study import Study
@@ -195,7 +195,7 @@ def test_a_signature_is_a_measure_and_a_row(traced, monkeypatch):
         name="length", measure=length, unit="ticks", extent="ticks", meaning="how long",
         heading="length", table="main-signatures",
     )  # fmt: skip
-    monkeypatch.setattr(study_rows, "WITHIN", (*study_rows.WITHIN, row))
+    monkeypatch.setattr(register, "WITHIN", (*register.WITHIN, row))
     monkeypatch.setitem(REGISTER, "length", row)
     study = Study(traced.results)
     shown = by_column(tables_of(study, "ascending")["main-signatures"])[EC1]["length"]

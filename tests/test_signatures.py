@@ -38,17 +38,17 @@ from analysis.signatures.paths import (
     spectral_arc_length,
     turning_angles,
 )
-from analysis.signatures.recruitment import best_sequences, entropy, isolated_agreement
 from analysis.signatures.register import REGISTER
 from analysis.signatures.rows import Place
 from analysis.signatures.subtasks import (
     change_from,
     excess,
+    isolated_agreement,
     isolated_reaches,
     sacrifice_p,
     sacrifices,
 )
-from analysis.signatures.trajectories import Trajectories
+from analysis.signatures.trajectories import Trajectories, best_sequences, entropy
 from analysis.statistics import intervals
 from analysis.study import Study
 from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory

@@ -22,7 +22,6 @@ import numpy as np
 from scipy import stats
 
 from analysis.calibration.simulation import Check, Draw, simulate
-from analysis.published import Summary
 from analysis.statistics import across_tasks, estimates
 from analysis.statistics.equivalence import Equivalence, bootstrap_equivalence, difference
 from analysis.statistics.estimates import LEVEL, Inference
@@ -61,6 +60,10 @@ class Population:
     def sample(self, runs: int = RUNS) -> Sample:
         """So many rewards."""
         return lambda rng: self.draw(rng, runs)
+
+    def task(self, rng: np.random.Generator) -> dict[str, Array]:
+        """Rewards of a task by itself."""
+        return {self.name: self.draw(rng, RUNS)}
 
     def centred(self, rng: np.random.Generator) -> Array:
         """Rewards less their true mean."""
@@ -168,26 +171,14 @@ def _intervals(*every: Population) -> Iterator[Check]:
         errs, samples = _misses(each.mean - normal.mean), (each.sample(), normal.sample())
         yield _check(subject, data, errs, estimates.difference_of_means, *samples)
         subject, errs = "BCa interval of an interquartile mean", _misses(each.middle)
-        yield _check(subject, each.name, errs, _middle, each.sample())
+        yield _check(subject, each.name, errs, across_tasks.interquartile_mean, each.task)
     for theta in (0.5, 0.8, 0.95, 0.99):
         shift = math.sqrt(2) * float(stats.norm.ppf(theta))
-        yield _check(
-            "interval of a probability of improvement",
-            f"normal, {theta}",
-            _misses(theta),
-            estimates.probability_of_improvement,
-            partial(_normal, shift),
-            partial(_normal, 0.0),
-        )
+        subject = "interval of a probability of improvement"
+        draws = [partial(np.random.Generator.normal, loc=mean, size=RUNS) for mean in (shift, 0)]
+        infer = estimates.probability_of_improvement
+        yield _check(subject, f"normal, {theta}", _misses(theta), infer, *draws)
     yield _across(every)
-
-
-def _middle(values: Array, **options: Any) -> Inference:
-    return across_tasks.interquartile_mean({"task": values}, **options)
-
-
-def _normal(mean: float, rng: np.random.Generator) -> Array:
-    return rng.normal(mean, 1, RUNS)
 
 
 def _across(tasks: tuple[Population, ...]) -> Check:
@@ -212,8 +203,7 @@ def _equivalences(*every: Population) -> Iterator[Check]:
     normal = every[0]
 
     def beside_summary(a: Array, b: Array, **_: object) -> Equivalence:
-        published = Summary(float(b.mean()), float(b.std(ddof=1)), len(b))
-        return difference(a, published, margin=MARGIN)
+        return difference(a, float(b.mean()), float(b.std(ddof=1)), len(b), margin=MARGIN)
 
     def agrees(found: Equivalence) -> bool:
         return found.verdict == "equivalent"

@@ -20,8 +20,8 @@ from analysis.calibration.simulation import Check, Draw, simulate
 from analysis.signatures.context import lead_time, permutation_p
 from analysis.signatures.locus import locus_slopes, slope_norm
 from analysis.signatures.manifold import movable, subspaces, synergy
-from analysis.signatures.recruitment import entropy
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifice_p, sacrifices
+from analysis.signatures.trajectories import entropy
 from analysis.statistics import intervals
 from analysis.statistics.intervals import Interval
 from coartic import Movement, corrective_trial, execute, hand_sequences, load_task
@@ -212,7 +212,7 @@ def _context(
     scatter: Draw, shift: Array, second: int, basis: Array | None, rng: np.random.Generator
 ) -> bool:
     groups = scatter(rng, 20) + shift, scatter(rng, second)
-    return permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA
+    return bool(permutation_p(*groups, rng, basis=basis, resamples=RESAMPLES) <= ALPHA)
 
 
 def _lead(scatter: Draw, shift: Array, rng: np.random.Generator) -> bool:

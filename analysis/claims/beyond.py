@@ -7,22 +7,17 @@ import math
 from dataclasses import replace
 
 from analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
-from analysis.claims.evidence import by_optimum, estimate_of, measured, of_either_optimum
+from analysis.claims.evidence import by_optimum, estimate_of, layout, measured
 from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import Summary, published_cell
-from analysis.report.document import Column, Estimate, RestsOn, Row
+from analysis.report.document import Estimate, RestsOn
 from analysis.results.optima import OtherArm
 from analysis.statistics.equivalence import MARGIN, difference
 from analysis.statistics.estimates import SEED, difference_of_means, mean
 from analysis.words import NONE, interval
-
-_EQUIVALENT = f"within ± {MARGIN:.0%}"
-
-
-_CELL = (Column("task", "task"), Column("condition", "condition"))
 
 
 @decides("learned-rewards-as-printed")
@@ -38,37 +33,30 @@ def _as_printed(data: Data) -> Finding:
             own = rewards_of(data.learned(task, condition, hands))
             if summary is None or not len(own):
                 continue
-            apart = difference(own, summary)
+            apart = difference(own, summary.mean, summary.sd, summary.runs)
             verdict = None if math.isnan(apart.low) else apart.verdict
-            share = apart.estimate / -summary.mean
-            values = (
-                *(task, condition, name, Estimate(summary.mean, digits=summary.digits)),
-                summary.runs,
-                *(float(own.mean()), len(own), estimate_of(apart), share, verdict),
+            row = layout("learned-rewards-as-printed").row(
+                f"{task} {condition} {name}",
+                cells=[(task, LEARNER + condition)],
+                task=task,
+                condition=condition,
+                hands=name,
+                printed=Estimate(summary.mean, digits=summary.digits),
+                printed_runs=summary.runs,
+                ours=float(own.mean()),
+                our_runs=len(own),
+                difference=estimate_of(apart),
+                share=apart.estimate / -summary.mean,
+                verdict=verdict,
             )
-            key = (task, LEARNER + condition)
             sources: dict[str, tuple[RestsOn, ...]] = {
                 "printed": (summary.source,),
                 "printed_runs": (summary.source_of_runs,),
             }
-            rows.append(Row(f"{task} {condition} {name}", values, (key,), rests_on=sources))
+            rows.append(replace(row, rests_on=sources))
             if hands is None:
                 verdicts.append(f"{task} {condition} {verdict or NONE}")
-    both: tuple[RestsOn, ...] = ("runs", "paper")
-    columns = (
-        *_CELL,
-        Column("hands", "hands"),
-        Column("printed", "printed", "number", digits=1, rests_on=("paper",)),
-        Column("printed_runs", "runs", "number", rests_on=("paper",)),
-        Column("ours", "ours", "number", digits=1, rests_on=("runs",)),
-        Column("our_runs", "runs", "number", rests_on=("runs",)),
-        Column("difference", "difference", "number", digits=1, rests_on=both),
-        Column("share", "of the printed", "share", digits=1, rests_on=both),
-        Column("verdict", _EQUIVALENT, rests_on=both),
-    )
-    evidence = "; ".join(verdicts)
-    title = "Learned rewards as printed"
-    return measured("learned-rewards-as-printed", evidence, title, columns, rows)
+    return measured("learned-rewards-as-printed", "; ".join(verdicts), rows, margin=MARGIN)
 
 
 @decides("distance-to-optimum")
@@ -87,18 +75,14 @@ def _to_the_optimum(data: Data) -> Finding:
             high=best.reward - reward.low,
         )
         share = gap.estimate / -best.reward
-        values = by_optimum(arm, best.reward, estimate_of(gap), share)
-        key = (task, LEARNER + condition)
-        rows.append(Row(f"{task} {condition}", (task, condition, *values), (key,)))
+        values = by_optimum(arm, optimum=best.reward, gap=estimate_of(gap), gap_share=share)
+        cells = [(task, LEARNER + condition)]
+        row = layout("distance-to-optimum").row(
+            f"{task} {condition}", cells=cells, task=task, condition=condition, **values
+        )
+        rows.append(row)
         shares.append(f"{task} {condition} {share:.1%}")
-    both: tuple[RestsOn, ...] = ("runs", "optimum")
-    columns = of_either_optimum(
-        Column("optimum", "optimum", "number", rests_on=("optimum",)),
-        Column("gap", "from it", "number", "ticks", digits=1, rests_on=both),
-        Column("gap_share", "of it", "share", digits=1, rests_on=both),
-    )
-    evidence, title = "; ".join(shares), "Distance to the optimum"
-    return measured("distance-to-optimum", evidence, title, (*_CELL, *columns), rows)
+    return measured("distance-to-optimum", "; ".join(shares), rows)
 
 
 _PROPOSALS = {
@@ -118,15 +102,17 @@ def _proposals(data: Data) -> Finding:
         cells = tuple(
             (task, f"{LEARNER}{name}") for name in (condition, f"{condition}-{proposal}")
         )
-        values = (task, condition, change, estimate_of(gain))
-        rows.append(Row(f"{task} {condition} {proposal}", values, cells))
+        row = layout("proposals").row(
+            f"{task} {condition} {proposal}",
+            cells=cells,
+            task=task,
+            condition=condition,
+            change=change,
+            gain=estimate_of(gain),
+        )
+        rows.append(row)
         gains.append(f"{task} {change.split()[0]} {interval(gain)}")
-    columns = (
-        *_CELL,
-        Column("change", "change"),
-        Column("gain", "gain in reward", "number", digits=1, rests_on=("runs",)),
-    )
-    return measured("proposals", "; ".join(gains), "Proposals", columns, rows)
+    return measured("proposals", "; ".join(gains), rows)
 
 
 @decides("absent-without-looking-ahead")

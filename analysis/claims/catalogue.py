@@ -11,13 +11,14 @@ import pandas as pd
 from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     beyond,
     coarticulation,
+    costs,
     general,
     one_armed,
+    presence,
     two_armed,
 )
 from analysis.claims.data import Data, MissingError
-from analysis.claims.judges import costs, hands, presence, resemblance  # noqa: F401
-from analysis.claims.register import Claim, Finding, Judged
+from analysis.claims.register import Claim, Judged
 from analysis.claims.statements import JUDGED, STATEMENTS
 from analysis.statistics.hypotheses import holm
 
@@ -34,8 +35,7 @@ _COLUMNS = (
 
 def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
     """Every claim with its verdict, p-values corrected over all of them (Holm)."""
-    data = Data(study)
-    found = [_seen(claim, data) for claim in claims]
+    found = [_seen(claim, Data(study)) for claim in claims]
     adjusted = holm([entry.p for entry in found]), holm([entry.contrary_p for entry in found])
     return [
         replace(entry, adjusted_p=p, adjusted_contrary_p=contrary)
@@ -44,13 +44,12 @@ def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
 
 
 def _seen(claim: Claim, data: Data) -> Judged:
-    data.forget()
     try:
         finding = claim.judge(data)
     except MissingError as missing:
-        lacking = Finding(None, f"not judged: {missing}")
-        return Judged(**vars(lacking), claim=claim, run_ids=(), sources=())
-    return Judged(**vars(finding), claim=claim, run_ids=data.run_ids, sources=data.others)
+        return Judged(None, f"not judged: {missing}", claim=claim)
+    run_ids, sources = (tuple(dict.fromkeys(read)) for read in (data.run_ids, data.others))
+    return Judged(**vars(finding), claim=claim, run_ids=run_ids, sources=sources)
 
 
 def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
@@ -63,8 +62,7 @@ def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
             **vars(entry.claim),
             **vars(entry),
             "verdict": entry.verdict,
-            "p": entry.p,
-            "contrary_p": entry.contrary_p,
+            **{"p": entry.p, "contrary_p": entry.contrary_p},
             "runs": " ".join(entry.run_ids),
             "sources": ", ".join(entry.sources),
         }

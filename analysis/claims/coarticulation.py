@@ -13,7 +13,7 @@ from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
-from analysis.signatures.recruitment import isolated_agreement
+from analysis.signatures.subtasks import isolated_agreement
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.hypotheses import share_test

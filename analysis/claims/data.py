@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import TOLD
+from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
-from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.rows import SignatureRow
-from analysis.signatures.trajectories import Trajectories
+from analysis.signatures.trajectories import Trajectories, best_sequences
 from analysis.statistics.estimates import FEWEST
 from coartic import Execution, Task
 from coartic.method import Information
@@ -65,32 +64,14 @@ class MissingError(Exception):
 
 @dataclass
 class Data:
-    """A results folder as the claims read it."""
+    """A results folder as one claim reads it."""
 
     study: Study
-    _runs: list[str] = field(default_factory=list)
-    _others: list[str] = field(default_factory=list)
+    run_ids: list[str] = field(default_factory=list)
+    """Runs read so far, some of them more than once."""
+    others: list[str] = field(default_factory=list)
+    """What else was read."""
     _cells: list[tuple[str, str]] = field(default_factory=list)
-
-    @property
-    def run_ids(self) -> tuple[str, ...]:
-        """Runs read since :meth:`forget`."""
-        return tuple(dict.fromkeys(self._runs))
-
-    @property
-    def others(self) -> tuple[str, ...]:
-        """What else was read since :meth:`forget`."""
-        return tuple(dict.fromkeys(self._others))
-
-    def forget(self) -> None:
-        """Begin a new record of what is read."""
-        self._runs.clear()
-        self._others.clear()
-        self._cells.clear()
-
-    def note(self, run_ids: tuple[str, ...]) -> None:
-        """Record runs as read."""
-        self._runs += run_ids
 
     def recorded(
         self, read: Callable[[Data, str], Read | None], method: str
@@ -131,8 +112,13 @@ class Data:
                 raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}")
         self._cells.append((task, method))
         found = cell.good if hands is None else cell.good[cell.good.hands == hands]
-        self.note(tuple(found.run_id))
+        self.run_ids.extend(found.run_id)
         return found
+
+    def row(self, task: str, method: str) -> MethodRow:
+        """The row of :meth:`runs` in the table of methods."""
+        self.runs(task, method)
+        return self.study.method_rows[task, method]
 
     def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
         """:meth:`runs` of the paper's learner."""
@@ -193,7 +179,7 @@ class Data:
         execution = Trajectories(self.task(name), "", "", ()).initial
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
-        self._others.append(f"the corrective process on {name}")
+        self.others.append(f"the corrective process on {name}")
         return execution
 
     def sequences(self, task: str) -> dict[str, float]:
@@ -204,7 +190,7 @@ class Data:
             raise MissingError(
                 f"this folder has no rewards of the corrective process alone on {task}"
             )
-        self._others.append("sequences.parquet")
+        self.others.append("sequences.parquet")
         rewards = own.reward.to_numpy(dtype=np.float64, na_value=np.nan)
         return dict(zip(map(str, own.hands), rewards.tolist(), strict=True))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.claims.register import Finding
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.report.document import DataTable, Estimate, Row, Value
+from analysis.report.tables.layout import LAYOUTS, Layout
 from analysis.results.optima import ARMS, OtherArm
 from analysis.statistics.estimates import SEED, Inference, mean
 from analysis.statistics.hypotheses import bootstrap_test
@@ -31,17 +33,17 @@ def all_hold(tests: Sequence[Inference], parts: Sequence[str], before: str = "")
     return Finding(seen, before + "; ".join(parts), tuple(tests))
 
 
-def measured(
-    claim: str,
-    evidence: str,
-    title: str,
-    columns: tuple[Column, ...],
-    rows: Sequence[Row],
-) -> Finding:
-    """A finding that judges nothing: a sentence and a table."""
-    name, caption = f"evidence-{claim}", f"{title} ({claim})."
-    table = DataTable(name, caption, columns, tuple(rows)) if rows else None
-    return Finding(None, evidence, table=table)
+def measured(claim: str, evidence: str, rows: Sequence[Row], **facts: float) -> Finding:
+    """A finding that judges nothing: a sentence and a table, with ``facts`` in its words."""
+    of = layout(claim)
+    columns = (replace(column, header=column.header.format(**facts)) for column in of.columns)
+    table = DataTable(of.name, of.caption.format(**facts), tuple(columns), tuple(rows))
+    return Finding(None, evidence, table=table if rows else None)
+
+
+def layout(claim: str) -> Layout:
+    """What the table of its evidence says."""
+    return LAYOUTS[f"evidence-{claim}"]
 
 
 def estimate_of(found: Inference) -> Estimate:
@@ -51,21 +53,7 @@ def estimate_of(found: Inference) -> Estimate:
     return Estimate(found.estimate, None, found.low, found.high)
 
 
-def of_either_optimum(*columns: Column) -> tuple[Column, ...]:
-    """Columns for the optimum with the other arm free, then the same for that with it still."""
-    return tuple(
-        replace(
-            column,
-            name=f"{column.name}_{arm}",
-            header=f"{column.header}, other arm {arm}",
-            other_arm=arm,
-        )
-        for arm in ARMS
-        for column in columns
-    )
-
-
-def by_optimum(arm: OtherArm, *values: Value) -> tuple[Value, ...]:
-    """The values below :func:`of_either_optimum`; none for the other optimum."""
-    none = (None,) * len(values)
-    return (*values, *none) if arm == "free" else (*none, *values)
+def by_optimum(arm: OtherArm, **values: Value) -> dict[str, Value]:
+    """Values by column, whose names end in the other arm: none for the other optimum."""
+    sides = itertools.product(ARMS, values.items())
+    return {f"{name}_{side}": value if side == arm else None for side, (name, value) in sides}

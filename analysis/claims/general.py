@@ -10,22 +10,29 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from scipy import optimize
 
 from analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
 from analysis.claims.evidence import all_hold, exceeds, shown
-from analysis.claims.judges.reach import shortest_reach
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides_apart
 from analysis.methods import LEARNER
 from analysis.published import TRIALS
+from analysis.signatures.manifold import movable
 from analysis.signatures.subtasks import postures_before
 from analysis.statistics.estimates import SEED
 from analysis.words import short
+from coartic import Hand, Task
 from coartic.record import SEARCH
+from coartic.robot import Array
 from coartic.task import hands_of
 
 CLOSE = 0.10
 """Of a way beyond the shortest: "close to the shortest distance"."""
+STARTS = 8
+"""Random starts of the search beside the given one."""
+SPREAD = 0.3
+"""SD of the random starts about the given one: length unit, rad."""
 _PLAN = "trajectory-optimisation/"
 
 
@@ -83,16 +90,59 @@ def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
     )
 
 
+def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array, seed: int) -> float:
+    """Least joint-space distance from ``q`` to a configuration that hits a goal.
+
+    ``goal`` counts from 1; ``guess`` is a configuration near one that hits it, shape
+    ``(dof,)``. Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints
+    that can move the hand, from ``guess`` and random starts about it: the best local minimum,
+    so at least as long as the global one. Infinite where none is found. Length unit and rad
+    mixed.
+    """
+    joints = movable(task, hand)
+    centre = np.array(task.goals[goal - 1])
+
+    def moved(change: Array) -> Array:
+        result = q.copy()
+        result[joints] += change
+        return result
+
+    def miss(change: Array) -> Array:
+        return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
+
+    def inside(change: Array) -> float:
+        off = miss(change)
+        return float(task.radius**2 - off @ off)
+
+    def inside_gradient(change: Array) -> Array:
+        jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
+        return np.asarray(-2 * miss(change) @ jacobian)
+
+    first = (guess - q)[joints]
+    rng = np.random.default_rng(seed)
+    best = math.inf
+    for start in (first, *(first + rng.normal(0, SPREAD, (STARTS, len(joints))))):
+        found = optimize.minimize(
+            lambda change: (change @ change, 2 * change),
+            start,
+            jac=True,
+            method="SLSQP",
+            constraints=[{"type": "ineq", "fun": inside, "jac": inside_gradient}],
+            options={"ftol": 1e-12, "maxiter": 300},
+        )
+        if inside(found.x) >= -1e-8:
+            best = min(best, float(np.linalg.norm(found.x)))
+    return best
+
+
 @decides_apart("less-experience", BEST)
 def _less_experience(data: Data, cells: Cells) -> Finding:
     parts, holds = [], True
     for task, condition in cells:
-        data.runs(task, LEARNER + condition)
-        learner = data.study.method_rows[task, LEARNER + condition]
+        learner = data.row(task, LEARNER + condition)
         better, best = [], False
         for cost in ("path-length", *SMOOTH):
-            data.runs(task, _PLAN + cost)
-            plan = data.study.method_rows[task, _PLAN + cost]
+            plan = data.row(task, _PLAN + cost)
             holds &= plan.trials == 0 and len(plan.told) > len(learner.told)
             if plan.reward >= learner.reward:
                 better.append(f"{cost} ({plan.told})")
@@ -109,13 +159,10 @@ def _less_experience(data: Data, cells: Cells) -> Finding:
 def _low_computation(data: Data, cells: Cells) -> Finding:
     parts, below, above = [], [], []
     for task, condition in cells:
-        data.runs(task, LEARNER + condition)
-        run = _evaluations(data, task, LEARNER + condition)
-        informed = {label: _evaluations(data, task, label) for label in _informed(data, task)}
+        run = data.row(task, LEARNER + condition).evaluations
+        informed = {label: data.row(task, label).evaluations for label in _informed(data, task)}
         if not informed:
             raise MissingError(f"this folder has no runs of informed search on {task}")
-        for label in informed:
-            data.runs(task, label)
         few, many = (pick(informed, key=informed.__getitem__) for pick in (min, max))
         below.append(run < informed[few])
         above.append(run / TRIALS >= informed[many])
@@ -127,10 +174,6 @@ def _low_computation(data: Data, cells: Cells) -> Finding:
     holds = True if all(below) else False if all(above) else None
     open_ = ". The answer depends on whether a trial or a skill is counted, and on the method"
     return Finding(holds, "; ".join(parts) + (open_ if holds is None else ""))
-
-
-def _evaluations(data: Data, task: str, label: str) -> float:
-    return data.study.method_rows[task, label].evaluations
 
 
 def _informed(data: Data, task: str) -> list[str]:
@@ -153,8 +196,7 @@ def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
         rewards = data.rewards(task, condition)
         plans = []
         for cost in SMOOTH:
-            data.runs(task, _PLAN + cost)
-            plan = data.study.method_rows[task, _PLAN + cost].reward
+            plan = data.row(task, _PLAN + cost).reward
             tests.append(exceeds(rewards, plan))
             plans.append(f"{cost} {plan:.0f}")
         parts.append(f"{task}: learner {shown(rewards)}, {', '.join(plans)}")

@@ -72,8 +72,8 @@ class Judged(Finding):
     """A claim with what was seen of it, and its verdict."""
 
     claim: Claim
-    run_ids: tuple[str, ...]
-    sources: tuple[str, ...]
+    run_ids: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
     """What it rests on beside runs."""
     adjusted_p: float = math.nan
     """:attr:`p`, adjusted over the paper's claims (Holm)."""

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pandas as pd
 
 from analysis.results.folder import Cell, CellKey, CellRuns
@@ -107,7 +106,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 def _row(study: Study, cell: CellRuns) -> MethodRow:
     good, runs = cell.good, cell.runs
-    rewards = good.reward.to_numpy(dtype=np.float64)
+    rewards = cell.rewards
     mean = float(rewards.mean()) if len(rewards) else math.nan
     still = bool(len(good)) and bool((good.other_arm_travel <= STILL).all())
     locked = locks_base(runs)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from analysis.methods import LEARNER
 from analysis.statistics.across_tasks import (
@@ -138,7 +139,7 @@ def over_tasks(scores: pd.DataFrame) -> pd.DataFrame:
         measures = {
             "score": unknown if failed else interquartile_mean(score, seed=SEED),
             "gap": unknown if failed else task_mean(gap, seed=SEED),
-            **{name: _share(gap, near) for name, near in WITHIN.items()},
+            **dict(zip(WITHIN, _shares(gap, NEAR, "at most"), strict=True)),
         }
         row: dict[str, Any] = {"method": method, "tasks": len(gap)}
         row |= {"runs": sum(map(len, gap.values())), "failed": failed}
@@ -161,29 +162,24 @@ def profiles(scores: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for method in everywhere(scores):
         for kind, thresholds in THRESHOLDS.items():
-            found = profile(by_task(scores, method, kind), thresholds, REACHED[kind], seed=SEED)
-            shares = zip(found.thresholds, found.share, found.low, found.high, strict=True)
-            for threshold, *share in shares:
-                rows.append((method, kind, threshold, *_with_note(found.n, *share)))
+            shares = _shares(by_task(scores, method, kind), thresholds, REACHED[kind])
+            for threshold, s in zip(thresholds, shares, strict=True):
+                rows.append((method, kind, threshold, s.estimate, s.low, s.high, s.note))
     columns = ["method", "kind", "threshold", "share", "low", "high", "note"]
     return pd.DataFrame(rows, columns=columns)
 
 
-def _share(gaps: dict[str, Array], near: float) -> Inference:
-    """Share of runs whose gap is at most ``near``."""
-    found = profile(gaps, [near], "at most", seed=SEED)
-    (share,), (low,), (high,) = found.share, found.low, found.high
-    share, low, high, note = _with_note(found.n, share, low, high)
-    return Inference(share, found.n, "", low, high, note=note)
-
-
-def _with_note(
-    n: tuple[int, ...], share: float, low: float, high: float
-) -> tuple[float, float, float, str]:
-    """A share of runs with its interval, or the reason why it has none."""
-    note = ""
-    if min(n) < FEWEST:
-        note = f"no interval: fewer than {FEWEST} runs of a task"
-    elif low == high:
-        note = f"no interval: no spread within tasks in {sum(n)} runs"
-    return (share, math.nan, math.nan, note) if note else (share, low, high, note)
+def _shares(values: dict[str, Array], thresholds: ArrayLike, reached: Reached) -> list[Inference]:
+    """Share of runs that reach each threshold, with its interval or why there is none."""
+    found = profile(values, thresholds, reached, seed=SEED)
+    shares = []
+    for share, low, high in zip(found.share, found.low, found.high, strict=True):
+        note = ""
+        if min(found.n) < FEWEST:
+            note = f"no interval: fewer than {FEWEST} runs of a task"
+        elif low == high:
+            note = f"no interval: no spread within tasks in {sum(found.n)} runs"
+        if note:
+            low = high = math.nan
+        shares.append(Inference(share, found.n, "", low, high, note=note))
+    return shares

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import TOLD, MethodRow
+from analysis.comparisons.methods import MethodRow
 from analysis.comparisons.targets import SHARES
 from analysis.methods import LEARNER
 from analysis.results.folder import CellRuns
@@ -96,7 +96,8 @@ def pairs(study: Study) -> Iterator[Pair]:
             elif still in plain and study.method_rows[task, label].other_arm == "still":
                 against.append(str(still))
             for name in against:
-                more_told = _told(study, cell) - _told(study, plain[name])
+                first, second = (study.method_rows[task, of] for of in (LEARNER + name, label))
+                more_told = _told_beyond(second, first)
                 yield Pair(kind, plain[name], cell, "less" if more_told else "greater")
 
 
@@ -217,8 +218,8 @@ def _row(study: Study, pair: Pair) -> PairRow:
         mean_first=one.reward,
         mean_second=two.reward,
         expected="higher" if pair.expected == "greater" else "lower",
-        told_more=_letters(set(two.told) - set(one.told)),
-        told_less=_letters(set(one.told) - set(two.told)),
+        told_more=_told_beyond(two, one),
+        told_less=_told_beyond(one, two),
         **found,
         **_sizes(pair, one, two, abs(optimum.reward) if optimum else math.nan),
     )
@@ -226,7 +227,7 @@ def _row(study: Study, pair: Pair) -> PairRow:
 
 def _inferred(pair: Pair) -> dict[str, Any]:
     """Difference, tests and effect size of two samples of rewards."""
-    a, b = (cell.good.reward.to_numpy(dtype=np.float64) for cell in (pair.first, pair.second))
+    a, b = pair.first.rewards, pair.second.rewards
     x, y = paired_by_seed(pair.first.good, pair.second.good)
     second: Array | float = b
     interval = "paired by seed" if len(x) else "independent"
@@ -289,9 +290,5 @@ def _keeping_still(condition: str) -> str | None:
     return None
 
 
-def _told(study: Study, cell: CellRuns) -> set[str]:
-    return set(study.method_rows[cell.task, cell.label].told)
-
-
-def _letters(told: set[str]) -> str:
-    return "".join(letter for letter in TOLD.values() if letter in told)
+def _told_beyond(one: MethodRow, other: MethodRow) -> str:
+    return "".join(letter for letter in one.told if letter not in other.told)

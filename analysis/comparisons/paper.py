@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from analysis.methods import LEARNER
 from analysis.published import (
     RUNS,
@@ -82,10 +80,11 @@ def paper_rows(study: Study) -> list[PaperRow]:
     """Every cell that the paper has too, in the order of the plan."""
     rows = []
     for cell in study.cells.values():
-        paper, rewards = published_of(cell), _rewards(cell)
+        paper = published_of(cell)
         if paper is not None:
+            apart = _apart(cell.rewards, paper.summary)
             comparable = bool((cell.good.trials == TRIALS).all())
-            rows.append(PaperRow(cell, paper, rewards, _apart(rewards, paper.summary), comparable))
+            rows.append(PaperRow(cell, paper, cell.rewards, apart, comparable))
     return rows
 
 
@@ -102,7 +101,7 @@ def sequence_rows(study: Study) -> list[SequenceRow]:
         printed = {sequence.hands: sequence for sequence in paper.sequences}
         complete = sum(sequence.runs or 0 for sequence in paper.sequences) == RUNS
         for name in dict.fromkeys([*printed, *hands.value_counts().index]):
-            rewards = _rewards(cell)[(hands == name).to_numpy(bool)]
+            rewards = cell.rewards[(hands == name).to_numpy(bool)]
             summary, runs = None, 0 if complete else None
             if name in printed:
                 summary, runs = printed[name].summary, printed[name].runs
@@ -111,9 +110,7 @@ def sequence_rows(study: Study) -> list[SequenceRow]:
     return rows
 
 
-def _rewards(cell: CellRuns) -> Array:
-    return cell.good.reward.to_numpy(dtype=np.float64)
-
-
 def _apart(rewards: Array, published: Summary | None) -> Equivalence | None:
-    return difference(rewards, published) if published is not None and len(rewards) else None
+    if published is None or not len(rewards):
+        return None
+    return difference(rewards, published.mean, published.sd, published.runs)

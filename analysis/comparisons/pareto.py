@@ -74,8 +74,7 @@ def _fronts(study: Study, cells: Sequence[CellRuns]) -> Iterator[pd.DataFrame]:
     told = [frozenset(row.told) for row in rows]
     no_more: Flags = np.array([[other <= own for other in told] for own in told])
     reward = np.array([row.reward for row in rows])
-    rewards = [cell.runs.reward.to_numpy(dtype=np.float64) for cell in cells]
-    rewards_again = np.stack([resampled(each).mean(axis=-1) for each in rewards], axis=-1)
+    rewards_again = np.stack([resampled(cell.rewards).mean(axis=-1) for cell in cells], axis=-1)
     for spend in LABELS:
         spent = [_spent(cell, spend, len(row.told)) for cell, row in zip(cells, rows, strict=True)]
         amount = np.array([float(_median(each)) for each in spent])

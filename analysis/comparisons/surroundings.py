@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-if TYPE_CHECKING:
-    from analysis.study import Study
+from analysis.study import Study
 
 _WORDS = {"title", "description", "provenance"}  # of a task; they change no result
 

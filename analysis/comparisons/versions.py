@@ -14,7 +14,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from analysis.comparisons.methods import MethodRow
@@ -163,7 +162,7 @@ def _rows(first: Study, second: Study) -> list[VersionRow]:
                 b=second.method_rows[key],
                 **_runs(cell, second.cells[key], tasks.get(cell.task), other_code=other),
             )
-            rows.append(_compared(made, cell.good, second.cells[key].good))
+            rows.append(_compared(made, cell, second.cells[key]))
     adjusted = holm([row.p for row in rows])
     return [replace(row, p_adjusted=p) for row, p in zip(rows, adjusted, strict=True)]
 
@@ -192,17 +191,17 @@ def _runs(
     }
 
 
-def _compared(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> VersionRow:
+def _compared(row: VersionRow, a: CellRuns, b: CellRuns) -> VersionRow:
     """With the difference of mean rewards, B less A, its interval, test and verdict."""
     if row.verdict == "not compared":
         return row
-    if row.identical == len(a) == len(b):
+    if row.identical == len(a.good) == len(b.good):
         return replace(row, verdict="identical", paired=True, difference=0.0)
-    before, after = paired_by_seed(a, b)
+    before, after = paired_by_seed(a.good, b.good)
     paired = len(before) >= FEWEST
     samples: tuple[Array, Array | float] = after - before, 0.0
     if not paired:
-        samples = b.reward.to_numpy(dtype=np.float64), a.reward.to_numpy(dtype=np.float64)
+        samples = b.rewards, a.rewards
     found = difference_of_means(*samples, seed=SEED)
     row = replace(
         row,
@@ -213,7 +212,7 @@ def _compared(row: VersionRow, a: pd.DataFrame, b: pd.DataFrame) -> VersionRow:
         p=bootstrap_test(*samples, "two-sided", seed=SEED).p,
     )
     margin = MARGIN * abs(row.a.reward)
-    if not margin or min(len(a), len(b)) < FEWEST:
+    if not margin or min(len(a.good), len(b.good)) < FEWEST:
         return row
     agreed = bootstrap_equivalence(*samples, margin, seed=SEED)
     # Where most pairs are equal, resamples without any spread leave it without an end.

@@ -184,7 +184,13 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        _dress(axes, panel)
+        above: Any = {"textcoords": "offset points", "ha": "center", "va": "bottom"}
+        for number, (x, y) in enumerate(panel.trajectory.task.goals, 1):
+            end = x, y + panel.trajectory.task.radius
+            axes.annotate(str(number), end, (0, 3), fontsize=9, **above)
+        axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
+        axes.tick_params(labelsize=8)
+        axes.spines[["top", "right"]].set_visible(False)
     # What stands still takes most of the time of drawing: it is drawn once, as a picture.
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
@@ -195,17 +201,6 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
         for text in list(axes.texts):
             text.remove()
     return figure, [_Scene(*of) for of in zip(figure.axes, movements, strict=True)]
-
-
-def _dress(axes: Axes, panel: Panel) -> None:
-    """What stands still: title, scales, the goals' numbers."""
-    task = panel.trajectory.task
-    for number, (x, y) in enumerate(task.goals, 1):
-        above: Any = {"textcoords": "offset points", "ha": "center", "va": "bottom"}
-        axes.annotate(str(number), (x, y + task.radius), (0, 3), fontsize=9, **above)
-    axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
-    axes.tick_params(labelsize=8)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _writer(path: Path, timed: Timing) -> Any:

@@ -16,7 +16,7 @@ from analysis.comparisons.paper import published_of
 from analysis.figures import style
 from analysis.figures.configurations import initial_solution
 from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import CONDITIONS, has, missing, rewards_of, solved
+from analysis.figures.selection import CONDITIONS, has, missing, solved
 from analysis.methods import LEARNER, short_name
 from analysis.published import Summary, published_cell, published_initial
 from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
@@ -53,7 +53,7 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     figure = Figure(figsize=(width, 2.6), layout="constrained")
     panels = figure.subplots(1, len(labels), width_ratios=counts, squeeze=False)[0]
     for axes, name in zip(panels, labels, strict=True):
-        runs = {label: rewards_of(solved(study, name, label)) for label in labels[name]}
+        runs = {label: study.cells[name, label].rewards for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
         axes.set_title(style.heading(study.tasks[name]))
         axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
@@ -86,7 +86,7 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     before: Any = initial
     for label in labels:
         cell = solved(study, task, label)
-        rewards, paper = rewards_of(cell), published_of(cell)
+        rewards, paper = cell.rewards, published_of(cell)
         found = mean(rewards, seed=SEED)
         summary = paper.summary if paper else None
         centre, half = summary.mean if summary else math.nan, _half(summary)

@@ -97,13 +97,12 @@ def typical_run(study: Study, task: str, label: str, hands: str | None = None) -
     ``hands`` of those with the commonest sequence (the first of them in the alphabet where
     several are as common) that whose reward is nearest to the median of the cell.
     """
-    good = solved(study, task, label).good
-    middle = good if hands is None else good[good.hands == hands]
+    cell = solved(study, task, label)
     own = common_sequences(study, task, label, 1)[0] if hands is None else hands
-    candidates = good[good.hands == own]
-    median = float(np.median(middle.reward.to_numpy(dtype=np.float64)))
-    off = np.abs(candidates.reward.to_numpy(dtype=np.float64) - median)
-    return str(candidates.run_id.iloc[int(off.argmin())])
+    candidates = (cell.good.hands == own).to_numpy(bool)
+    rewards = cell.rewards[candidates]
+    off = np.abs(rewards - np.median(cell.rewards if hands is None else rewards))
+    return str(cell.good.run_id[candidates].iloc[int(off.argmin())])
 
 
 def learned_solution(study: Study, task: str, label: str, run_id: str) -> Solution:

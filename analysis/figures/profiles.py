@@ -50,18 +50,14 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     }
     joined = scores[scores.method == scores.task.map(learners)].assign(method=LEARNER)
     scores = pd.concat([joined, scores], ignore_index=True)
-    if methods is None:
-        defaults = chosen(study, tasks, None) if tasks else []
-        labels = [
-            LEARNER,
-            *(label for label in defaults if label in _SHOWN or label not in HEADLINES),
-        ]
-    else:
-        known_methods(study, [label for label in methods if label != LEARNER])
-        labels = list(methods)
-    everywhere = [label for label in labels if set(by_task(scores, label)) == set(tasks)]
+    known_methods(study, [label for label in methods or () if label != LEARNER])
     if not tasks:
         raise missing(study, "no task with a known optimum and an initial solution below it")
+    labels = list(methods or [LEARNER])
+    if methods is None:
+        hidden = set(HEADLINES) - _SHOWN
+        labels += [label for label in chosen(study, tasks, None) if label not in hidden]
+    everywhere = [label for label in labels if set(by_task(scores, label)) == set(tasks)]
     names = ", ".join(tasks)
     if not everywhere:
         raise missing(study, f"no runs on every one of {names}: {', '.join(labels)}")

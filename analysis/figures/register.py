@@ -140,15 +140,12 @@ class Figures(Mapping[str, Figure]):
     def _found(self, entry: Entry) -> list[Plot] | CoarticError:
         """The figures of a row, drawn once, or why there are none."""
         if entry.name not in self._drawn:
+            tasks = len(self._study.tasks)
             try:
-                self._drawn[entry.name] = self._draw(entry)
+                if entry.by_task and self._most is not None and tasks > self._most:
+                    raise CoarticError(f"there would be one for each of {tasks} tasks")
+                found = entry.draw(self._study, methods=self._methods)
+                self._drawn[entry.name] = found if isinstance(found, list) else [found]
             except CoarticError as error:
                 self._drawn[entry.name] = error
         return self._drawn[entry.name]
-
-    def _draw(self, entry: Entry) -> list[Plot]:
-        tasks = len(self._study.tasks)
-        if entry.by_task and self._most is not None and tasks > self._most:
-            raise CoarticError(f"there would be one for each of {tasks} tasks")
-        found = entry.draw(self._study, methods=self._methods)
-        return found if isinstance(found, list) else [found]

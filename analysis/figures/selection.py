@@ -8,7 +8,6 @@ from analysis.methods import LEARNER, METHODS
 from analysis.results.folder import CellRuns
 from analysis.study import Study
 from coartic import CoarticError
-from coartic.robot import Array
 from coartic.text import did_you_mean
 
 CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in range(1, 5))
@@ -69,11 +68,6 @@ def solved(study: Study, task: str, label: str) -> CellRuns:
     if not has(study, task, label):
         raise missing(study, f"no solved run of {label} on {task}")
     return study.cells[task, label]
-
-
-def rewards_of(cell: CellRuns) -> Array:
-    """Rewards of the solved runs, shape ``(runs,)``."""
-    return cell.good.reward.to_numpy(dtype="float64")
 
 
 def missing(study: Study, what: str) -> CoarticError:

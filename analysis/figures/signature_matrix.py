@@ -56,25 +56,14 @@ def signature_matrix(study: Study, *, methods: Sequence[str] | None = None) -> l
 
 def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
     """One row a method and signature: value, standardised value, or why there is none."""
-    rows = []
-    for label in labels:
-        own = frame[frame.label == label]
-        for name in SIGNATURES:
-            part = own[own.signature == name]
-            known = part.value.dropna()
-            why = next((text for text in part.why_not if text), "")
-            rows.append(
-                {
-                    "method": label,
-                    "signature": name,
-                    "value": float(known.mean()) if len(known) else math.nan,
-                    "places": len(known),
-                    "unit": next((unit for unit in part.unit if unit), ""),
-                    "why_not": "" if len(known) else why,
-                }
-            )
-    columns = "method signature value places unit why_not"
-    data = pd.DataFrame(rows, columns=columns.split())
+    places = frame.groupby(["label", "signature"])
+    data = pd.DataFrame({"value": places.value.mean(), "places": places.value.count()})
+    for column in ("unit", "why_not"):  # the first there is
+        data[column] = places[column].agg(lambda texts: next(filter(None, texts), ""))
+    rows = pd.MultiIndex.from_product([labels, SIGNATURES], names=["method", "signature"])
+    data = data.reindex(rows).fillna({"places": 0, "unit": "", "why_not": ""}).reset_index()
+    data = data.astype({"places": int})
+    data["why_not"] = data.why_not.mask(data.places > 0, "")
     by_name = data.groupby("signature").value
     differ = by_name.transform("min") < by_name.transform("max")
     spread = by_name.transform("std").where(differ)

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from analysis.results.laws import check_tables, read_manifest, read_records
 from coartic import CoarticError, Task, parse_task
+from coartic.robot import Array
 from coartic.tables import Manifest, label_of
 
 CellKey = tuple[str, str]
@@ -41,6 +43,11 @@ class CellRuns(Cell):
         """The runs that have a solution."""
         return self.runs[self.runs["status"] == "ok"]
 
+    @cached_property
+    def rewards(self) -> Array:
+        """Of those runs, shape ``(n,)``."""
+        return self.good.reward.to_numpy(dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class Results:
@@ -63,19 +70,19 @@ class Results:
         """The cells with their runs, in the order of the plan."""
         found, runs = {}, self.runs
         for cell in self.manifest.specification.cells:
+            names = cell.task, cell.method, cell.variant
             own = (runs.task == cell.task) & (runs.method == cell.method)
             own &= runs.variant == cell.variant
-            names = cell.task, cell.method, cell.variant
             found[cell.task, cell.label] = CellRuns(*names, runs[own])
         return found
 
     def solutions(self) -> pd.DataFrame:
         """Movements of every run's solution."""
-        return read_table(self.folder, "solutions", nullable=False)
+        return pd.read_parquet(self.folder / "solutions.parquet")
 
     def paths(self) -> pd.DataFrame:
         """Waypoints of the movements that follow a path."""
-        return read_table(self.folder, "paths", nullable=False)
+        return pd.read_parquet(self.folder / "paths.parquet")
 
     def learning(self) -> pd.DataFrame:
         """Reward of every trial."""
@@ -100,9 +107,6 @@ def load_results(folder: Path) -> Results:
     return Results(folder, manifest, read_table(folder, "runs"), read_table(folder, "sequences"))
 
 
-def read_table(folder: Path, name: str, *, nullable: bool = True) -> pd.DataFrame:
-    """A table of a results folder; nullable types unless it lacks no values."""
-    path = folder / f"{name}.parquet"
-    if nullable:
-        return pd.read_parquet(path, dtype_backend="numpy_nullable")
-    return pd.read_parquet(path)
+def read_table(folder: Path, name: str) -> pd.DataFrame:
+    """A table of a results folder that lacks values: with nullable types."""
+    return pd.read_parquet(folder / f"{name}.parquet", dtype_backend="numpy_nullable")

@@ -12,7 +12,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -116,10 +116,8 @@ def check_tables(folder: Path, manifest: Manifest, records: Mapping[str, Record]
         except (OSError, ValueError, pa.ArrowException) as error:
             damaged(path, str(error).splitlines()[0] if str(error) else type(error).__name__)
         if not found.schema.equals(due.schema, check_metadata=True):
-            differing = sorted(
-                {str(field) for field in found.schema} ^ {str(field) for field in due.schema}
-            )
-            what = ", ".join(differing[:3]) or "their metadata"
+            differing = {*map(str, found.schema)} ^ {*map(str, due.schema)}
+            what = ", ".join(sorted(differing)[:3]) or "their metadata"
             damaged(path, f"its columns are not those of this table: {what}")
         if not found.equals(due):
             damaged(path, _difference(found, due))
@@ -141,7 +139,8 @@ def _check_plan(path: Path, plan: Plan) -> None:
         if cell.task not in plan.tasks or cell.method not in plan.methods:
             damaged(path, f"{where} is of a task or method that it does not describe")
         method = plan.methods[cell.method]
-        ours = method.origin == BUILT_IN
+        # What a suite sets: parameters of the cell, and trials, which are the suite's.
+        given = {k: v for k, v in cell.complete.items() if k == "trials"} | cell.parameters
         laws = (
             (
                 len(cell.run_ids) == (plan.runs if method.stochastic else 1),
@@ -149,7 +148,7 @@ def _check_plan(path: Path, plan: Plan) -> None:
             ),
             (cell.variant == variant_of(cell.parameters, method.defaults), "has another variant"),
             (
-                not ours or cell.complete == {**method.defaults, **_set(cell)},
+                method.origin != BUILT_IN or cell.complete == method.defaults | given,
                 "has parameters that nobody set",
             ),
             (trials_in(cell.complete) <= plan.trials, "makes more trials than planned"),
@@ -161,12 +160,6 @@ def _check_plan(path: Path, plan: Plan) -> None:
         seen.update(cell.run_ids)
     if plan.trials != max((trials_in(cell.complete) for cell in plan.cells), default=0):
         damaged(path, "no cell makes as many trials as it says")
-
-
-def _set(cell: PlannedCell) -> dict[str, Any]:
-    """What a suite sets: parameters of the cell, and trials, which are the suite's."""
-    trials = {name: cell.complete[name] for name in cell.complete if name == "trials"}
-    return {**trials, **cell.parameters}
 
 
 def _departure(manifest: Manifest, cell: PlannedCell, run: int, record: Record) -> str | None:
@@ -191,14 +184,14 @@ def _departure(manifest: Manifest, cell: PlannedCell, run: int, record: Record) 
 
 def _check_bounds(folder: Path, records: Mapping[str, Record]) -> None:
     """No run is better than what another one proves that none can be."""
-    proofs = [record for record in records.values() if record.bound is not None]
-    for proof in proofs:
+    for proof in records.values():
         parameters = proof.specification.parameters
-        if parameters.get("base", BASE) != BASE or parameters.get("other_arm") == "still":
-            continue  # of a narrower problem
+        narrower = parameters.get("base", BASE) != BASE or parameters.get("other_arm") == "still"
+        if proof.bound is None or narrower:
+            continue
         for record in records.values():
             same = record.specification.task == proof.specification.task
-            if same and record.solution and record.solution.reward > (proof.bound or 0):
+            if same and record.solution and record.solution.reward > proof.bound:
                 raise CoarticError(
                     f"{folder}: run {record.run_id} has reward {record.solution.reward}, and run "
                     f"{proof.run_id} proves that none exceeds {proof.bound}: one of them is "

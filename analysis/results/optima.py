@@ -12,7 +12,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -115,14 +115,13 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
                 candidates.append(Optimum(entry.reward, entry.hands, entry.bound, best))
             if candidates:
                 stored = f"{SHIPPED}, runs {', '.join(entry.run_ids if entry else ())}"
-                found[name, arm] = _best(name, candidates, searches, stored)
+                found[name, arm] = _best(candidates, searches, stored)
     return found
 
 
 def locks_base(runs: pd.DataFrame) -> bool:
     """Whether a parameter of these runs locks the base: another problem, another optimum."""
-    locks = runs.parameters.map(lambda text: json.loads(text).get("base", BASE))
-    return bool((locks != BASE).any())
+    return bool((_restrictions(runs).base != BASE).any())
 
 
 def essence(task: Task) -> str:
@@ -143,12 +142,10 @@ def collect(results: Results) -> list[Entry]:
 
     Raises CoarticError where the folder has no searches for the optimum.
     """
-    runs = results.runs[results.runs.method.str.startswith(SEARCH)].copy()
+    runs = results.runs[results.runs.method.str.startswith(SEARCH)]
     if not len(runs):
         raise CoarticError(f"{results.folder}: has no runs of methods {SEARCH}*")
-    parameters = runs.parameters.map(json.loads)
-    runs["other_arm"] = parameters.map(lambda values: values["other_arm"])
-    runs["base"] = parameters.map(lambda values: values["base"])
+    runs = runs.join(_restrictions(runs))
     movements = results.solutions()
     environment = results.manifest.environment.model_dump(mode="json")
     keys = ("coartic", "commit", "model_code", "python", "date")
@@ -197,12 +194,16 @@ def renew(new: Iterable[Entry]) -> int:
 def _searches(runs: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], pd.DataFrame]]:
     """Solved searches of one task with this other arm and the task's own base, by cell."""
     good = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
-    asked = good.parameters.map(json.loads)
-    base = asked.map(lambda parameters: parameters.get("base", BASE))
-    other_arm = asked.map(lambda parameters: parameters.get("other_arm", "free"))
-    kept = good[(base == BASE) & (other_arm == arm)]
+    asked = _restrictions(good)
+    kept = good[(asked.base == BASE) & (asked.other_arm == arm)]
     for (task, method, variant), own in kept.groupby(["task", "method", "variant"], sort=False):
         yield (str(task), label_of(str(method), str(variant))), own
+
+
+def _restrictions(runs: pd.DataFrame) -> pd.DataFrame:
+    """Lock of the base and other arm of each run, by its parameters."""
+    asked = [{"base": BASE, "other_arm": "free"} | json.loads(own) for own in runs.parameters]
+    return pd.DataFrame(asked, runs.index, ["base", "other_arm"])
 
 
 def _from_runs(runs: pd.DataFrame) -> Optimum:
@@ -218,7 +219,6 @@ def _from_runs(runs: pd.DataFrame) -> Optimum:
 
 
 def _best(
-    task: str,
     candidates: list[Optimum],
     searches: Mapping[tuple[str, str], pd.DataFrame],
     stored: str,
@@ -227,23 +227,12 @@ def _best(
     best = max(candidates, key=lambda optimum: optimum.reward)
     bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
     bound = min(bounds, default=None)
-    cells = [
-        [
-            key
-            for key, runs in searches.items()
-            if value is not None and (runs[column] == value).any()
-        ]
-        for column, value in (("reward", best.reward), ("proven_bound", bound))
-    ]
-    reward, proof = ("searches of this folder" if own else stored for own in cells)
-    return Optimum(
-        best.reward,
-        best.hands,
-        bound,
-        best.searches,
-        reward if bound is None or reward == proof else f"reward: {reward}; bound: {proof}",
-        tuple(dict.fromkeys(cells[0] + cells[1])),
-    )
+    given = [key for key, runs in searches.items() if (runs.reward == best.reward).any()]
+    proving = [key for key, runs in searches.items() if (runs.proven_bound == bound).any()]
+    reward, proof = ("searches of this folder" if own else stored for own in (given, proving))
+    source = reward if bound is None or reward == proof else f"reward: {reward}; bound: {proof}"
+    cells = tuple(dict.fromkeys(given + proving))
+    return replace(best, bound=bound, source=source, cells=cells)
 
 
 @cache

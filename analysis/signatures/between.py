@@ -14,7 +14,7 @@ import numpy as np
 from analysis.signatures.context import context_dependence, distance, lead_time, permutation_p
 from analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
 from analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from analysis.signatures.rows import Place, Rows, Signature
+from analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
 from analysis.signatures.trajectories import Trajectories, last_ticks, postures
 from analysis.statistics import spread
 from analysis.statistics.estimates import SEED
@@ -22,6 +22,7 @@ from coartic import Hand, Trajectory
 from coartic.robot import HANDS, Array
 
 Runs = tuple[Trajectory, ...]
+NO_SPREAD = "one run a context: no spread within contexts, no test"
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,8 @@ class Contexts:
     @cached_property
     def runs(self) -> tuple[Runs, Runs]:
         """Of either context."""
-        first, second = (
-            cell.with_hand(self.hand, self.goal) for cell in (self.first, self.second)
-        )
-        return first, second
+        hand, goal = self.hand, self.goal
+        return self.first.with_hand(hand, goal), self.second.with_hand(hand, goal)
 
     @cached_property
     def postures(self) -> tuple[Array, Array]:
@@ -62,10 +61,12 @@ class Contexts:
         """Whether a context has one run only, and so no spread."""
         return min(map(len, self.runs)) < 2
 
-    def p(self, signature: Signature, basis: Array | None = None) -> float:
-        """Of no difference (within a subspace); NaN for a single run."""
-        first, second = self.postures
-        return permutation_p(first, second, rng_of(signature, self.place), basis=basis)
+    def row(
+        self, signature: Signature, value: float, why_not: str, basis: Array | None = None
+    ) -> SignatureRow:
+        """A value and its test (within a subspace); without one for a single run."""
+        p = permutation_p(*self.postures, rng_of(signature, self.place), basis=basis)
+        return signature.at(self.place, value=value, p=float(p), n=self.n, why_not=why_not)
 
 
 def context_distance(contexts: Contexts, signature: Signature) -> Rows:
@@ -75,12 +76,9 @@ def context_distance(contexts: Contexts, signature: Signature) -> Rows:
 
 def dependence(contexts: Contexts, signature: Signature) -> Rows:
     """The distance in pooled standard deviations, with its test."""
-    why = "one run a context: no spread within contexts, no test" if contexts.single else ""
     value = context_dependence(*contexts.postures)
-    if not why and math.isnan(value):
-        why = "runs do not differ within contexts"
-    p = contexts.p(signature)
-    yield signature.at(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
+    why = "runs do not differ within contexts" if math.isnan(value) else ""
+    yield contexts.row(signature, value, NO_SPREAD if contexts.single else why)
 
 
 def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Rows:
@@ -96,16 +94,14 @@ def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Rows:
     ):
         wide = np.zeros((task.robot.dof, basis.shape[1]))
         wide[joints] = basis
-        p = contexts.p(signature, wide)
-        yield signature.at(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
+        yield contexts.row(signature, value, why, wide)
 
 
 def lead(contexts: Contexts, signature: Signature) -> Rows:
     """How long before the hit contexts differ."""
     place, n = contexts.place, contexts.n
     if contexts.single:
-        why = "one run a context: no spread within contexts, no test"
-        yield signature.at(place, n=n, why_not=why)
+        yield signature.at(place, n=n, why_not=NO_SPREAD)
         return
     count = min(int(run.hits[contexts.goal - 1]) for group in contexts.runs for run in group) + 1
     if count == 1:
@@ -136,9 +132,8 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
     """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
     family, task = members.family, members.first.task
     position = dict(zip(family.tasks, family.positions.tolist(), strict=True))
-    for goal, hand in product((family.moving - 1, family.moving + 1), HANDS):
-        if not 1 <= goal <= len(task.goals):
-            continue
+    beside = {family.moving - 1, family.moving + 1} & set(range(1, len(task.goals) + 1))
+    for goal, hand in product(sorted(beside), HANDS):
         runs = {name: cell.with_hand(hand, goal) for name, cell in members.of_task.items()}
         places = [position[name] for name, own in runs.items() for _ in own]
         n, place = len(places), Place(goal=goal, moving=family.moving, hand=hand)
@@ -146,14 +141,13 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
             continue
         if len(set(places)) < LEAST:
             why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-            yield from (signature.without(why, place, n) for signature in (slope, norm))
+            yield from without((slope, norm), why, place, n)
             continue
         q = postures(tuple(chain.from_iterable(runs.values())), goal)
         for joint, found in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
             unit = "1" if joint.startswith("base") else slope.unit
-            yield slope.at(replace(place, joint=joint), **found._asdict(), n=n, unit=unit)
-        whole = slope_norm(q, places, rng_of(norm, place))
-        yield norm.at(place, **whole._asdict(), n=n)
+            yield slope.estimated(replace(place, joint=joint), found, n, unit=unit)
+        yield norm.estimated(place, slope_norm(q, places, rng_of(norm, place)), n)
 
 
 def rng_of(signature: Signature, place: Place) -> np.random.Generator:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import combinations, takewhile
 
 import numpy as np
 
@@ -27,12 +27,11 @@ def shared_goals(first: Task, second: Task) -> int:
 
     0 where anything but the goals differs, and where no goal differs.
     """
-    if any(getattr(first, key) != getattr(second, key) for key in KEPT):
+    others = any(getattr(first, key) != getattr(second, key) for key in KEPT)
+    if others or first.goals == second.goals:
         return 0
-    if first.goals == second.goals:
-        return 0
-    same = [a == b for a, b in zip(first.goals, second.goals, strict=False)]
-    return same.index(False) if False in same else len(same)
+    same = (a == b for a, b in zip(first.goals, second.goals, strict=False))
+    return sum(1 for _ in takewhile(bool, same))
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -72,31 +71,20 @@ def permutation_p(
     *,
     basis: Array | None = None,
     resamples: int = RESAMPLES,
-) -> float:
+) -> Array:
     """Probability of so large a distance between means if the context did nothing.
 
     One-sided permutation test over runs, exact where all divisions of the runs are no more
     than ``resamples``. The statistic is :func:`distance`, which orders permutations as
-    :func:`context_dependence` does; with an orthonormal ``basis`` (dof, k) it is the distance
+    :func:`context_dependence` does; with an orthonormal ``basis`` (dof, d) it is the distance
     within its span. 0 < p ≤ 1; 1 where no run differs from another. NaN where a context has
     one run only.
+
+    ``first`` and ``second`` have shape ``(runs, dof)``, or ``(runs, k, dof)`` for k ticks with
+    a p each, shape ``(k,)``: the same divisions at every tick.
     """
     if min(len(first), len(second)) < 2:
-        return math.nan
-    return float(_apart(first[:, None], second[:, None], rng, resamples, basis)[0])
-
-
-def _apart(
-    first: Array,
-    second: Array,
-    rng: np.random.Generator,
-    resamples: int,
-    basis: Array | None = None,
-) -> Array:
-    """p-value at each of k ticks, shape ``(k,)``; groups have shape ``(runs, k, dof)``.
-
-    Runs are permuted as wholes: the same divisions at every tick.
-    """
+        return np.full(first.shape[1:-1], math.nan)
     pool = np.concatenate([first, second])
     pool = pool - mean(pool)
     if basis is not None:
@@ -105,10 +93,10 @@ def _apart(
     own = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
     flat = pool.reshape(len(pool), -1)
     null, observed = (
-        np.linalg.norm((rows @ flat).reshape(len(rows), *pool.shape[1:]), axis=-1)
-        for rows in (weights, own[None])
+        np.linalg.norm((rows @ flat).reshape(*rows.shape[:-1], *pool.shape[1:]), axis=-1)
+        for rows in (weights, own)
     )
-    return p_values(null, observed[0], exact=exact)
+    return p_values(null, observed, exact=exact)
 
 
 def lead_time(
@@ -124,10 +112,10 @@ def lead_time(
     ``first`` and ``second`` have shape ``(runs, k, dof)``: the last k control ticks of
     each run up to the hit, which is entry -1. Going back from the hit, contexts count as
     distinguishable at a tick while the test of :func:`permutation_p` gives at most
-    ``alpha`` there. The
-    first tick that fails ends the count: tests in a fixed order (Maurer, Hothorn & Lehmacher
-    1995), so that the error rate of the whole is ``alpha`` without correction. 0 means at the
-    hit only; None, not even there, or a context with one run. At most k - 1, the whole movement.
+    ``alpha`` there. The first tick that fails ends the count: tests in a fixed order (Maurer,
+    Hothorn & Lehmacher 1995), so that the error rate of the whole is ``alpha`` without
+    correction. 0 means at the hit only; None, not even there, or a context with one run. At most
+    k - 1, the whole movement.
 
     After Engel, Flanders & Soechting (1997), who looked for the moment at which hand
     postures before the same piano key diverge by the notes to come. Caveat: from a common
@@ -135,8 +123,6 @@ def lead_time(
     a lead shorter than the movement speaks of noise or of different speeds, not of a late
     decision.
     """
-    if min(len(first), len(second)) < 2:
-        return None
-    failed = _apart(first, second, rng, resamples)[::-1] > alpha
+    failed = ~(permutation_p(first, second, rng, resamples=resamples)[::-1] <= alpha)
     lead = int(failed.argmax()) if failed.any() else len(failed)
     return lead - 1 if lead else None

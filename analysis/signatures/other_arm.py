@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.signatures.subtasks import postures_before
 from coartic import Execution, Hand, Trajectory
-from coartic.robot import BASE_DOF, Array
+from coartic.robot import BASE_DOF, HANDS, Array
 
 
 def other(hand: Hand) -> Hand:
@@ -53,9 +53,9 @@ def preshaping_since_hit(path: Trajectory, initial: Execution) -> Array:
     from the initial solution. NaN where the other hand hits no later goal.
     """
     held = np.array(path.execution.configurations)
-    own_last = {"left": np.array(path.task.q0), "right": np.array(path.task.q0)}
+    own_last = dict.fromkeys(HANDS, path.task.q0)
     for row, hand in zip(held, path.hands, strict=True):
-        own_last[hand] = np.array(row)
+        own_last[hand] = row.copy()
         joints = path.task.robot.joints(other(hand))
         row[joints] = own_last[other(hand)][joints]
     return preshaping(path, initial) - _nearer(path, initial, held)
@@ -63,20 +63,17 @@ def preshaping_since_hit(path: Trajectory, initial: Execution) -> Array:
 
 def _nearer(path: Trajectory, initial: Execution, configurations: Array) -> Array:
     """1 - d/d_initial with the waiting hands of ``configurations``, (G, dof), at each hit."""
-    task = path.task
+    task, hands = path.task, path.hands
     result = np.full(len(task.goals), np.nan)
-    for number, hand in enumerate(path.hands, 1):
-        waiting = other(hand)
-        later = [k for k, later in enumerate(path.hands, 1) if k > number and later == waiting]
-        if not later:
-            continue
-        goal = np.array(task.goals[later[0] - 1])
-        distances = [
-            float(np.linalg.norm(task.robot.forward_kinematics(q, waiting) - goal))
-            for q in (configurations[number - 1], initial.configurations[number - 1])
-        ]
-        if distances[1] > 0:
-            result[number - 1] = 1 - distances[0] / distances[1]
+    for k, waiting in enumerate(map(other, hands)):
+        if waiting in hands[k:]:
+            goal = task.goals[hands.index(waiting, k)]
+            now, initially = (
+                np.linalg.norm(task.robot.forward_kinematics(q[k], waiting) - goal)
+                for q in (configurations, initial.configurations)
+            )
+            if initially > 0:
+                result[k] = 1 - now / initially
     return result
 
 
@@ -85,11 +82,6 @@ def travel(path: Trajectory) -> Array:
 
     From hit to hit, as in column ``other_arm_travel``, which is its sum; ≥ 0.
     """
-    execution, task = path.execution, path.task
-    moved = execution.configurations - np.array(postures_before(execution, task))
-    return np.array(
-        [
-            float(np.linalg.norm(row[task.robot.joints(other(hand))]))
-            for row, hand in zip(moved, path.hands, strict=True)
-        ]
-    )
+    moved = path.execution.configurations - postures_before(path.execution, path.task)
+    waiting = [path.task.robot.joints(other(hand)) for hand in path.hands]
+    return np.array([np.linalg.norm(row[own]) for row, own in zip(moved, waiting, strict=True)])

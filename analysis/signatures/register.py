@@ -1,29 +1,45 @@
-"""Every signature of coarticulation: how it is measured, what it says, where it is shown.
+"""Every signature of coarticulation, and all of a study: applied to every method and task.
 
 To add one: a function that computes it, in the file of its concept, a measure of it
 (:mod:`~.within` one method's runs on one task, :mod:`~.between` tasks), and a row of
-``register.toml``. Rows are in the order of ``signatures.csv``.
+``register.toml``, which says how it is measured, what it says and where it is shown. Rows are
+in the order of ``signatures.csv``.
 """
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import pandas as pd
 from pydantic import TypeAdapter
 
-from analysis.signatures.rows import Signature
+from analysis.signatures.between import Contexts, Members
+from analysis.signatures.context import context_pairs
+from analysis.signatures.locus import LEAST, families, variants
+from analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
+from analysis.signatures.trajectories import Trajectories
+from coartic.robot import HANDS
+
+if TYPE_CHECKING:
+    from analysis.study import Study
 
 PER_DIMENSION = ", per root of dimension"
 """Of a unit."""
+NO_CONTEXT = "the method did no other task that shares the start and the first goals"
+IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
+NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
 
 
-def _read() -> dict[str, tuple[Signature, ...]]:
-    text = (Path(__file__).parent / "register.toml").read_text(encoding="utf-8")
-    return TypeAdapter(dict[str, tuple[Signature, ...]]).validate_python(tomllib.loads(text))
-
-
-_KINDS = _read()
+_KINDS = TypeAdapter(dict[str, tuple[Signature, ...]]).validate_python(
+    tomllib.loads(Path(__file__).with_name("register.toml").read_text(encoding="utf-8"))
+)
 WITHIN = _KINDS["within"]
 """Of one method's runs on one task."""
 CONTEXTS = _KINDS["contexts"]
@@ -32,3 +48,66 @@ FAMILIES = _KINDS["families"]
 """Of tasks that differ in one goal."""
 REGISTER = {signature.name: signature for signature in (*WITHIN, *CONTEXTS, *FAMILIES)}
 """All signatures by name."""
+
+
+def signature_rows(study: Study) -> list[SignatureRow]:
+    """Every signature of every method and task of a study.
+
+    Differences between contexts stand with the first task of the pair and name the other; tasks
+    that locus families join are no pairs, their slopes say how each depends on the others.
+    """
+    groups = families(study.tasks)
+    joined = variants(groups)
+    pairs = context_pairs(study.tasks)
+    pairs = [pair for pair in pairs if not any({*pair[:2]} <= names for names in joined)]
+    rows: list[SignatureRow] = []
+    for (task, label), cell in study.trajectories.items():
+        done = {name: its for (name, whose), its in study.trajectories.items() if whose == label}
+        own = [group for group in groups if task in group.tasks]
+        values = list(_measured(WITHIN, cell))
+        partners = [pair for pair in pairs if task in pair[:2] and {*pair[:2]} <= done.keys()]
+        for _, second, shared in (pair for pair in partners if pair[0] == task):
+            values += _of_pair(cell, done[second], shared)
+        if not partners:
+            values += without(CONTEXTS, IN_FAMILY if own else NO_CONTEXT)
+        for group in own:
+            cells = {name: done[name] for name in group.tasks if name in done}
+            if task == next(iter(cells)):
+                values += _measured(FAMILIES, Members(group, cells))
+        if not own:
+            values += without(FAMILIES, NO_FAMILY)
+        of_cell = partial(replace, task=task, method=cell.method, variant=cell.variant)
+        rows += map(of_cell, values)
+    return rows
+
+
+def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
+    """Of every shared goal with every hand that hit it in both contexts."""
+    for goal in range(1, shared + 1):
+        every = [Contexts(first, second, goal, hand) for hand in HANDS]
+        found = [contexts for contexts in every if all(contexts.runs)]
+        for contexts in found:
+            yield from _measured(CONTEXTS, contexts)
+        if not found:
+            place = Place(goal=goal, against=second.task.name)
+            yield from without(CONTEXTS, "no hand hit the goal in both contexts", place)
+
+
+def _measured(signatures: Iterable[Signature], what: Trajectories | Contexts | Members) -> Rows:
+    """Values of all signatures, those with the same measure together."""
+    for measure, measured in groupby(signatures, attrgetter("measure")):
+        yield from measure(what, *measured)
+
+
+def signatures_table(rows: Sequence[SignatureRow]) -> pd.DataFrame:
+    """The rows as ``signatures.csv`` has them, and ``label``.
+
+    Columns are the fields of :class:`~.rows.SignatureRow`, with the place in words (``where``),
+    then those of its :class:`~.rows.Place`. Signatures over runs are means with Student's
+    interval, shares of runs have Wilson's.
+    """
+    frame = pd.DataFrame(
+        {**vars(row), "place": str(row.place), **vars(row.place), "label": row.label}
+        for row in rows
+    ).rename(columns={"place": "where"})
+    return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ImportString
 
 from analysis.references import Key
+from analysis.statistics.intervals import Interval
 from coartic.tables import label_of
 
 NO_RUN = "no run has a solution"
@@ -56,6 +57,9 @@ class Place:
         return ", ".join(parts)
 
 
+_NOWHERE = Place()
+
+
 @dataclass(frozen=True, kw_only=True)
 class SignatureRow:
     """One value of a signature, or why there is none."""
@@ -65,7 +69,7 @@ class SignatureRow:
     method: str = ""
     variant: str = ""
     signature: str
-    place: Place = Place()
+    place: Place = _NOWHERE
     value: float = math.nan
     low: float = math.nan
     """Interval at 95 %."""
@@ -120,10 +124,16 @@ class Signature(BaseModel):
         """Whether it is a share of runs."""
         return self.extent.startswith("share")
 
-    def at(self, place: Place = Place(), **values: Any) -> SignatureRow:
+    def at(self, place: Place, **values: Any) -> SignatureRow:
         """A value of it, with its unit; ``values`` as :class:`SignatureRow` has them."""
         return SignatureRow(signature=self.name, place=place, **{"unit": self.unit, **values})
 
-    def without(self, why: str, place: Place = Place(), n: int = 0) -> SignatureRow:
-        """That it does not apply."""
-        return SignatureRow(signature=self.name, place=place, n=n, why_not=why)
+    def estimated(self, place: Place, found: Interval, n: int, **values: Any) -> SignatureRow:
+        """The same of a value with its interval or test, over so many runs."""
+        return self.at(place, **found._asdict(), n=n, **values)
+
+
+def without(of: Iterable[Signature], why: str, place: Place = _NOWHERE, n: int = 0) -> Rows:
+    """That none of them applies."""
+    for signature in of:
+        yield SignatureRow(signature=signature.name, place=place, n=n, why_not=why)

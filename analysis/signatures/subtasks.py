@@ -1,6 +1,8 @@
-"""Subtasks: what each costs within the whole, and what it would cost by itself."""
+"""Subtasks: what each costs within the whole, and with which hand it would be done by itself."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,8 +44,7 @@ def postures_before(execution: Execution, task: Task) -> list[Array]:
 
 def change_from(execution: Execution, reference: Execution) -> NDArray[np.int64]:
     """Ticks of each subtask less those of another solution, shape ``(G,)``; negative: faster."""
-    ticks, before = execution.ticks_by_goal(), reference.ticks_by_goal()
-    return np.array([a - b for a, b in zip(ticks, before, strict=True)], dtype=np.int64)
+    return np.subtract(execution.ticks_by_goal(), reference.ticks_by_goal(), dtype=np.int64)
 
 
 def sacrifices(change: ArrayLike) -> bool:
@@ -68,11 +69,9 @@ def sacrifice_p(changes: ArrayLike, *, seed: int, resamples: int = RESAMPLES) ->
     """
     ticks = np.asarray(changes, dtype=np.float64)
     first, total = ticks[:, 0], ticks.sum(axis=1)
-    tests = (
-        bootstrap_test(first, ROUNDING, seed=seed, resamples=resamples),
-        bootstrap_test(total, 0.0, "less", seed=seed, resamples=resamples),
-    )
-    return float(np.max([test.p for test in tests]))
+    longer = bootstrap_test(first, ROUNDING, seed=seed, resamples=resamples)
+    less = bootstrap_test(total, 0.0, "less", seed=seed, resamples=resamples)
+    return float(np.maximum(longer.p, less.p))
 
 
 def excess(path: Trajectory) -> Array:
@@ -82,10 +81,22 @@ def excess(path: Trajectory) -> Array:
     subtask is done worse than by itself, for what comes after; negative: better than the
     corrective process does it. NaN where no hand reaches the goal by itself.
     """
-    result = np.full(len(path.task.goals), np.nan)
-    ticks = path.execution.ticks_by_goal()
-    for number, q in enumerate(postures_before(path.execution, path.task), 1):
-        alone = isolated_reaches(path.task, q, number)
-        if alone:
-            result[number - 1] = ticks[number - 1] - min(alone.values())
-    return result
+    pairs = zip(path.execution.ticks_by_goal(), _alone(path), strict=True)
+    return np.array([ticks - min(alone.values(), default=math.nan) for ticks, alone in pairs])
+
+
+def isolated_agreement(path: Trajectory) -> list[bool]:
+    """Whether each goal is hit with the hand that would be chosen for it by itself.
+
+    That is the hand with which the corrective process alone reaches it in the fewest ticks
+    from the posture before; equally quick ones both agree. False for a goal that it reaches
+    with neither. Where False, the choice of hand serves other goals than its own.
+    """
+    pairs = zip(path.hands, _alone(path), strict=True)
+    return [hand in alone and alone[hand] == min(alone.values()) for hand, alone in pairs]
+
+
+def _alone(path: Trajectory) -> list[dict[Hand, int]]:
+    """:func:`isolated_reaches` of each subtask from the posture before it."""
+    befores = postures_before(path.execution, path.task)
+    return [isolated_reaches(path.task, q, number) for number, q in enumerate(befores, 1)]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
+from scipy import stats
 
-from analysis.signatures.recruitment import best_sequences
 from analysis.signatures.subtasks import change_from
 from coartic import Execution, Hand, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
@@ -67,8 +69,7 @@ class Trajectories:
     @cached_property
     def against_initial(self) -> NDArray[np.int64]:
         """Ticks of subtasks less the initial solution's, ``(runs, G)``; no row without one."""
-        initial = self.initial
-        return self._changes([initial] * len(self.runs))
+        return self._changes(dict.fromkeys(self.sequences, self.initial))
 
     @cached_property
     def against_same_hands(self) -> NDArray[np.int64]:
@@ -76,14 +77,14 @@ class Trajectories:
 
         Shape ``(n, G)``: runs whose hands it completes the task with.
         """
-        alone = {hands: self.corrective(hands) for hands in set(self.sequences)}
-        return self._changes([alone[hands] for hands in self.sequences])
+        return self._changes({hands: self.corrective(hands) for hands in set(self.sequences)})
 
-    def _changes(self, references: list[Execution | None]) -> NDArray[np.int64]:
+    def _changes(self, references: Mapping[str, Execution | None]) -> NDArray[np.int64]:
+        """From the solution that each hand sequence is compared with."""
         rows = [
             change_from(run.execution, reference)
-            for run, reference in zip(self.runs, references, strict=True)
-            if reference is not None
+            for run in self.runs
+            if (reference := references[run.execution.hands]) is not None
         ]
         return np.array(rows, dtype=np.int64).reshape(-1, len(self.task.goals))
 
@@ -95,10 +96,25 @@ def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:
 
 def last_ticks(runs: tuple[Trajectory, ...], goal: int, count: int) -> Array:
     """The last control ticks of each run up to a hit, shape ``(runs, count, dof)``."""
-    ends = [run.hits[goal - 1] + 1 for run in runs]
-    return np.array(
-        [run.configurations[end - count : end] for run, end in zip(runs, ends, strict=True)]
-    )
+    return np.array([run.configurations[: run.hits[goal - 1] + 1][-count:] for run in runs])
+
+
+def entropy(sequences: Iterable[str]) -> float:
+    """Shannon entropy of hand sequences over runs, bits.
+
+    The plug-in estimate, biased downwards for few runs. 0 (always the same sequence) to
+    log₂ of the number of runs, or G bits for G goals and two hands, whichever is less.
+    """
+    return float(stats.entropy(list(Counter(sequences).values()), base=2)) + 0.0
+
+
+def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
+    """The hand sequences that are best by the corrective process alone, ties included.
+
+    ``sequences`` is a results folder's table of that name. Empty where none has a reward.
+    """
+    own = sequences[(sequences.task == task) & sequences.reward.notna()]
+    return [str(hands) for hands in own.hands[own.reward == own.reward.max()]]
 
 
 def all_trajectories(study: Study) -> dict[tuple[str, str], Trajectories]:

@@ -21,7 +21,6 @@ from analysis.signatures.other_arm import (
     travel,
 )
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
-from analysis.signatures.recruitment import entropy, isolated_agreement
 from analysis.signatures.rows import (
     NO_INITIAL,
     NO_RUN,
@@ -32,9 +31,10 @@ from analysis.signatures.rows import (
     Rows,
     Signature,
     SignatureRow,
+    without,
 )
-from analysis.signatures.subtasks import excess, sacrifice_p, sacrifices
-from analysis.signatures.trajectories import Trajectories, postures
+from analysis.signatures.subtasks import excess, isolated_agreement, sacrifice_p, sacrifices
+from analysis.signatures.trajectories import Trajectories, entropy, postures
 from analysis.statistics import intervals
 from analysis.statistics.estimates import SEED
 from coartic.robot import Array
@@ -57,20 +57,16 @@ def _changes(
         yield mean_at(first, Place(goal=1), changes[:, 0])
         yield mean_at(total, Place(), changes.sum(axis=1))
     else:
-        yield from (signature.without(_no_reference(cell)) for signature in (first, total))
-
-
-def _no_reference(cell: Trajectories) -> str:
-    return NO_INITIAL if cell.runs else NO_RUN
+        yield from without((first, total), NO_INITIAL if cell.runs else NO_RUN)
 
 
 def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that sacrifice the first subtask, against their own hands."""
     changes = cell.against_same_hands
     if not len(changes):
-        yield signature.without(_no_reference(cell))
+        yield from without((signature,), NO_INITIAL if cell.runs else NO_RUN)
         return
-    shown = share_at(signature, Place(), [sacrifices(change) for change in changes])
+    shown = share_at(signature, Place(), [*map(sacrifices, changes)])
     p = sacrifice_p(changes, seed=SEED)
     why = shown.why_not
     if not why and math.isnan(p):
@@ -90,8 +86,7 @@ def of_two_hands(measure: Measure) -> Measure:
 
     def restricted(cell: Trajectories, *signatures: Signature) -> Rows:
         if len(cell.task.hands) < 2 or not cell.runs:
-            why = ONE_HAND if cell.runs else NO_RUN
-            return (signature.without(why) for signature in signatures)
+            return without(signatures, ONE_HAND if cell.runs else NO_RUN)
         return measure(cell, *signatures)
 
     return restricted
@@ -125,21 +120,20 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
         agrees = [hands in best for hands in cell.sequences]
         yield share_at(signature, Place(hands=", ".join(best)), agrees)
     else:
-        yield signature.without("the folder's table of sequences has no reward")
+        yield from without((signature,), "the folder's table of sequences has no reward")
 
 
 @of_two_hands
 def preshapings(cell: Trajectories, *signatures: Signature) -> Rows:
     """All preshaping, that seen from the base, that since the last hit; but at the last goal."""
     measures = (preshaping, preshaping_from_base, preshaping_since_hit)
-    initial = cell.initial
+    if (initial := cell.initial) is None:
+        yield from without(signatures, NO_INITIAL)
+        return
+    missing = "the other hand hits no later goal"
     for signature, nearer in zip(signatures, measures, strict=True):
-        if initial is None:
-            yield signature.without(NO_INITIAL)
-        else:
-            values = [nearer(run, initial) for run in cell.runs]
-            missing = "the other hand hits no later goal"
-            yield from by_goal(signature, len(cell.task.goals) - 1, values, missing)
+        values = [nearer(run, initial) for run in cell.runs]
+        yield from by_goal(signature, len(cell.task.goals) - 1, values, missing)
 
 
 @of_two_hands
@@ -154,7 +148,7 @@ def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
     for k, name in enumerate("xy"):
         place = Place(joint=f"base_{name}")
         if name in cell.task.locked_base:
-            yield signature.without("the coordinate is locked", place)
+            yield from without((signature,), "the coordinate is locked", place)
         else:
             yield mean_at(signature, place, [run[k] for run in reversals])
 
@@ -163,7 +157,7 @@ def turning(cell: Trajectories, signature: Signature) -> Rows:
     """Mean turning angle at every goal but the last."""
     goals = len(cell.task.goals)
     if goals < 2:
-        yield signature.without("the task has one goal")
+        yield from without((signature,), "the task has one goal")
         return
     turns = [
         turning_angles(np.vstack([run.task.q0, run.execution.configurations])) for run in cell.runs
@@ -179,14 +173,16 @@ def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Rows:
         yield mean_at(signature, Place(hand="chosen"), [run[k] for run in found], short)
 
 
-def synergies(
-    cell: Trajectories, within: Signature, across: Signature, delta: Signature, z: Signature
-) -> Rows:
-    """Variance over runs by what it does to the hand, over runs with the commonest hands."""
+def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
+    """Variance over runs by what it does to the hand, over runs with the commonest hands.
+
+    Within the uncontrolled manifold, across it, their ratio ΔV, and its transform z.
+    """
+    *parts, z = signatures
     runs, n = cell.typical, len(cell.typical)
     if n < 2:
         why = "one run: no variance across runs" if runs else NO_RUN
-        yield from (signature.without(why, n=n) for signature in (within, across, delta, z))
+        yield from without(signatures, why, n=n)
         return
     for number in range(1, len(cell.task.goals) + 1):
         hand = runs[0].hands[number - 1]
@@ -195,14 +191,13 @@ def synergies(
         found = synergy(q[:, joints], jacobian)
         place = Place(goal=number, hand=hand, hands=runs[0].execution.hands)
         why = "runs do not differ" if math.isnan(found.z.value) else ""
-        parts = (within, found.within), (across, found.orthogonal), (delta, found.delta)
-        for signature, value in parts:
+        for signature, value in zip(parts, found[:3], strict=True):
             yield signature.at(place, value=value, n=n, why_not=why)
         if not why:
             place = replace(place, neutral=found.neutral)
             if math.isnan(found.z.p):
                 why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield z.at(place, **found.z._asdict(), n=n, why_not=why)
+        yield z.estimated(place, found.z, n, why_not=why)
 
 
 def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: str = "") -> Rows:
@@ -221,17 +216,15 @@ def mean_at(
     """
     given = np.asarray(values, dtype=np.float64)
     known = given[np.isfinite(given)]
-    if not len(known):
+    n = len(known)
+    if not n:
         return signature.at(place, why_not=missing if len(given) else NO_RUN)
-    return _estimated(signature, place, intervals.mean(known), len(known))
+    why = ONE_RUN if n == 1 else ""
+    return signature.estimated(place, intervals.mean(known), n, why_not=why)
 
 
 def share_at(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
     """Share of runs, with Wilson's interval."""
-    return _estimated(signature, place, intervals.share(agrees), len(agrees))
-
-
-def _estimated(
-    signature: Signature, place: Place, found: intervals.Interval, n: int
-) -> SignatureRow:
-    return signature.at(place, **found._asdict(), n=n, why_not=ONE_RUN if n == 1 else "")
+    n = len(agrees)
+    why = ONE_RUN if n == 1 else ""
+    return signature.estimated(place, intervals.share(agrees), n, why_not=why)

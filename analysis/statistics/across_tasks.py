@@ -120,10 +120,11 @@ def profile(
     Percentile intervals of the stratified bootstrap, for each threshold alone; where all
     runs of a task reach it or none does, that task adds no width.
     """
-    levels = sample(thresholds)
-    reaches = [_reached(runs, levels, reached) for runs in values.values()]
-    if not reaches:
-        raise ValueError("a profile needs at least one task")
+    levels, beyond = sample(thresholds), np.greater if reached == "above" else np.less_equal
+    each = [np.asarray(runs, dtype=np.float64) for runs in values.values()]
+    if not each or any(runs.ndim != 1 or not runs.size for runs in each):
+        raise ValueError("a profile needs a vector of at least one run for every task")
+    reaches = [beyond.outer(runs, levels).astype(np.float64) for runs in each]
     share = np.mean([runs.mean(axis=0) for runs in reaches], axis=0)
     rng = np.random.default_rng(seed)
     drawn = np.zeros((resamples, len(levels)))
@@ -133,12 +134,3 @@ def profile(
         drawn += counts @ runs / len(runs)
     low, high = np.quantile(drawn / len(reaches), TAILS, axis=0)
     return Profile(levels, share, low, high, tuple(map(len, reaches)))
-
-
-def _reached(values: ArrayLike, thresholds: Array, reached: Reached) -> Array:
-    """1 where a run (row) reaches a threshold (column), else 0."""
-    runs = np.asarray(values, dtype=np.float64)
-    if runs.ndim != 1 or runs.size == 0:
-        raise ValueError("a profile needs a vector of at least one run for every task")
-    found = runs[:, None] > thresholds if reached == "above" else runs[:, None] <= thresholds
-    return found.astype(np.float64)

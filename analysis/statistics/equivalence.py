@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,22 +32,6 @@ from analysis.statistics.spread import mean, variance
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
-
-
-class Summary(Protocol):
-    """What is printed of a sample: its mean, its SD if there is one, and how many runs."""
-
-    @property
-    def mean(self) -> float:
-        """Of the sample."""
-
-    @property
-    def sd(self) -> float | None:
-        """Of the sample, n - 1 degrees of freedom; None where it is not printed."""
-
-    @property
-    def runs(self) -> int:
-        """Size of the sample."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,36 +55,34 @@ class Equivalence(Inference):
         return "undecided"
 
 
-def difference(ours: ArrayLike, published: Summary, *, margin: float | None = None) -> Equivalence:
-    """Our mean less the published one, with Welch's interval from its mean, SD and n.
+def difference(
+    ours: ArrayLike, published: float, sd: float | None, runs: int, *, margin: float | None = None
+) -> Equivalence:
+    """Our mean less the published one, with Welch's interval from its SD and number of runs.
 
-    Where no SD is printed the published mean is taken as exact, and the interval is
+    Where no SD is printed (None) the published mean is taken as exact, and the interval is
     Student's. The margin is :data:`MARGIN` of the published mean unless given. With fewer
     than two runs of our own there is no interval; without spread on either side it is a
     point.
     """
     values = sample(ours)
-    value = float(mean(values)) - published.mean
-    margin = MARGIN * abs(published.mean) if margin is None else _positive(margin)
-    spread = published.sd is not None and published.runs > 1
+    value = float(mean(values)) - published
+    margin = MARGIN * abs(published) if margin is None else _positive(margin)
+    theirs = [(sd**2, runs)] if sd is not None and runs > 1 else []
     found = Equivalence(
         estimate=value,
-        n=(len(values), published.runs) if spread else (len(values),),
+        n=(len(values), *(runs for _, runs in theirs)),
         method="difference to the published mean, "
-        + ("Welch's interval" if spread else "Student's interval, published mean as exact"),
+        + ("Welch's interval" if theirs else "Student's interval, published mean as exact"),
         margin=margin,
     )
     if len(values) < 2:
         return replace(found, note="no interval: fewer than 2 values")
-    variances = [float(variance(values)) / len(values)]
-    freedoms = [len(values) - 1]
-    if published.sd is not None and spread:
-        variances.append(published.sd**2 / published.runs)
-        freedoms.append(published.runs - 1)
-    total = sum(variances)
+    parts = [(v / n, n - 1) for v, n in [(float(variance(values)), len(values)), *theirs]]
+    total = sum(part for part, _ in parts)
     if total == 0.0:
         return replace(found, low=value, high=value, note=NO_SPREAD)
-    freedom = total**2 / sum(v**2 / f for v, f in zip(variances, freedoms, strict=True))
+    freedom = total**2 / sum(part**2 / free for part, free in parts)
     error = math.sqrt(total)
     _, low, high, _ = student(value, error, freedom)
     p = float(special.stdtr(freedom, (abs(value) - margin) / error))

@@ -91,7 +91,7 @@ def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Ar
 def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
     """Two samples, or where ``second`` is a number one sample of differences to it."""
     if np.ndim(second) == 0:
-        return (sample(sample(first) - float(np.asarray(second))),)
+        return (differences(first, second),)
     return sample(first), sample(second)
 
 
@@ -121,7 +121,7 @@ def paired_difference(
 
     Raises ValueError for samples of different length.
     """
-    samples = (differences_of_pairs(first, second),)
+    samples = (differences(first, second),)
     return bootstrap_estimate("mean of paired differences", samples, spread.mean, seed, resamples)
 
 
@@ -261,9 +261,9 @@ def _separated(n: tuple[int, ...], estimate: float) -> float:
     return far if estimate == 1.0 else 1 - far
 
 
-def differences_of_pairs(first: ArrayLike, second: ArrayLike) -> Array:
-    """``first − second``, pair by pair. Raises ValueError for samples of different length."""
-    a, b = sample(first), sample(second)
-    if a.shape != b.shape:
+def differences(first: ArrayLike, second: ArrayLike | float) -> Array:
+    """``first − second``, pair by pair or to a number. Raises ValueError for unequal lengths."""
+    a, b = sample(first), np.asarray(second, dtype=np.float64)
+    if b.ndim and a.shape != b.shape:
         raise ValueError(f"pairs need samples of one length, not {len(a)} and {len(b)}")
-    return a - b
+    return sample(a - b)

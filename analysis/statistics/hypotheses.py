@@ -11,7 +11,7 @@ Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -23,7 +23,7 @@ from analysis.statistics import spread
 from analysis.statistics.estimates import (
     RESAMPLES,
     Inference,
-    differences_of_pairs,
+    differences,
     sample,
     samples_of,
 )
@@ -92,15 +92,7 @@ def permutation_test(
     one too. NaN with fewer than two values in a sample.
     """
     samples = sample(first), sample(second)
-    return _permuted(
-        samples,
-        _bounded_t,
-        "independent",
-        "permutation test, studentised",
-        alternative,
-        seed,
-        resamples,
-    )
+    return _permuted(samples, "permutation test, studentised", alternative, seed, resamples)
 
 
 def sign_flip_test(
@@ -118,36 +110,26 @@ def sign_flip_test(
     ``resamples`` (13 pairs by default), otherwise as many are drawn. NaN with fewer than two
     pairs. Raises ValueError for samples of different length.
     """
-    differences = (
-        differences_of_pairs(first, second) if np.ndim(second) else samples_of(first, second)[0]
-    )
     name = "sign-flip test of paired differences"
-    return _permuted(
-        (differences,), spread.difference, "samples", name, alternative, seed, resamples
-    )
+    return _permuted((differences(first, second),), name, alternative, seed, resamples)
 
 
 def _permuted(
-    samples: tuple[Array, ...],
-    statistic: Callable[..., Array],
-    kind: Literal["independent", "samples"],
-    name: str,
-    alternative: Alternative,
-    seed: int,
-    resamples: int,
+    samples: tuple[Array, ...], name: str, alternative: Alternative, seed: int, resamples: int
 ) -> Inference:
-    n = tuple(map(len, samples))
-    exact = (math.comb(sum(n), n[0]) if kind == "independent" else 2 ** n[0]) <= resamples
+    """Two samples exchange their values; the differences that one sample has, their signs."""
+    n, two = tuple(map(len, samples)), len(samples) == 2
+    exact = (math.comb(sum(n), n[0]) if two else 2 ** n[0]) <= resamples
     drawn = "exact" if exact else f"Monte Carlo ({resamples} resamples)"
     method = f"{_TAILS[alternative]} {drawn} {name}"
     found = Inference(float(spread.difference(*samples)), n, method)
     if min(n) < 2:
-        few = "a sample has fewer than 2 values" if kind == "independent" else "fewer than 2 pairs"
+        few = "a sample has fewer than 2 values" if two else "fewer than 2 pairs"
         return replace(found, note=f"no test: {few}")
     result = stats.permutation_test(
         samples,
-        statistic,
-        permutation_type=kind,
+        _bounded_t if two else spread.difference,
+        permutation_type="independent" if two else "samples",
         alternative=alternative,
         vectorized=True,
         n_resamples=resamples,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import os
 import re
 import shutil
 import sys
@@ -12,17 +14,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
+from benchmarks import sandbox
 from benchmarks.run import run_suite
+from benchmarks.specification import RunSpec
 from coartic import execute, load_task
 from coartic.rows import movements_from
 from tests.support.suites import InProcess
 
-from .checkout import Driver, Ended, adopt_orphans, left_behind, read_json, run, size_of
+from .checkout import (
+    Driver,
+    Ended,
+    adopt_orphans,
+    in_process,
+    left_behind,
+    read_json,
+    run,
+    size_of,
+)
 from .methods import ATTACKS, Attack, Expectation
 
+HERE = Path(__file__).parents[2]
 TASK = "ascending"
 BUILT_IN = ("dual-process/EC1", "corrective-alone/given", "random-search/climbing")
 LIMIT_S = 90.0  # of a whole suite, for every hostile method in it
@@ -95,7 +110,7 @@ def hold(attack: Attack, root: Path, clean: Path, folder: Path) -> list[str]:
 def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) -> list[str]:
     """As :func:`hold`, in a folder that is there and stays; several attacks share a suite.
 
-    Several have to have the same expectation.
+    Several have to have the same expectation, and attack the checkout that this file is of.
     """
     attack = attacks[0]
     hostile = [_named(*a) for a in enumerate(attacks)] if len(attacks) > 1 else [attack]
@@ -109,7 +124,8 @@ def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) 
     if sources := [a.source for a in hostile if not a.installed]:
         (folder / "hostile.py").write_text("\n".join(sources), encoding="utf-8")
         command += ["--method-file", "hostile.py"]
-    ended = run(root, command, folder, limit=LIMIT_S * len(attacks), paths=paths)
+    perform = run if len(attacks) == 1 else _run_forked
+    ended = perform(root, command, folder, limit=LIMIT_S * len(attacks), paths=paths)
     found = _manners(attack, ended, folder)
     out = folder / "out"
     if attack.expects == "ended" and ended.code not in (0, 1):
@@ -119,12 +135,52 @@ def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) 
             found.append(f"the suite does not go on: {again.last_line}")
     if not (out / "manifest.json").exists():
         return found + ["no tables"] * (ended.code in (0, 1))
-    read = _driver(root).run("compare", clean, out)
+    words = ["compare", clean, out]
+    read = Ended(*in_process(words)) if root == HERE else _driver(root).run(*words)
     if read.code != 0:
         if not (attack.expects == "seen" and read.refused and read.names):
             found.append(f"the folder is not read: {read.last_line}")
         return found
     return found + _forged(hostile, clean, out)
+
+
+def _run_forked(
+    root: Path, arguments: Sequence[str], folder: Path, *, limit: float, paths: Sequence[Path] = ()
+) -> Ended:
+    """As :func:`run`, in a fork of this process, which has imported everything.
+
+    The hostile methods share one sandbox after another, apart from this project's methods: that
+    each has one of its own is for tests/test_sandbox.py.
+    """
+    assert root == HERE
+    assert not paths
+    said = folder / "said-forked.txt"
+
+    def command() -> None:
+        os.setsid()
+        os.chdir(folder)
+        for variable, name in (("HOME", "home"), ("TMPDIR", "tmp")):
+            (folder / name).mkdir(exist_ok=True)
+            os.environ[variable] = str(folder / name)
+        sandbox._RETRIES = 1
+        own_job = RunSpec.job
+
+        def job(spec: RunSpec) -> dict[str, Any]:
+            found = own_job(spec)
+            return {**found, "owner": found["owner"] and "hostile"}
+
+        RunSpec.job = job  # type: ignore[method-assign]
+        code, text = in_process(arguments)
+        said.write_text(text, encoding="utf-8", errors="backslashreplace")
+        sandbox.close_all()
+        sys.exit(code)
+
+    child = multiprocessing.get_context("fork").Process(target=command)
+    child.start()
+    child.join(limit)
+    code = child.exitcode
+    child.kill()
+    return Ended(code, said.read_text(encoding="utf-8") if said.exists() else "")
 
 
 def _named(number: int, attack: Attack) -> Attack:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 from analysis.claims.data import BEST, UNINFORMED, Data, MissingError
-from analysis.claims.evidence import by_optimum, measured, of_either_optimum
+from analysis.claims.evidence import by_optimum, layout, measured
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
-from analysis.comparisons.methods import TOLD
+from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.methods import LEARNER
-from analysis.report.document import Column, RestsOn, Row, Value
+from analysis.report.document import Row, Value
 from coartic.method import Information
 from coartic.record import SEARCH
 
@@ -45,29 +46,22 @@ def _learners_runs(data: Data) -> None:
         data.runs(task, LEARNER + condition)
 
 
-_BESIDE = (
-    Column("method", "method"),
-    Column("task", "task"),
-    Column("told", "told", rests_on=("text",)),
-    Column("reward", "mean reward", "number", digits=1, rests_on=("runs",)),
-)
-
-
 def _beside(
-    data: Data, labels: Iterable[str], values: Callable[[str, str], tuple[Value, ...] | None]
+    data: Data,
+    claim: str,
+    labels: Iterable[str],
+    values: Callable[[MethodRow], dict[str, Value] | None],
 ) -> list[Row]:
-    """Each method on each task where it can be judged and has values, which follow its reward."""
+    """Each method on each task where it can be judged and has values."""
     found = []
     for label, task in itertools.product(labels, _TASKS):
-        try:
-            data.runs(task, label)
-        except MissingError:
-            continue
-        own = values(task, label)
-        if own is not None:
-            row = data.study.method_rows[task, label]
-            shown = (label, task, row.told, row.reward, *own)
-            found.append(Row(f"{label} on {task}", shown, ((task, label),)))
+        with suppress(MissingError):
+            row = data.row(task, label)
+            own = values(row)
+            if own is not None:
+                own = {"method": label, **own}
+                key = f"{label} on {task}"
+                found.append(layout(claim).row(key, row, [(task, label)], **own))
     return found
 
 
@@ -80,31 +74,23 @@ def _experience(data: Data) -> Finding:
     # Methods that keep the other arm still, to the optimum with it still: their last row.
     reached = {(row.task, row.method): row for row in rows}
 
-    def values(task: str, label: str) -> tuple[Value, ...] | None:
-        row = reached.get((task, label))
+    def values(of: MethodRow) -> dict[str, Value] | None:
+        row = reached.get((of.task, of.label))
         if row is None:
             return None
         median = None if math.isinf(row.median) else float(row.median)
-        return (int(row.runs), *by_optimum(row.other_arm, int(row.reached), median))
+        arm, reached_it = row.other_arm, int(row.reached)
+        return {"runs": int(row.runs)} | by_optimum(arm, reached=reached_it, median_trials=median)
 
     _learners_runs(data)
-    near_it = f"within {NEAR:.0%} of the optimum"
-    rests: tuple[RestsOn, ...] = ("runs", "optimum")
+    found = _beside(data, "reward-by-experience", _labels(data, _uninformed), values)
     return measured(
         "reward-by-experience",
-        f"runs {near_it} (of that with the other arm still, for methods "
+        f"runs within {NEAR:.0%} of the optimum (of that with the other arm still, for methods "
         "that keep it so), median trials until then, and the mean reward at the end; "
         "every method that is told no more than the learner",
-        f"Runs that come {near_it}, and median trials until then, over all runs",
-        (
-            *_BESIDE,
-            Column("runs", "runs", "number", rests_on=("runs",)),
-            *of_either_optimum(
-                Column("reached", f"within {NEAR:.0%}", "number", rests_on=rests),
-                Column("median_trials", "median trials", "number", digits=0, rests_on=rests),
-            ),
-        ),
-        _beside(data, _labels(data, _uninformed), values),
+        found,
+        near=NEAR,
     )
 
 
@@ -113,9 +99,9 @@ def _computation(data: Data) -> Finding:
     """Kinematics that uninformed methods evaluate, and informed ones in their default form."""
     _learners_runs(data)
 
-    def values(task: str, label: str) -> tuple[Value, ...]:
-        row = data.study.method_rows[task, label]
-        return (row.evaluations, row.evaluations / row.trials if row.trials > 1 else None)
+    def values(row: MethodRow) -> dict[str, Value]:
+        a_trial = row.evaluations / row.trials if row.trials > 1 else None
+        return {"evaluations": row.evaluations, "evaluations_a_trial": a_trial}
 
     uninformed = _labels(data, _uninformed)
     informed = [
@@ -128,11 +114,5 @@ def _computation(data: Data) -> Finding:
         "evaluations of forward kinematics and Jacobian in a run (median), and per trial, beside "
         "the mean reward they buy; letters of what is told: docs/methods.md. First "
         "methods that are told no more than the learner, then informed search in its default form",
-        "Evaluations of forward kinematics and Jacobian in a run (median)",
-        (
-            *_BESIDE,
-            Column("evaluations", "evaluations", "number", digits=0, rests_on=("runs",)),
-            Column("evaluations_a_trial", "a trial", "number", rests_on=("runs",)),
-        ),
-        _beside(data, [*uninformed, *informed], values),
+        _beside(data, "computation", [*uninformed, *informed], values),
     )

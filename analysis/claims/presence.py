@@ -14,7 +14,7 @@ from analysis.claims.one_armed import context_distance, sacrifice
 from analysis.claims.register import Finding
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
-from analysis.report.document import CellKey, Column, Row, Value
+from analysis.report.document import CellKey, Row, Value
 from analysis.statistics.estimates import LEVEL
 
 _PLAN, _POSTURES = "trajectory-optimisation/", "posture-based/"
@@ -97,45 +97,28 @@ def _reward(data: Data, label: str) -> float:
     return float(rewards_of(data.runs(ASCENDING, label)).mean())
 
 
-def _number(name: str, header: str, unit: str = "", digits: int = 2) -> Column:
-    return Column(name, header, "number", unit, digits, rests_on=("runs",), printed=False)
-
-
 class _Sign(NamedTuple):
-    """A signature whose presence is asked for."""
+    """A signature whose presence is asked for; its column has its name."""
 
     name: str
     show: Callable[[Data, str], Seen]
-    numbers: tuple[Column, ...]
+    numbers: tuple[str, ...]
+    """Columns of its numbers."""
     two_armed: bool = False
 
     @property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[str, ...]:
         """Whether it is there, and its numbers."""
-        return (Column(self.name.replace("-", "_"), self.name, rests_on=("runs",)), *self.numbers)
+        return (self.name.replace("-", "_"), *self.numbers)
 
 
 _SIGNS = (
-    _Sign("context", _context, (_number("context_distance", "postures apart"),)),
-    _Sign(
-        "sacrifice",
-        _sacrifice,
-        (
-            _number("first_change", "first movement", "ticks", 1),
-            _number("total_change", "all movements", "ticks", 1),
-        ),
-    ),
-    _Sign(
-        "motor-equivalent",
-        _equivalence,
-        (
-            _number("equivalent_part", "motor-equivalent part", digits=3),
-            _number("other_part", "other part", digits=3),
-        ),
-    ),
-    _Sign("preshaping", _preshaping, (_number("nearer", "waiting hand nearer"),), two_armed=True),
-    _Sign("lead", _lead, (_number("lead_time", "lead time", "ticks", 0),)),
-    _Sign("turning", _turning, (_number("turning_angles", "turning angles", "rad"),)),
+    _Sign("context", _context, ("context_distance",)),
+    _Sign("sacrifice", _sacrifice, ("first_change", "total_change")),
+    _Sign("motor-equivalent", _equivalence, ("equivalent_part", "other_part")),
+    _Sign("preshaping", _preshaping, ("nearer",), two_armed=True),
+    _Sign("lead", _lead, ("lead_time",)),
+    _Sign("turning", _turning, ("turning_angles",)),
 )
 
 
@@ -160,16 +143,11 @@ def _shared_signatures(data: Data) -> Finding:
                 present, numbers = found
                 values += ["yes" if present else "no", *numbers]
                 shown.setdefault(sign.name, []).extend([name] * present)
-            by_column |= {column.name: own for column in sign.columns if own != cells}
+            by_column |= {column: own for column in sign.columns if own != cells}
         rows.append(Row(name, tuple(values), cells, by_column))
-    columns = (
-        Column("method", "method"),
-        Column("reward", "reward, ascending", "number", digits=1, rests_on=("runs",)),
-        *(column for sign in _SIGNS for column in sign.columns),
-    )
     evidence = "; ".join(
         f"{sign.name}: "
         + (", ".join(shown[sign.name]) or "none" if sign.name in shown else "not judged")
         for sign in _SIGNS
     )
-    return measured("shared-signatures", evidence, "Signatures", columns, rows)
+    return measured("shared-signatures", evidence, rows)
