@@ -236,13 +236,12 @@ def _cost(study: Study, figures: list[Block]) -> Section:
 
 def _signatures(study: Study, figures: list[Block]) -> Section:
     short = _many(study)
-    below = _by_task(
-        study,
-        "signatures",
-        lambda task: _tables(*signatures_tables(study, task, short=short)),
-    )
+
+    def of(task: str) -> list[Block]:
+        return _tables(*signatures_tables(study, task, short=short))
+
     between = _tables(contexts_table(study), *slopes_tables(study))
-    title = "Signatures of coarticulation"
+    title, below = "Signatures of coarticulation", _by_task(study, "signatures", of)
     return _section("coarticulation", title, [*figures, *between], below)
 
 
@@ -272,21 +271,18 @@ def _about(
             f"No figure {escaped(name)}: {escaped(why.removeprefix(f'{study.results.folder}: '))}."
             for name, why in figures.skipped.items()
         ),
-        *([_few(study)] if _many(study) else []),
     ]
+    if _many(study):
+        items.append(
+            f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has "
+            "no tables of pairs, targets, areas, Pareto sets and further signatures by task, and "
+            "no figures of signatures; `coartic analyse` writes all of them as CSV."
+        )
     return _section("about", "Tracing and citing", [Bullets(tuple(items))])
 
 
 def _many(study: Study) -> bool:
     return len(study.results.tasks) > MOST_TASKS
-
-
-def _few(study: Study) -> str:
-    return (
-        f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has no "
-        "tables of pairs, targets, areas, Pareto sets and further signatures by task, and no "
-        "figures of signatures; `coartic analyse` writes all of them as CSV."
-    )
 
 
 def _section(

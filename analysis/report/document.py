@@ -236,11 +236,7 @@ class Document:
 
     def __post_init__(self) -> None:
         ids = [section.id for section in self.walk()]
-        ids += [
-            block.id
-            for block in self.blocks()
-            if isinstance(block, DataTable | FigureBlock | PlayerBlock)
-        ]
+        ids += [block.id for block in self.blocks() if not isinstance(block, Prose | Bullets)]
         for name in ids:
             if not _ID.fullmatch(name):
                 raise ValueError(f"id {name!r}: small letters and digits, joined by - or .")

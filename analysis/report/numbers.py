@@ -131,11 +131,7 @@ def macro_names(study: Study) -> Names:
 def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
     """The macros as a LaTeX file. Numbers go through ``\\coarticnum``, which may be redefined."""
     layout = template("numbers.tex.jinja", one_line, **LATEX)
-    return layout.render(numbers=numbers, about=about, shown=_tex, prefix=PREFIX)
-
-
-def _tex(number: str) -> str:
-    return f"\\{PREFIX}num{{{number}}}"
+    return layout.render(numbers=numbers, about=about, prefix=PREFIX)
 
 
 def _distinct(names: Iterable[str]) -> dict[str, str]:

@@ -19,7 +19,7 @@ from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
 from coartic import Robot, Task, Trajectory, corrective_trial, initial_hands, trajectory
 from coartic.errors import NotApplicableError
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS
 from coartic.text import json_text
 
 TOLERANCE = 0.005
@@ -150,13 +150,11 @@ def _movement(head: dict[str, Any], run: Trajectory, unit: float) -> dict[str, A
 
 def _box(task: Task, runs: list[Trajectory]) -> list[float]:
     """What must be in sight: left, bottom, right, top; length unit."""
-    clouds: list[Array] = [task.goal_array]
+    robot, clouds = task.robot, [task.goal_array]
     for run in runs:
-        clouds.append(task.robot.base_outline(run.configurations).reshape(-1, 2))
-        clouds += [
-            task.robot.joint_positions(run.configurations, hand).reshape(-1, 2)
-            for hand in task.hands
-        ]
+        q = run.configurations
+        joints = (robot.joint_positions(q, hand) for hand in task.hands)
+        clouds += [cloud.reshape(-1, 2) for cloud in (robot.base_outline(q), *joints)]
     points = np.concatenate(clouds)
     corners = [points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN]
     return [round(float(value), 2) for value in np.concatenate(corners)]

@@ -21,6 +21,7 @@ from coartic.record import Environment
 from coartic.text import counted
 
 _CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
+_VARIANT = re.compile(r"=|\bEC\d-")
 _VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell")
 
 
@@ -116,14 +117,10 @@ def without_variants(of: DataTable) -> tuple[DataTable, DataTable | None]:
 
     Variants are what was run with other parameters, and ablations of the learner.
     """
-    variants = tuple(row for row in of.rows if _is_variant(row.key))
-    kept = tuple(row for row in of.rows if not _is_variant(row.key))
+    variants = tuple(row for row in of.rows if _VARIANT.search(row.key))
+    kept = tuple(row for row in of.rows if not _VARIANT.search(row.key))
     if not variants or not kept:
         return of, None
     caption = f"{of.caption.removesuffix('.')}: variants of parameters, ablations."
     folded = replace(of, id=f"{of.id}-variants", caption=caption, rows=variants, folded=True)
     return replace(of, rows=kept), folded
-
-
-def _is_variant(method: str) -> bool:
-    return "=" in method or bool(re.search(r"\bEC\d-", method))

@@ -37,12 +37,8 @@ def table_csv(table: DataTable) -> str:
 
 def runs_csv(document: Document) -> str:
     """``task``, ``label`` and ``run_id`` of every run behind the tables."""
-    return _csv(
-        [
-            ["task", "label", "run_id"],
-            *([*cell, run] for cell, runs in document.runs.items() for run in runs),
-        ]
-    )
+    lines = ([*cell, run] for cell, runs in document.runs.items() for run in runs)
+    return _csv([["task", "label", "run_id"], *lines])
 
 
 def _text(value: Value) -> str:

@@ -1,1 +1,1 @@
-"""The pages of ``coartic analyse``: documents of the report's tables, with what explains them."""
+"""The pages of ``coartic analyse``: their tables, with what explains them."""

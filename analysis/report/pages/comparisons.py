@@ -155,14 +155,12 @@ def _pairing(study: Study) -> str:
 
 def _pairs(study: Study, task: str, layout: Layout, **facts: str) -> DataTable | None:
     """Conditions, methods, variants; of each the best second first."""
-    pairs = sorted(
-        (row for row in study.pair_rows if row.task == task),
-        key=lambda row: (
-            list(_OTHERS).index(row.kind),
-            row.first,
-            -np.nan_to_num(row.mean_second, nan=-np.inf),
-        ),
-    )
+
+    def place(row: PairRow) -> tuple[int, str, float]:
+        mean = float(np.nan_to_num(row.mean_second, nan=-np.inf))
+        return list(_OTHERS).index(row.kind), row.first, -mean
+
+    pairs = sorted((row for row in study.pair_rows if row.task == task), key=place)
     rows = [
         layout.row(
             f"{pair.first} - {pair.second}", pair, ((task, pair.first), (task, pair.second))

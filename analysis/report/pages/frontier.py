@@ -47,14 +47,11 @@ _TARGETS, _AREAS, _PARETO = (LAYOUTS[name] for name in ("targets", "areas", "par
 
 def frontier_document(study: Study) -> Document:
     """All tables of reward against cost, task by task."""
-    reading = Section("reading", "How to read it", (Bullets(reading_of_cost()),))
-    by_task = (_on(study, task, slug) for task, slug in table_ids(study).items())
-    return Document("Reward and what it costs", (reading, *by_task), runs=study.run_ids)
-
-
-def _on(study: Study, task: str, slug: str) -> Section:
-    blocks: tuple[Block, ...] = optima_known(study, task), *cost_tables(study, task)
-    return Section(f"on-{slug}", marked(study, task), blocks)
+    sections = [Section("reading", "How to read it", (Bullets(reading_of_cost()),))]
+    for task, slug in table_ids(study).items():
+        blocks: tuple[Block, ...] = optima_known(study, task), *cost_tables(study, task)
+        sections.append(Section(f"on-{slug}", marked(study, task), blocks))
+    return Document("Reward and what it costs", tuple(sections), runs=study.run_ids)
 
 
 def cost_tables(study: Study, task: str) -> Iterator[DataTable]:

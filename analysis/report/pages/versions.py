@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from analysis.comparisons.versions import SPENT, VersionComparison, VersionRow
 from analysis.markup import code, escaped
@@ -67,19 +66,18 @@ def versions_table(found: VersionComparison) -> DataTable | None:
 
 def _row(row: VersionRow) -> Row:
     (mean_a, mean_b), (solved_a, solved_b) = row.both("reward"), row.both("solved")
-    own: dict[str, Any] = {name: _ratio(*row.both(name)) for name in SPENT} | {
-        "mean_a": finite(mean_a),
-        "mean_b": finite(mean_b),
-        "solved_a": solved_a,
-        "solved_b": solved_b,
-    }
     return _CELLS.row(
         f"{row.a.task} {row.a.label}",
         row,
+        (),
         task=row.a.task,
         method=row.a.label,
+        mean_a=finite(mean_a),
+        mean_b=finite(mean_b),
+        solved_a=solved_a,
+        solved_b=solved_b,
         paired=None if row.paired is None else "yes" if row.paired else "no",
-        **own,
+        **{name: _ratio(*row.both(name)) for name in SPENT},
     )
 
 

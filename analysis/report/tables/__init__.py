@@ -1,4 +1,4 @@
-"""The report's tables: frames of the analysis as tables that know their cells.
+"""The tables that several pages share: frames of the analysis as tables that know their cells.
 
 To add one: a section of ``tables.toml``, which says what it has beside values, a function that
 makes its rows, and its call where it is shown (:mod:`analysis.report.build`).

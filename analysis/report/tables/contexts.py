@@ -104,16 +104,9 @@ def _slopes_at(
                 kin = "joints" if row.place.joint else "norms"
                 found.append(Row(f"{label}, {what}", values, cells, family=kin))
     columns = columns_of(REGISTER["locus slope"], "slope", "slope", "p", p_printed=True)
-    return (
-        LAYOUTS["slopes"]
-        .plus(columns)
-        .table(
-            found,
-            *(table_ids(study)[task], str(place.goal), "of", str(place.moving), place.hand),
-            place=place,
-            task=escaped(task),
-        )
-    )
+    names = table_ids(study)[task], str(place.goal), "of", str(place.moving), place.hand
+    layout = LAYOUTS["slopes"].plus(columns)
+    return layout.table(found, *names, place=place, task=escaped(task))
 
 
 def _cells_there(study: Study, cells: Iterable[CellKey]) -> tuple[CellKey, ...]:

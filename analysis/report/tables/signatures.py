@@ -56,11 +56,8 @@ def signatures_tables(study: Study, task: str, *, short: bool = False) -> list[D
     ``short``: the main ones and those of the other arm alone.
     """
     rows = [row for row in study.signature_rows if row.task == task]
-    kinds = [
-        kind
-        for kind in (_SHORT if short else _KINDS)
-        if kind != "hands" or len(study.tasks[task].hands) > 1
-    ]
+    left_out = "" if len(study.tasks[task].hands) > 1 else "hands"
+    kinds = (kind for kind in (_SHORT if short else _KINDS) if kind != left_out)
     return list(filter(None, (_of_task(study, task, kind, rows) for kind in kinds)))
 
 
