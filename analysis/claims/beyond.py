@@ -99,9 +99,7 @@ def _proposals(data: Data) -> Finding:
         own = data.rewards(task, condition)
         other = rewards_of(data.learned(task, f"{condition}-{proposal}"))
         gain = difference_of_means(other, own, seed=SEED)
-        cells = tuple(
-            (task, f"{LEARNER}{name}") for name in (condition, f"{condition}-{proposal}")
-        )
+        cells = [(task, LEARNER + name) for name in (condition, f"{condition}-{proposal}")]
         row = layout("proposals").row(
             f"{task} {condition} {proposal}",
             cells=cells,

@@ -50,18 +50,15 @@ def _beside(
     data: Data,
     claim: str,
     labels: Iterable[str],
-    values: Callable[[MethodRow], dict[str, Value] | None],
+    values: Callable[[MethodRow], dict[str, Value]],
 ) -> list[Row]:
     """Each method on each task where it can be judged and has values."""
     found = []
     for label, task in itertools.product(labels, _TASKS):
         with suppress(MissingError):
             row = data.row(task, label)
-            own = values(row)
-            if own is not None:
-                own = {"method": label, **own}
-                key = f"{label} on {task}"
-                found.append(layout(claim).row(key, row, [(task, label)], **own))
+            own = {"method": label, **values(row)}
+            found.append(layout(claim).row(f"{label} on {task}", row, [(task, label)], **own))
     return found
 
 
@@ -74,10 +71,10 @@ def _experience(data: Data) -> Finding:
     # Methods that keep the other arm still, to the optimum with it still: their last row.
     reached = {(row.task, row.method): row for row in rows}
 
-    def values(of: MethodRow) -> dict[str, Value] | None:
+    def values(of: MethodRow) -> dict[str, Value]:
         row = reached.get((of.task, of.label))
         if row is None:
-            return None
+            raise MissingError(f"no run of {of.label} on {of.task} has steps")
         median = None if math.isinf(row.median) else float(row.median)
         arm, reached_it = row.other_arm, int(row.reached)
         return {"runs": int(row.runs)} | by_optimum(arm, reached=reached_it, median_trials=median)

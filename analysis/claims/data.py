@@ -47,13 +47,8 @@ BEST: Cells = ((ASCENDING, "EC1"), (DESCENDING, "EC1"), (ONE, "EC4"), (TWO, "EC4
 UNINFORMED = {TOLD[Information.CORRECTIVE_PROCESS], TOLD[Information.REWARD_BY_TRIAL]}
 """All that the paper's learner is told (condition 2 is also told where the hands are)."""
 
-SMOOTH = {
-    "squared-changes": "least squared configuration changes (Jordan)",
-    "acceleration": "least acceleration",
-    "jerk": "least jerk (Flash & Hogan)",
-}
-"""Smoothness costs of trajectory optimisation, in words."""
-
+SMOOTH = ("squared-changes", "acceleration", "jerk")
+"""Smoothness costs of trajectory optimisation: Jordan's, and Flash & Hogan's last."""
 
 Read = TypeVar("Read")
 

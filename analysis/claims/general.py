@@ -6,6 +6,7 @@ are a reconstruction.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -71,18 +72,15 @@ def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
     parts, all_excess = [], []
     for name in dict.fromkeys(task for task, _ in cells):
         task, initial = data.task(name), data.initial(name)
-        ways, shortest = [], []
-        for k, (q, hand) in enumerate(
-            zip(postures_before(initial, task), hands_of(initial.hands), strict=True)
-        ):
-            end = initial.configurations[k]
-            ways.append(float(np.linalg.norm(end - q)))
-            shortest.append(shortest_reach(task, q, hand, k + 1, end, SEED))
-        excess = [way / least - 1 for way, least in zip(ways, shortest, strict=True)]
-        all_excess += excess
+        before, after = postures_before(initial, task), initial.configurations
+        reaches = zip(before, hands_of(initial.hands), itertools.count(1), after, strict=False)
+        shortest = np.array([shortest_reach(task, *reach, SEED) for reach in reaches])
+        ways = np.linalg.norm(after - before, axis=1)
+        excess = ways / shortest - 1
+        all_excess += excess.tolist()
         parts.append(
             f"{name} {', '.join(f'{share:+.1%}' for share in excess)} (in all "
-            f"{sum(ways) / sum(shortest) - 1:+.1%})"
+            f"{ways.sum() / shortest.sum() - 1:+.1%})"
         )
     return Finding(
         max(all_excess) <= CLOSE,

@@ -23,11 +23,13 @@ def surroundings(first: Study, second: Study) -> tuple[list[Differing], list[str
     a, b = _facts(first), _facts(second)
     rows = [Differing(name, a[name], b[name]) for name in a if a[name] != b[name]]
     same = [name for name in a if a[name] and a[name] == b[name]]
-    for what, kinds, (ours, theirs) in (
-        ("task", "tasks", _task_texts(first, second)),
-        ("code of", "methods", (codes(first), codes(second))),
-        ("library", "libraries", (_packages(first), _packages(second))),
+    tasks = differing_tasks(first, second)
+    for what, kinds, texts in (
+        ("task", "tasks", lambda study: _task_texts(study, tasks)),
+        ("code of", "methods", codes),
+        ("library", "libraries", lambda study: study.results.manifest.environment.packages),
     ):
+        ours, theirs = texts(first), texts(second)
         shared = [name for name in ours if name in theirs]
         differing = [name for name in shared if ours[name] != theirs[name]]
         rows += [Differing(f"{what} {name}", ours[name], theirs[name]) for name in differing]
@@ -89,21 +91,12 @@ def _facts(study: Study) -> dict[str, str]:
     return {name: "" if value is None else str(value) for name, value in facts.items()}
 
 
-def _task_texts(first: Study, second: Study) -> tuple[dict[str, str], dict[str, str]]:
+def _task_texts(study: Study, differing: dict[str, list[str]]) -> dict[str, str]:
     """By task the keys, with their values, in which it differs from the other of its name."""
-    differing = differing_tasks(first, second)
-    here, there = (
-        {
-            name: ", ".join(f"{key} {task.get(key)}" for key in differing.get(name, ()))
-            for name, task in _tasks(study).items()
-        }
-        for study in (first, second)
-    )
-    return here, there
-
-
-def _packages(study: Study) -> dict[str, str]:
-    return study.results.manifest.environment.packages
+    return {
+        name: ", ".join(f"{key} {task.get(key)}" for key in differing.get(name, ()))
+        for name, task in _tasks(study).items()
+    }
 
 
 def _named(of: object, *names: str) -> dict[str, Any]:

@@ -239,24 +239,20 @@ def _panels(panels: Sequence[Axes], solution: Solution, low: Array, high: Array)
 
 def _data(shown: Sequence[Solution]) -> pd.DataFrame:
     """One row a goal and one for the start (goal 0), with the configuration."""
-    rows = []
+    parts = []
     for solution in shown:
         task, execution = solution.task, solution.execution
-        spent = (0, *execution.ticks_by_goal())
-        postures = [task.q0, *execution.configurations]
-        hands = ("", *hands_of(execution.hands))
-        for goal, (q, hand, ticks) in enumerate(zip(postures, hands, spent, strict=True)):
-            rows.append(
-                {
-                    "task": task.name,
-                    "method": solution.method or "initial",
-                    "run_id": solution.run_id,
-                    "hands": execution.hands,
-                    "total": -execution.ticks,
-                    "goal": goal,
-                    "hand": hand,
-                    "reward": -ticks,
-                    **dict(zip(task.robot.joint_names, q.tolist(), strict=True)),
-                }
-            )
-    return pd.DataFrame(rows)
+        postures = np.array([task.q0, *execution.configurations])
+        columns = {
+            "task": task.name,
+            "method": solution.method or "initial",
+            "run_id": solution.run_id,
+            "hands": execution.hands,
+            "total": -execution.ticks,
+            "goal": range(len(postures)),
+            "hand": ["", *hands_of(execution.hands)],
+            "reward": [0, *(-ticks for ticks in execution.ticks_by_goal())],
+            **dict(zip(task.robot.joint_names, postures.T, strict=True)),
+        }
+        parts.append(pd.DataFrame(columns))
+    return pd.concat(parts, ignore_index=True)

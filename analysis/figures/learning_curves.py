@@ -9,12 +9,12 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from analysis.figures import style
-from analysis.figures.configurations import initial_solution
 from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import CONDITIONS, has, missing
 from analysis.methods import short_name
+from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
-from coartic import CoarticError, Task
+from coartic import Task
 from coartic.robot import Array
 
 WINDOW = 100
@@ -115,13 +115,10 @@ def _panel(
         axes.plot(rows.trial, rows.best, linewidth=1.3, **look.line)
         axes.plot(rows.trial, rows.trials, linewidth=0.6, **look.line)
     floor, top = data.best.min(), data.best_high.max()
-    try:
-        initial = -initial_solution(study, task.name).execution.ticks
-    except CoarticError:
-        initial = None
+    initial = Trajectories(task, "", "", ()).initial
     if initial is not None:
-        axes.axhline(initial, **style.INITIAL)
-        floor, top = initial, max(top, initial)
+        axes.axhline(-initial.ticks, **style.INITIAL)
+        floor, top = -initial.ticks, max(top, -initial.ticks)
     optimum = study.optima.get((task.name, "free"))
     if optimum is not None:
         axes.axhline(optimum.reward, **style.OPTIMUM)
