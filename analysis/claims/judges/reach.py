@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from scipy import optimize
 
 from analysis.signatures.manifold import movable
 from coartic import Hand, Task
-from coartic.robot import Array
+from coartic.robot import Array, Robot
 
 STARTS = 8
 """Random starts of the search beside the given one."""
@@ -26,8 +27,23 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array, se
     so at least as long as the global one. Infinite where none is found. Length unit and rad
     mixed.
     """
-    joints = movable(task, hand)
-    centre = np.array(task.goals[goal - 1])
+    joints = tuple(np.arange(task.robot.dof)[movable(task, hand)].tolist())
+    given = tuple(q.tolist()), tuple(guess.tolist())
+    return _shortest(task.robot, task.radius, task.goals[goal - 1], hand, joints, *given, seed)
+
+
+@lru_cache(256)  # the same for every folder with the task
+def _shortest(
+    robot: Robot,
+    radius: float,
+    centre: tuple[float, float],
+    hand: Hand,
+    movable_joints: tuple[int, ...],
+    before: tuple[float, ...],
+    guess: tuple[float, ...],
+    seed: int,
+) -> float:
+    joints, q = list(movable_joints), np.array(before)
 
     def moved(change: Array) -> Array:
         result = q.copy()
@@ -35,17 +51,17 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array, se
         return result
 
     def miss(change: Array) -> Array:
-        return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
+        return np.asarray(robot.forward_kinematics(moved(change), hand) - centre)
 
     def inside(change: Array) -> float:
         off = miss(change)
-        return float(task.radius**2 - off @ off)
+        return float(radius**2 - off @ off)
 
     def inside_gradient(change: Array) -> Array:
-        jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
+        jacobian = robot.jacobian(moved(change), hand)[:, joints]
         return np.asarray(-2 * miss(change) @ jacobian)
 
-    first = (guess - q)[joints]
+    first = (np.array(guess) - q)[joints]
     rng = np.random.default_rng(seed)
     best = math.inf
     for start in (first, *(first + rng.normal(0, SPREAD, (STARTS, len(joints))))):
