@@ -39,6 +39,12 @@ def _kernels(session_folder):
             warm_up()
 
 
+@pytest.fixture(autouse=True)
+def _plain_width(monkeypatch):
+    """Output as wide as it is without a terminal, whatever started the tests."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
 @pytest.fixture
 def undrawn():
     """Reports without figures, which take long and have tests of their own."""

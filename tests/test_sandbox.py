@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import ClassVar
 
 import psutil
 import pytest
@@ -142,8 +143,8 @@ def workers_of(pid):
     return [p for p, (_, line) in parents.items() if b"benchmarks.worker" in line and below(p)]
 
 
-def test_a_method_that_kills_its_own_process_is_data_after_some_tries(known, monkeypatch):
-    monkeypatch.setattr(sandbox, "_RETRIES", 1)
+def test_a_method_that_kills_its_own_process_is_data(known, monkeypatch):
+    monkeypatch.setattr(sandbox, "_RETRIES", 0)
     (spec,) = spec_of(known, "test/segfaults")
     record = perform_once(spec)
     assert record.status == "crashed"
@@ -227,19 +228,58 @@ def test_what_a_method_starts_ends_with_it(known, tmp_path):
     assert sleepers() == []
 
 
-def test_a_method_that_is_not_built_in_has_a_process_of_its_own(known):
-    names = ("test/good", "test/leaver", "dual-process/EC1")
+class Counted:
+    """Sandboxes in name only, each with what it was asked to perform."""
+
+    made: ClassVar[list["Counted"]] = []
+    answers = staticmethod(lambda question: b"done")
+
+    def __init__(self):
+        self.jobs, self.alive = [], True
+        self.made.append(self)
+
+    def ask(self, question, limit_s, *, patient=False):
+        if question["question"] == "prepare":
+            return b"ready"
+        assert self.alive
+        self.jobs.append(question["run_id"])
+        answer = self.answers(question)
+        self.alive = isinstance(answer, bytes)
+        return answer
+
+    def close(self):
+        self.alive = False
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    monkeypatch.setattr(Counted, "made", [])
+    monkeypatch.setattr(sandbox, "Sandbox", Counted)
+    return Counted
+
+
+def test_a_method_that_is_not_built_in_has_a_process_of_its_own(counted):
     keeper = Keeper()
-    workers = []
-    try:
-        for name in names:
-            (spec,) = spec_of(known, name)
-            record = record_of(keeper.perform(spec.job()), spec)
-            assert record.status == "ok"
-            workers += [workers_of(os.getpid())[-1:], record.details.get("pid")]
-    finally:
-        keeper.close()
-    assert len({tuple(w) for w in workers[::2]}) == 3  # none is used for another method
+    reusable = []
+    for number, owner in enumerate(["a", "a", "b", None, None, "a"]):
+        answer = keeper.perform({"run_id": number, "owner": owner, "time_limit_s": 1.0})
+        assert answer == {"run_id": number, "outcome": "done"}
+        reusable.append(keeper.reusable)
+        assert [one.alive for one in counted.made] == [False] * (len(counted.made) - 1) + [True]
+    # None is used for another method, and none of theirs for whoever is next.
+    assert [one.jobs for one in counted.made] == [[0, 1], [2], [3, 4], [5]]
+    assert reusable == [False, False, False, True, True, False]
+
+
+@pytest.mark.parametrize(("disturbed", "tries"), [(True, 3), (False, 1)])
+def test_a_run_that_was_disturbed_is_tried_again_in_fresh_processes(
+    counted, monkeypatch, disturbed, tries
+):
+    failed = Failure("crashed", "killed", 0.5, disturbed=disturbed)
+    monkeypatch.setattr(counted, "answers", staticmethod(lambda question: failed))
+    answer = Keeper().perform({"run_id": "x", "owner": None, "time_limit_s": 1.0})
+    assert answer == sandbox.failure("x", "crashed", "killed", 0.5)
+    assert [one.jobs for one in counted.made] == [["x"]] * tries
 
 
 def test_the_clock_stops_where_the_run_is_stopped(known):
