@@ -73,6 +73,11 @@ def published_exhaustive(task: str) -> tuple[str, int] | None:
     return entry and (entry["hands"], entry["reward"])
 
 
+def published_cells() -> tuple[tuple[str, str], ...]:
+    """Tasks and conditions of the paper, in its order: less exploration first."""
+    return tuple((task, name) for task in _PUBLISHED for name in _PUBLISHED[task] if "EC" in name)
+
+
 def published_cell(task: str, condition: str) -> PublishedCell | None:
     """What is printed about a cell; None for a cell that the paper does not have."""
     entry = _printed(task, condition)

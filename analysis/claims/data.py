@@ -13,7 +13,7 @@ import pandas as pd
 
 from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.methods import LEARNER
-from analysis.published import TRIALS
+from analysis.published import TRIALS, published_cells
 from analysis.signatures.rows import SignatureRow
 from analysis.signatures.trajectories import Trajectories, best_sequences
 from analysis.statistics.estimates import FEWEST
@@ -30,25 +30,15 @@ ONE, TWO = "two-armed-1", "two-armed-2"
 Cells = tuple[tuple[str, str], ...]
 """Tasks with a condition each."""
 
-CELLS: Cells = (
-    (ASCENDING, "EC1"),
-    (DESCENDING, "EC1"),
-    (ONE, "EC2"),
-    (ONE, "EC3"),
-    (ONE, "EC4"),
-    (TWO, "EC3"),
-    (TWO, "EC4"),
-)
-"""Tasks and conditions of the paper."""
-
-BEST: Cells = ((ASCENDING, "EC1"), (DESCENDING, "EC1"), (ONE, "EC4"), (TWO, "EC4"))
+CELLS: Cells = published_cells()
+BEST: Cells = tuple(dict(CELLS).items())
 """The condition that explores most, by task."""
 
 UNINFORMED = {TOLD[Information.CORRECTIVE_PROCESS], TOLD[Information.REWARD_BY_TRIAL]}
 """All that the paper's learner is told (condition 2 is also told where the hands are)."""
 
 SMOOTH = ("squared-changes", "acceleration", "jerk")
-"""Smoothness costs of trajectory optimisation: Jordan's, and Flash & Hogan's last."""
+"""Smoothness costs of trajectory optimisation; the first is Jordan's, the last Flash & Hogan's."""
 
 Read = TypeVar("Read")
 

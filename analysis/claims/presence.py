@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from analysis.claims.coarticulation import prepared_by_waiting
-from analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError, rewards_of
+from analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError
 from analysis.claims.evidence import measured
 from analysis.claims.one_armed import context_distance, sacrifice
 from analysis.claims.register import Finding
@@ -93,10 +93,6 @@ def _turning(data: Data, label: str) -> Seen:
     return own <= initial - TURN_APART, (own,)
 
 
-def _reward(data: Data, label: str) -> float:
-    return float(rewards_of(data.runs(ASCENDING, label)).mean())
-
-
 class _Sign(NamedTuple):
     """A signature whose presence is asked for; its column has its name."""
 
@@ -133,7 +129,7 @@ def _shared_signatures(data: Data) -> Finding:
         seen = [data.recorded(sign.show, two if sign.two_armed else one) for sign in _SIGNS]
         if not any(found for found, _ in seen):
             continue
-        reward, cells = data.recorded(_reward, one)
+        reward, cells = data.recorded(lambda own, label: own.row(ASCENDING, label).reward, one)
         values: list[Value] = [name, reward]
         by_column: dict[str, tuple[CellKey, ...]] = {}
         for sign, (found, own) in zip(_SIGNS, seen, strict=True):

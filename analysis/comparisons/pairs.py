@@ -205,7 +205,7 @@ def _row(study: Study, pair: Pair) -> PairRow:
     one, two = (study.method_rows[cell.task, cell.label] for cell in (pair.first, pair.second))
     optimum = study.optima.get((one.task, "free"))
     found = _inferred(pair) if one.solved and two.solved else {"note": "no run with a solution"}
-    found |= {name: _ratio(getattr(two, name), getattr(one, name)) for name in SPENDS}
+    found |= {name: getattr(two, name) / (getattr(one, name) or math.nan) for name in SPENDS}
     return PairRow(
         task=one.task,
         kind=pair.kind,
@@ -275,10 +275,6 @@ def _sizes(pair: Pair, one: MethodRow, two: MethodRow, best: float) -> dict[str,
     }
     sizes |= {"smallest": smallest, "smallest_share": smallest / best if best > 0 else math.nan}
     return {"sd_first": sds[0], "sd_second": sds[1], **sizes}
-
-
-def _ratio(theirs: float, ours: float) -> float:
-    return theirs / ours if ours else math.nan
 
 
 def _keeping_still(condition: str) -> str | None:

@@ -99,5 +99,4 @@ def _panel(axes: Axes, data: pd.DataFrame) -> None:
             mark, end = stars(row["holm_equivalent"]), (max(values), -place)
             axes.annotate(mark, end, (5, -0.5), textcoords="offset points", va="center")
     style.name_rows(axes, [short_name(method) for method in data.method])
-    axes.set_ylim(-len(data) + 0.4, 0.6)
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.4)

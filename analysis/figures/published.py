@@ -118,7 +118,6 @@ def _draw(axes: Axes, data: pd.DataFrame, marked: dict[str, str]) -> None:
     axes.axvline(0, color=style.INK, linewidth=0.6)
     style.name_rows(axes, names)
     axes.spines["left"].set_visible(False)
-    axes.set_ylim(-len(data) + 0.4, 0.6)
     # The widest interval need not hide the others: symmetric about zero at least to margins.
     reach = np.nanmax(np.abs(data[["low", "high", "difference", "margin"]].to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)

@@ -45,10 +45,13 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
     figure = Figure(figsize=(style.TWO, 0.75 + 0.155 * max(bars)), layout="constrained")
     panels = figure.subplots(1, len(found), squeeze=False)[0]
+    colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
     for axes, task in zip(panels, found.values(), strict=True):
-        _panel(axes, task, data[data.task == task.name], order)
+        _panel(axes, task, data[data.task == task.name], order, colors)
     style.letters(panels)
-    _legend(figure, order)
+    colors |= {OTHERS: style.GREY} if len(order) > MOST else {}
+    handles = [Patch(facecolor=color, label=hands, **_EDGE) for hands, color in colors.items()]
+    style.legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)
     words = "; ".join(
         f"{task}, {short_name(str(label))}{'' if source == 'ours' else ', published'}: "
         + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
@@ -74,8 +77,9 @@ def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     return frame.assign(share=frame.runs / totals)
 
 
-def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None:
-    colors = _colors(order)
+def _panel(
+    axes: Axes, task: Task, data: pd.DataFrame, order: list[str], colors: dict[str, str]
+) -> None:
     names = []
     groups = data.groupby(["method", "source"], sort=False)
     for place, ((label, source), rows) in enumerate(groups):
@@ -96,13 +100,3 @@ def _panel(axes: Axes, task: Task, data: pd.DataFrame, order: list[str]) -> None
     axes.set_xlabel("share of runs")
     axes.spines["left"].set_visible(False)
     axes.set_title(style.heading(task))
-
-
-def _colors(order: Sequence[str]) -> dict[str, str]:
-    return dict(zip(order[:MOST], style.PALETTE, strict=False))
-
-
-def _legend(figure: Figure, order: Sequence[str]) -> None:
-    colors = _colors(order) | ({OTHERS: style.GREY} if len(order) > MOST else {})
-    handles = [Patch(facecolor=colors[hands], label=hands, **_EDGE) for hands in colors]
-    style.legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from analysis.methods import LEARNER, METHODS
 from analysis.results.folder import CellRuns
@@ -15,37 +15,29 @@ HEADLINES = tuple(name for name, row in METHODS.items() if row.headline)
 """Methods that stand for their families where none are named, in the order of figures."""
 
 
-def headline(study: Study, tasks: Iterable[str]) -> list[str]:
-    """Labels of the default methods that have solved runs on one of the tasks.
+def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) -> list[str]:
+    """Labels of ``methods``, or of the default ones, that have a solved run on one of the tasks.
 
-    Those of :data:`HEADLINES`, then methods that are not the project's own; all where there
-    is neither.
+    By default those of :data:`HEADLINES`, then methods that are not the project's own; all where
+    there is neither. Raises CoarticError where there is none of them, or one that the folder does
+    not have.
     """
-    tasks, families = set(tasks), {name.partition("/")[0] for name in METHODS}
+    known_methods(study, methods or ())
+    families = {name.partition("/")[0] for name in METHODS}
     found = {
-        label: cell.method
+        label: cell.method.partition("/")[0] not in families
         for (task, label), cell in study.cells.items()
         if task in tasks and len(cell.good)
     }
-    others = [label for label, method in found.items() if method.partition("/")[0] not in families]
-    return [label for label in HEADLINES if label in found] + others or list(found)
-
-
-def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) -> list[str]:
-    """The default methods, or those of ``methods`` that have a solved run on one of the tasks.
-
-    Raises CoarticError where there is none of them, or one that the folder does not have.
-    """
-    if methods is None:
-        labels = headline(study, tasks)
-        if not labels:
-            raise missing(study, f"no method has a solved run on {', '.join(tasks) or 'any task'}")
-        return labels
-    known_methods(study, methods)
-    found = [label for label in methods if any(has(study, task, label) for task in tasks)]
-    if not found:
-        raise missing(study, f"no solved run of {', '.join(methods)} on {', '.join(tasks)}")
-    return found
+    labels = [label for label in HEADLINES if label in found]
+    labels = labels + [label for label, foreign in found.items() if foreign] or list(found)
+    if methods is not None:
+        labels = [label for label in methods if label in found]
+    if not labels and methods is None:
+        raise missing(study, f"no method has a solved run on {', '.join(tasks) or 'any task'}")
+    if not labels:
+        raise missing(study, f"no solved run of {', '.join(methods or ())} on {', '.join(tasks)}")
+    return labels
 
 
 def known_methods(study: Study, methods: Sequence[str]) -> None:

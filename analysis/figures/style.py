@@ -153,6 +153,7 @@ def task_panels(
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
     """Names at the left of rows that stand at 0, -1, -2 and so on."""
     axes.set_yticks([-place for place in range(len(names))], names)
+    axes.set_ylim(-len(names) + 0.4, 0.6)
     axes.tick_params(axis="y", length=0)
 
 
