@@ -57,7 +57,9 @@ def signature_matrix(study: Study, *, methods: Sequence[str] | None = None) -> l
 def _values(frame: pd.DataFrame, labels: Sequence[str]) -> pd.DataFrame:
     """One row a method and signature: value, standardised value, or why there is none."""
     places = frame.groupby(["label", "signature"])
-    data = pd.DataFrame({"value": places.value.mean(), "places": places.value.count()})
+    data = pd.DataFrame(
+        {"value": places.value.agg(lambda of: of.mean()), "places": places.value.count()}
+    )
     for column in ("unit", "why_not"):  # the first there is
         data[column] = places[column].agg(lambda texts: next(filter(None, texts), ""))
     rows = pd.MultiIndex.from_product([labels, SIGNATURES], names=["method", "signature"])
