@@ -56,7 +56,7 @@ def alone(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def figures(study):
-    return Figures(study)
+    return study.figures
 
 
 @pytest.fixture(scope="module")
