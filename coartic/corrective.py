@@ -19,7 +19,7 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from coartic.compiled import entry, inner, joint_chain, joint_lever, lanewise
-from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, leave, place
+from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, leave, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import checked_goal, configuration, scratch_for
 from coartic.robot import BASE_DOF, Array, Hand, Robot
@@ -116,7 +116,7 @@ def _stay_near(at: Any, count: int, how: Any) -> None:
 def _errors(at: Any, count: int, goal: Any, model: Any) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
-    for i in range(count):
+    for i in range(whole(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         error = math.sqrt(error_x * error_x + error_y * error_y)
@@ -129,7 +129,7 @@ def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> int:
     """q += α Jᵀ e in every lane that goes on; number of lanes that have ended."""
     ended = 0
     tip = len(at.length)
-    for i in range(count):
+    for i in range(whole(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         going = at.fate[i] == GOING
@@ -147,7 +147,7 @@ def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> int:
         # Where nothing moves: a stationary point away from the goal, which it will not leave.
         stuck = going & (not moved)
         at.fate[i] = _STUCK if stuck else at.fate[i]
-        ended += 0 if going & moved else 1
+        ended += 0 if (going & moved) | (i >= count) else 1
     return ended
 @inner
 def correct_lanes(
@@ -160,6 +160,7 @@ def correct_lanes(
     at = lanes.at
     if how.nullspace_gain > 0.0:
         at.start[:] = at.q
+    rows = 2 * len(at.q) + len(at.length) + 3  # down to its start
     iteration = 0
     while count > 0:
         place(at, count)
@@ -179,7 +180,7 @@ def correct_lanes(
                 ends.iterations[run] = iteration + (at.fate[lane] == _STUCK)
                 ends.evaluations[run] += ends.iterations[run] + 1
                 count -= 1
-                fill(lanes, lane, count)
+                fill(lanes, lane, count, 0, rows)
         iteration += 1
 
 

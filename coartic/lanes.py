@@ -19,6 +19,7 @@ from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
 LANES = 40
 """Most lanes at once: they and their rows stay in the innermost cache."""
+_VECTOR = 4  # lanes that vectors hold, or a multiple; LANES is a multiple of it
 GOING = 0.0
 """Fate of a lane that has not ended."""
 
@@ -58,19 +59,17 @@ def lanes_for(robot: Robot) -> Lanes:
     """Lanes for either arm of a robot; the shorter one ends in links of length 0."""
     links = max(len(robot.left_links), len(robot.right_links))
     joints = (BASE_DOF + links,)
-    height = {
-        "q": joints,  # base x and y, then the joints of the arm
-        "length": (links,),
-        "shoulder": (2,),
-        "x": (links + 1,),  # shoulder, joints, hand
-        "y": (links + 1,),
-        "start": joints,
+    corrected = {"q": joints, "pulled": ()}  # base x and y, then the joints of the arm
+    shared = {"length": (links,), "shoulder": (2,), "start": joints}
+    moved = {
         "target": joints,
         "rate": (links,),  # of the absolute link angles, rad a step
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
-        **dict.fromkeys(("step", "last", "distance", "speed", "bend", "pulled", "fate"), ()),
+        **dict.fromkeys(("step", "last", "distance", "speed", "bend"), ()),
     }
+    passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
+    height = corrected | shared | moved | passing
     rows = np.zeros(1, [(name, np.float64, (*shape, LANES)) for name, shape in height.items()])
     return Lanes(rows[0], rows.view(np.float64).reshape(-1, LANES), *np.zeros((3, LANES), np.int64))
 
@@ -81,10 +80,10 @@ def board(lanes: Any, lane: int, run: int, q: Any, arm: Any) -> None:
     at = lanes.at
     lanes.run[lane], lanes.first[lane], lanes.links[lane] = run, arm.first, len(arm.links)
     at.pulled[lane] = 0.0
-    at.q[0, lane] = q[0]
-    at.q[1, lane] = q[1]
     at.shoulder[0, lane] = arm.shoulder_x
     at.shoulder[1, lane] = arm.shoulder_y
+    at.q[0, lane] = q[0]
+    at.q[1, lane] = q[1]
     for k in range(len(at.length)):
         own = k < len(arm.links)
         at.length[k, lane] = arm.links[k] if own else 0.0
@@ -101,12 +100,24 @@ def leave(lanes: Any, lane: int, q: Any) -> None:
 
 
 @inner
-def fill(lanes: Any, lane: int, last: int) -> None:
+def fill(lanes: Any, lane: int, last: int, first_row: int, end_row: int) -> None:
     """Move the last lane into one that has ended."""
-    for who in (lanes.run, lanes.first, lanes.links):
-        who[lane] = who[last]
-    for row in range(len(lanes.rows)):
+    if lane == last:
+        return
+    lanes.run[lane] = lanes.run[last]
+    lanes.first[lane] = lanes.first[last]
+    lanes.links[lane] = lanes.links[last]
+    for row in range(first_row, end_row):
         lanes.rows[row, lane] = lanes.rows[row, last]
+
+
+@inner
+def whole(count: int) -> int:
+    """Lanes in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
+
+    A loop over whole vectors leaves no lanes over that would be worked on one by one.
+    """
+    return (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
 _chain = inner(chain)
@@ -143,7 +154,7 @@ _far_chains = _chains_by(cosine, sine)
 @inner
 def place(at: Any, count: int) -> None:
     """Forward kinematics of every lane: fill ``x`` and ``y``."""
-    if _near(at, count):
-        _near_chains(at, count)
+    if _near(at, whole(count)):
+        _near_chains(at, whole(count))
     else:
-        _far_chains(at, count)
+        _far_chains(at, whole(count))

@@ -179,7 +179,7 @@ def work_for(runs: int, task: Task) -> Work:
     )
 
 
-@inner
+@inlined
 def _goal_distance(run: int, number: int, hand: int, problem: Any, work: Any) -> float:
     arm = arm_of(problem, hand)
     scratch = work.scratch
@@ -206,7 +206,7 @@ def _random_hand(hands: Any, rng: Any) -> int:
     return int(hands[int(rng.random() * len(hands))])
 
 
-@inner
+@inlined
 def _closest_hand(
     run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any
 ) -> int:
@@ -240,7 +240,7 @@ def _choose_hands(
         work.hand[run] = hand
 
 
-@inner
+@inlined
 def _set_target(
     target: Any, q: Any, stored: Any, hand: int, explore: bool, rules: Any, rng: Any
 ) -> None:

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic.compiled import entry, inner, lanewise
-from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, place
+from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
@@ -96,11 +96,13 @@ def depart(
     lanes: Any, lane: int, run: int, q: Any, target: Any, arm: Any, model: Any
 ) -> None:
     """Put an arm into a lane, on its way from ``q`` to ``target``."""
-    board(lanes, lane, run, target, arm)
-    at = lanes.at
-    at.target[:, lane] = at.q[:, lane]
     board(lanes, lane, run, q, arm)
-    at.start[:, lane] = at.q[:, lane]
+    at = lanes.at
+    for j in range(len(at.q)):
+        joint = j if j < BASE_DOF else j - BASE_DOF + arm.first
+        own = j < BASE_DOF + len(arm.links)
+        at.start[j, lane] = q[joint] if own else 0.0
+        at.target[j, lane] = target[joint] if own else 0.0
 
     square = 0.0
     for j in range(len(q)):
@@ -126,7 +128,7 @@ def depart(
 @lanewise
 def _go(at: Any, count: int, model: Any) -> None:
     """The point at which each lane is now."""
-    for i in range(count):
+    for i in range(whole(count)):
         fraction = at.step[i] * model.step / at.distance[i]
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
@@ -139,7 +141,7 @@ def _look(at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any) -> 
     """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended."""
     ended = 0
     tip = len(at.length)
-    for i in range(count):
+    for i in range(whole(count)):
         goal_dx = goal.x - at.x[tip, i]
         goal_dy = goal.y - at.y[tip, i]
         goal_distance = math.sqrt(goal_dx * goal_dx + goal_dy * goal_dy)
@@ -165,7 +167,7 @@ def _look(at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any) -> 
         after = min(at.step[i] + 1.0 + math.floor(min(clear, at.last[i])), at.last[i])
         at.step[i] = after if fate == GOING else at.step[i]
         at.fate[i] = fate
-        ended += 0 if fate == GOING else 1
+        ended += 0 if (fate == GOING) | (i >= count) else 1
     return ended
 
 
@@ -186,6 +188,8 @@ def move_lanes(
     becomes the one in which it stopped; its ``ends`` says how.
     """
     at = lanes.at
+    first_row = len(at.q) + 1
+    rows = 2 * len(at.q) + 2 * len(at.length) + 11
     evaluations = 0
     if stop_on_arrival:
         at.q[:] = at.target
@@ -212,7 +216,7 @@ def move_lanes(
             ends.ticks[run] = int(at.step[lane]) + 1
             ends.evaluations[run] += evaluations
             count -= 1
-            fill(lanes, lane, count)
+            fill(lanes, lane, count, first_row, first_row + rows)
 
 
 @entry
