@@ -23,7 +23,7 @@ SHARE = 0.5
 """Of the initial solution's distance to the plan; ``claims.toml`` says half."""
 RATIO_TEST = (
     "one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to the "
-    "plan, learned over initial, is below 0.5; BCa interval of the ratio"
+    f"plan, learned over initial, is below {SHARE:g}; BCa interval of the ratio"
 )
 _OPTIMUM = "optimum/dynamic-programming"
 

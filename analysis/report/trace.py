@@ -141,10 +141,10 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
     how = dict.fromkeys(map(words, filter(None, (column.how, *above, *table.notes))))
     own = row.cells if "runs" in rests_on or not rests_on else ()
     cells = [*row.cells_by_column.get(column.name, own)]
-    if column.family and row.values[place] is not None:
+    kin = [*(other.cells for other in table.rows if other.family == row.family), table.unshown]
+    if column.family and row.values[place] is not None and len(list(filter(None, kin))) > 1:
         how[f"It depends on all of its family: {column.family}."] = None
-        kin = (other.cells for other in table.rows if other.family == row.family)
-        cells += [*chain.from_iterable(kin), *table.unshown]
+        cells += chain.from_iterable(kin)
     cells += chain.from_iterable(searches for _, searches in known_best)
     return Trace(
         f"{table.id} [{row.key}, {column.name}]",

@@ -30,7 +30,8 @@ def claims_table(study: Study) -> DataTable | None:
             verdict=entry.marked,
             place=", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
         )
-        rows.append(replace(row, link=f"#claim-{entry.claim.id}"))
+        family = entry.claim.id if math.isnan(entry.p) else "tested"
+        rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
     return layout.table(
         rows,
         rules=RULES,
