@@ -29,6 +29,7 @@ from analysis.results.optima import optima
 from analysis.signatures.register import signature_rows, signatures_table
 from analysis.signatures.trajectories import all_trajectories
 from coartic import Task
+from coartic.files import folder_named
 from coartic.text import counted, did_you_mean
 
 if TYPE_CHECKING:
@@ -40,10 +41,10 @@ def load(folder: str | Path) -> Study:
 
     Raises CoarticError as :func:`analysis.results.folder.load_results` does.
     """
-    return Study(load_results(Path(folder)))
+    return Study(load_results(folder_named(folder)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Study:
     """Stored results and what follows from them."""
 

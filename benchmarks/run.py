@@ -20,7 +20,7 @@ from benchmarks.store import Store
 from benchmarks.suites import Cell, Suite, load_suite, manifest_of, run_specs, select_cells
 from benchmarks.tables import OWNER, check_results_folder, write_tables
 from coartic import CoarticError
-from coartic.files import publish
+from coartic.files import folder_named, publish
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.record import Record
 from coartic.tables import Manifest
@@ -44,11 +44,13 @@ class Selection:
             if isinstance(given, str | Path):
                 raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
             _check(name, given, Sequence, "a list")
+            for item in given:
+                _check(f"an item of {name}", item, str | Path, "a name or a path")
 
 
 def _check(name: str, given: object, kind: Any, words: str) -> None:
     """Raises CoarticError where an argument is not of its kind."""
-    if not isinstance(given, kind):
+    if not isinstance(given, kind) or isinstance(given, bool):
         raise CoarticError(f"{name} is {given!r}; it must be {words}")
 
 
@@ -110,10 +112,9 @@ class SuitePlan:
         it goes on from there. Raises CoarticError where something else is in the way in the
         folder, another suite is at work in it, it cannot be written, or runs keep getting lost.
         """
-        _check("folder", folder, str | Path, "a path")
         if executor is not None:
             _check("executor", executor, Executor, "one of benchmarks.executors, as Local(jobs=2)")
-        folder = Path(folder)
+        folder = folder_named(folder)
         manifest, clock = self._manifest(), time.perf_counter()
         check_results_folder(folder)
         store = Store(folder)

@@ -162,6 +162,16 @@ def check_folder(
                 _survey(folder, dict.fromkeys(names, ""), listed, owner, alone, derived)
 
 
+def folder_named(name: object, what: str = "the name of a folder") -> Path:
+    """A folder by its name. Raises CoarticError for an empty one, which is not the current one,
+    and for what is no name."""
+    if not isinstance(name, str | Path):
+        raise CoarticError(f"folder is {name!r}; it must be a path")
+    if isinstance(name, str) and not name.strip():
+        raise CoarticError(f"{what} is empty; the current folder is .")
+    return Path(name)
+
+
 def check_no_report(folder: Path) -> None:
     """Raises CoarticError for a folder that a report was written into: it holds nothing else."""
     with _errors(folder):

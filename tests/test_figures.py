@@ -11,6 +11,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from analysis import load
 from analysis.figures import REGISTER, Figures, register
 from analysis.figures.bars import bars, stars
 from analysis.figures.configurations import (
@@ -113,6 +114,15 @@ def test_each_is_drawn_when_it_is_asked_for(study, monkeypatch):
     assert drawn[:2] == ["learned-reward", "published"]
     assert sorted(drawn) == sorted(row.name for row in REGISTER)
     assert list(figures) == [plot.id for plot in figures.plots]
+
+
+def test_a_study_is_itself_alone(study):
+    assert study == study
+    assert study != Study(study.results)
+    assert len({study, study}) == 1
+    for name, words in ((" ", "empty"), (3, "folder is 3; it must be a path")):
+        with pytest.raises(CoarticError, match=words):
+            load(name)
 
 
 def test_an_unknown_name_gets_an_answer(study):

@@ -660,7 +660,9 @@ def test_a_name_is_no_list_of_names():
         ({"executor": 2}, "executor is 2; it must be one of benchmarks.executors"),
         ({"select": {}}, "select is {}; it must be a Selection"),
         ({"suite": 3}, "suite is 3; it must be a name, a path or a Suite"),
+        ({"runs": True}, "runs is True; it must be an int from 1 to "),
         ({"folder": None}, "folder is None; it must be a path"),
+        ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
     ],
 )
 def test_an_argument_of_a_wrong_type_has_a_sentence(wrong, words, tmp_path):
@@ -673,3 +675,5 @@ def test_an_argument_of_a_wrong_type_has_a_sentence(wrong, words, tmp_path):
 def test_a_selection_of_a_wrong_type_has_a_sentence():
     with pytest.raises(CoarticError, match="tasks is 3; it must be a list"):
         Selection(tasks=3)
+    with pytest.raises(CoarticError, match="an item of tasks is 3; it must be a name or a path"):
+        Selection(tasks=[3])

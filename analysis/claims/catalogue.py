@@ -25,6 +25,9 @@ from analysis.statistics.hypotheses import holm
 if TYPE_CHECKING:
     from analysis.study import Study
 
+if STATEMENTS.keys() - JUDGED.keys():
+    without = ", ".join(STATEMENTS.keys() - JUDGED.keys())
+    raise ValueError(f"claims of claims.toml without a judge that is imported here: {without}")
 CLAIMS: tuple[Claim, ...] = tuple(JUDGED[name] for name in STATEMENTS)
 _COLUMNS = (
     *("id", "section", "statement", "verdict", "fitted", "evidence", "test"),

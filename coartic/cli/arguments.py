@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from coartic.errors import CoarticError
+from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.text import did_you_mean
 
@@ -51,13 +52,6 @@ def _completing(*sources: Callable[[], Iterable[str]]) -> Callable[[str], list[s
     return complete
 
 
-def directory(text: str) -> Path:
-    """A folder by its name. Raises CoarticError for an empty one, which is not the current one."""
-    if not text.strip():
-        raise CoarticError("the name of a folder is empty; the current folder is .")
-    return Path(text)
-
-
 SuiteName = Annotated[
     str,
     typer.Argument(
@@ -65,10 +59,12 @@ SuiteName = Annotated[
     ),
 ]
 ResultsFolder = Annotated[
-    Path, typer.Argument(parser=directory, help="Results folder, such as results/all.")
+    Path, typer.Argument(parser=folder_named, help="Results folder, such as results/all.")
 ]
 RunId = Annotated[str, typer.Argument(help="Id of a run, or its beginning.")]
-Records = Annotated[Path, typer.Option("--in", help="Folder to look for the run in.")]
+Records = Annotated[
+    Path, typer.Option("--in", parser=folder_named, help="Folder to look for the run in.")
+]
 Out = Annotated[str, typer.Option("--out", help="Folder for the results.")]
 Runs = Annotated[int | None, typer.Option(min=1, max=MOST_RUNS, help="Runs per cell.")]
 Trials = Annotated[int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")]
@@ -136,13 +132,6 @@ def labels_in(text: str, option: str) -> list[str]:
     if not labels or not all(labels):
         raise CoarticError(f"{option} {text!r} has an empty name; write for example a,b")
     return list(dict.fromkeys(labels))
-
-
-def results_folder(text: str) -> Path:
-    """The folder of ``--out``. Raises CoarticError for an empty name."""
-    if not text.strip():
-        raise CoarticError("--out is empty; name a folder for the results")
-    return Path(text)
 
 
 def endings_in(text: str, known: Collection[str]) -> list[str]:

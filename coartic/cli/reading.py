@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import directory, endings_in, labels_in
+from coartic.cli.arguments import endings_in, labels_in
 from coartic.cli.terminal import if_interrupted, say, show_data, show_table, writing
 from coartic.errors import CoarticError
+from coartic.files import folder_named
 from coartic.text import counted
 
 GROUP = "Read"
@@ -44,7 +45,7 @@ def report(
     folder: given.ResultsFolder,
     out: Annotated[
         Path | None,
-        typer.Option(parser=directory, help="Folder to write; DIR/report by default."),
+        typer.Option(parser=folder_named, help="Folder to write; DIR/report by default."),
     ] = None,
     methods: Annotated[
         str | None,
@@ -101,10 +102,10 @@ def trace(
 
 def compare(
     first: Annotated[
-        Path, typer.Argument(parser=directory, metavar="DIR_A", help="Results folder A.")
+        Path, typer.Argument(parser=folder_named, metavar="DIR_A", help="Results folder A.")
     ],
     second: Annotated[
-        Path, typer.Argument(parser=directory, metavar="DIR_B", help="Results folder B.")
+        Path, typer.Argument(parser=folder_named, metavar="DIR_B", help="Results folder B.")
     ],
     out: Annotated[
         Path | None, typer.Option(help="Page to write (.md), with a table beside it (.csv).")
@@ -138,7 +139,7 @@ def compare(
 def cite(
     folder: Annotated[
         Path | None,
-        typer.Argument(parser=directory, help="Results folder; all built-in methods without."),
+        typer.Argument(parser=folder_named, help="Results folder; all built-in methods without."),
     ] = None,
     style: Annotated[str, typer.Option("--format", help="Only bibtex.")] = "bibtex",
     analysis: Annotated[

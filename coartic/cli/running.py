@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import check_numbers, names_in, results_folder
+from coartic.cli.arguments import check_numbers, names_in
 from coartic.cli.terminal import Display, performing, say, show_data, show_lines, show_table
 from coartic.errors import CoarticError
+from coartic.files import folder_named
 from coartic.text import counted, json_text
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def run(
     from benchmarks.suites import load_suite
 
     check_numbers(jobs, time_limit)
-    chosen, out = load_suite(suite), results_folder(folder)
+    chosen, out = load_suite(suite), folder_named(folder, "--out")
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
