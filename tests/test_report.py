@@ -42,7 +42,7 @@ from analysis.report.text import number_text, parts, texts
 from analysis.report.write import write_report
 from analysis.words import typographic
 from coartic.files import LISTING
-from tests.support.reports import Page
+from tests.support.reports import Page, needs_latex
 
 LEARNER, OPTIMUM = ("shelf", "dual-process/EC4 noise_sd=0.1"), ("shelf", "optimum/multistart")
 NASTY = 'a_b & <i>50 %</i> #1 {x} ~ ^ $ \\ "q" -- − – — ± † ΔV ε ≤ [z] *s* `c` | 10⁻³ é 漢'
@@ -477,11 +477,7 @@ def write(folder, shown=None):
 
 
 def test_latex_compiles(tmp_path):
-    if not shutil.which("pdflatex"):
-        pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", *(f"{name}.sty" for name in PACKAGES)]
-    if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip(f"{', '.join(PACKAGES)} are not installed")
+    needs_latex(*PACKAGES)
     several = replace(
         document(), sections=(*document().sections, Section("pages", "Long", (LONG,)))
     )

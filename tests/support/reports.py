@@ -61,13 +61,18 @@ def report_of(study, folder):
     return folder
 
 
-def compiled(folder, body=""):
-    """The log of a document with all macros and tables; skips where LaTeX is missing."""
+def needs_latex(*packages):
+    """Skips where LaTeX or one of these packages is missing."""
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is not installed")
-    styles = ["kpsewhich", *(f"{name}.sty" for name in (*PACKAGES, "geometry"))]
+    styles = ["kpsewhich", *(f"{name}.sty" for name in packages)]
     if subprocess.run(styles, capture_output=True, check=False).returncode:
-        pytest.skip(f"geometry or one of {', '.join(PACKAGES)} is not installed")
+        pytest.skip(f"one of {', '.join(packages)} is not installed")
+
+
+def compiled(folder, body=""):
+    """The log of a document with all macros and tables; skips where LaTeX is missing."""
+    needs_latex(*PACKAGES, "geometry")
     (folder / "paper.tex").write_text(LATEX % body, encoding="utf-8")
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=120)
