@@ -18,11 +18,13 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-from coartic.compiled import entry, inner, joint_chain, joint_lever
+from coartic.compiled import entry, inner, joint_chain, joint_lever, lanewise
+from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, leave, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import checked_goal, configuration, scratch_for
-from coartic.robot import Array, Hand, Robot
+from coartic.robot import BASE_DOF, Array, Hand, Robot
 
+_CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 # Of the smaller pivot of J Jᵀ, in units of its trace: nothing where J has full rank, above
 # rounding where it has not (a straight arm on a locked base).
 _DAMPING = 1e-14
@@ -66,14 +68,13 @@ def _pull(q: Any, start: Any, joint: int, disturbing: float, gain: float) -> boo
 
 
 @inner
-def _stay(q: Any, start: Any, arm: Any, how: Any, scratch: Any) -> bool:
+def _stay(q: Any, start: Any, xs: Any, ys: Any, how: Any) -> bool:
     """q += β N(q) (start - q) for N = I - J⁺J, given the chain of ``q``; whether it moved.
 
     N r = r - Jᵀ(J Jᵀ)⁻¹ J r for r = start - q. It is never longer than r, so that a
     singular J does no harm.
     """
-    xs, ys = scratch.xs, scratch.ys
-    tip = len(arm.links)
+    tip = len(xs) - 1
     xx = 1.0 if how.free_x else 0.0  # J Jᵀ
     yy = 1.0 if how.free_y else 0.0
     xy = 0.0
@@ -81,7 +82,7 @@ def _stay(q: Any, start: Any, arm: Any, how: Any, scratch: Any) -> bool:
     hand_y = start[1] - q[1] if how.free_y else 0.0
     for k in range(tip):
         dx, dy = joint_lever(xs, ys, k, tip)
-        away = start[arm.first + k] - q[arm.first + k]
+        away = start[BASE_DOF + k] - q[BASE_DOF + k]
         xx += dx * dx
         xy += dx * dy
         yy += dy * dy
@@ -99,46 +100,98 @@ def _stay(q: Any, start: Any, arm: Any, how: Any, scratch: Any) -> bool:
         moved = _pull(q, start, 1, y, how.nullspace_gain) or moved
     for k in range(tip):
         dx, dy = joint_lever(xs, ys, k, tip)
-        moved = _pull(q, start, arm.first + k, dx * x + dy * y, how.nullspace_gain) or moved
+        moved = _pull(q, start, BASE_DOF + k, dx * x + dy * y, how.nullspace_gain) or moved
     return moved
 
 
-def _correct(q: Any, arm: Any, goal: Any, how: Any, model: Any, scratch: Any) -> tuple[bool, int]:
-    """Descend from ``q`` in place; converged, iterations."""
-    xs, ys, start = scratch.xs, scratch.ys, scratch.start
-    tip = len(arm.links)
-    if how.nullspace_gain > 0.0:
-        start[:] = q
-    for iteration in range(model.max_iterations + 1):
-        joint_chain(q, arm, xs, ys)
-        error_x = goal.x - xs[tip]
-        error_y = goal.y - ys[tip]
+@inner
+def _stay_near(at: Any, count: int, how: Any) -> None:
+    for i in range(count):
+        if at.fate[i] == GOING:
+            moved = _stay(at.q[:, i], at.start[:, i], at.x[:, i], at.y[:, i], how)
+            at.pulled[i] = 1.0 if moved else 0.0
+
+
+@lanewise
+def _errors(at: Any, count: int, goal: Any, model: Any) -> None:
+    """Set the fate of lanes whose hand is near enough, or nowhere."""
+    tip = len(at.length)
+    for i in range(whole(count)):
+        error_x = goal.x - at.x[tip, i]
+        error_y = goal.y - at.y[tip, i]
         error = math.sqrt(error_x * error_x + error_y * error_y)
-        if error <= model.correction_tolerance:
-            return True, iteration
-        if iteration == model.max_iterations or not math.isfinite(error):
-            return False, iteration
-        moved = False
-        if how.nullspace_gain > 0.0:
-            moved = _stay(q, start, arm, how, scratch)
-        if how.free_x:
-            moved = moved or q[0] + model.gain * error_x != q[0]
-            q[0] += model.gain * error_x
-        if how.free_y:
-            moved = moved or q[1] + model.gain * error_y != q[1]
-            q[1] += model.gain * error_y
+        fate = GOING if error < math.inf else _FAILED
+        at.fate[i] = _CONVERGED if error <= model.correction_tolerance else fate
+
+
+@lanewise
+def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> int:
+    """q += α Jᵀ e in every lane that goes on; number of lanes that have ended."""
+    ended = 0
+    tip = len(at.length)
+    for i in range(whole(count)):
+        error_x = goal.x - at.x[tip, i]
+        error_y = goal.y - at.y[tip, i]
+        going = at.fate[i] == GOING
+        x = at.q[0, i] + model.gain * error_x if how.free_x else at.q[0, i]
+        y = at.q[1, i] + model.gain * error_y if how.free_y else at.q[1, i]
+        moved = (x != at.q[0, i]) | (y != at.q[1, i]) | (at.pulled[i] != 0.0)
+        at.q[0, i] = x if going else at.q[0, i]
+        at.q[1, i] = y if going else at.q[1, i]
         for k in range(tip):
-            dx, dy = joint_lever(xs, ys, k, tip)
-            turned = q[arm.first + k] + model.gain * (dx * error_x + dy * error_y)
-            moved = moved or turned != q[arm.first + k]
-            q[arm.first + k] = turned
-        if not moved:  # a stationary point away from the goal: it will not leave
-            return False, iteration + 1
-    return False, model.max_iterations
+            dx, dy = joint_lever(at.x[:, i], at.y[:, i], k, tip)
+            before = at.q[BASE_DOF + k, i]
+            turned = before + model.gain * (dx * error_x + dy * error_y)
+            moved |= turned != before
+            at.q[BASE_DOF + k, i] = turned if going else before
+        # Where nothing moves: a stationary point away from the goal, which it will not leave.
+        stuck = going & (not moved)
+        at.fate[i] = _STUCK if stuck else at.fate[i]
+        ended += 0 if (going & moved) | (i >= count) else 1
+    return ended
+@inner
+def correct_lanes(
+    lanes: Any, count: int, goal: Any, how: Any, model: Any, found: Any, ends: Any
+) -> None:
+    """Let **A** descend in the first ``count`` lanes until each has ended.
+
+    Each run's ``found`` (N, dof) becomes what its lane ends with, and its ``ends`` says how.
+    """
+    at = lanes.at
+    if how.nullspace_gain > 0.0:
+        at.start[:] = at.q
+    rows = 2 * len(at.q) + len(at.length) + 3  # down to its start
+    iteration = 0
+    while count > 0:
+        place(at, count)
+        _errors(at, count, goal, model)
+        ended = count
+        if iteration < model.max_iterations:
+            if how.nullspace_gain > 0.0:
+                _stay_near(at, count, how)
+            ended = _descend(at, count, goal, how, model)
+        if ended > 0:
+            for lane in range(count - 1, -1, -1):
+                if at.fate[lane] == GOING and iteration < model.max_iterations:
+                    continue
+                run = lanes.run[lane]
+                leave(lanes, lane, found[run])
+                ends.converged[run] = at.fate[lane] == _CONVERGED
+                ends.iterations[run] = iteration + (at.fate[lane] == _STUCK)
+                ends.evaluations[run] += ends.iterations[run] + 1
+                count -= 1
+                fill(lanes, lane, count, 0, rows)
+        iteration += 1
 
 
-correct_kernel = inner(_correct)
-_compiled_correct = entry(_correct)
+@entry
+def _correct_one(
+    q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any
+) -> Ends:
+    """Correct ``q`` in place."""
+    board(lanes, 0, 0, q, arm)
+    correct_lanes(lanes, 1, goal, how, model, q.reshape((1, len(q))), ends)
+    return ends
 
 
 @inner
@@ -195,12 +248,13 @@ def correct(
     if not 0.0 <= nullspace_gain <= 1.0:
         raise ValueError(f"nullspace_gain is {nullspace_gain}; it must be 0 to 1")
     position = configuration(robot, q)
-    converged, iterations = _compiled_correct(
+    ends = _correct_one(
         position,
         robot.arm(hand),
         checked_goal(goal),
         Corrector("x" not in locked_base, "y" not in locked_base, float(nullspace_gain)),
         checked_model(model),
-        scratch_for(robot),
+        lanes_for(robot),
+        ends_of(1),
     )
-    return Correction(position, bool(converged), int(iterations))
+    return Correction(position, bool(ends.converged[0]), int(ends.iterations[0]))

@@ -5,12 +5,12 @@ hand, perturb the stored target configuration, move, and let the corrective proc
 finish where the goal was missed. A trial better than any before it that passed
 through the same state and hand replaces what is stored there.
 
-One run is one call of a compiled kernel (:mod:`coartic.learning` makes it). It draws
-from the NumPy generator it is given (``default_rng(seed)``, PCG64), per trial and goal
-in this order: a uniform number against ε, where hands are explored; a second one that
+One call of a compiled kernel performs many runs side by side, goal by goal and trial by
+trial (:mod:`coartic.learning` makes it). Each draws from a NumPy generator of its own
+(``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against ε, where hands are explored; a second one that
 picks a hand, where the first fell below ε and the pick is random; one standard normal
 per explored joint, in the order of ``q``, where a target is stored; a bias draws
-nothing. Runs share nothing, so any number of them may go on at once.
+nothing. Runs share nothing: the result of one depends neither on the others nor on their number.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic.compiled import entry, inlined, inner, joint_chain
-from coartic.corrective import correct_kernel, shift_kernel
+from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
-from coartic.movement import Scratch, move_kernel, scratch_for
+from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
+from coartic.movement import Scratch, depart, move_lanes, scratch_for
 from coartic.problem import arm_of, goal_of
 from coartic.robot import HANDS
 from coartic.task import Task
@@ -48,30 +49,32 @@ class Rules(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """What is learned, by goal, previous hand (left, right, none) and hand."""
+    """What each run learns, by goal, previous hand (left, right, none) and hand."""
 
-    value: Any  # Q, (G, 3, 2)
-    target: Any  # q*, (G, 3, 2, dof)
+    value: Any  # Q, (N, G, 3, 2)
+    target: Any  # q*, (N, G, 3, 2, dof)
 
 
 class Log(NamedTuple):
-    """The movements of one trial, and where it stood when each goal was hit."""
+    """The movements of one trial of each run, and where it stood when each goal was hit."""
 
-    count: Any  # (1,)
-    goal: Any  # (2 G,)
+    count: Any  # (N,)
+    goal: Any  # (N, 2 G)
     hand: Any
     kind: Any
     ticks: Any
-    target: Any  # (2 G, dof)
-    hands: Any  # (G,)
-    reached: Any  # (G, dof)
+    target: Any  # (N, 2 G, dof)
+    hands: Any  # (N, G)
+    reached: Any  # (N, G, dof)
 
 
 class Kept(NamedTuple):
-    """What is kept of the trials of a run."""
+    """What is kept of the trials of each run."""
 
-    rewards: Any  # (T,)
-    completed: Any  # (T,)
+    rewards: Any  # (N, T)
+    completed: Any  # (N, T)
+    best_trial: Any  # (N,), -1 for none
+    replayed: Any  # (N,) whether the replay hit every goal
     first: Log
     best: Log
     replay: Log
@@ -92,11 +95,19 @@ COUNT = Count()
 
 
 class Work(NamedTuple):
-    """What a trial works on."""
+    """What the trials of the runs work on, each now at the same goal of the same trial."""
 
-    q: Any  # (dof,) where the robot is
-    target: Any  # (dof,) where it is to go
-    counts: Any
+    q: Any  # (N, dof) where the robot is
+    target: Any  # (N, dof) where it is to go
+    hand: Any  # (N,) chosen for this goal
+    previous: Any  # (N,) hand of the goal before
+    known: Any  # (N,) whether the hand has a learned target
+    going: Any  # (N,) whether the trial has not failed
+    acting: Any  # (N,) whether the run is among those that are moved or corrected next
+    total: Any  # (N,) ticks of the trial
+    counts: Any  # (N, counters)
+    ends: Ends
+    lanes: Lanes
     scratch: Scratch
 
 
@@ -124,39 +135,56 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
     )
 
 
-def empty_tables(goals: int, dof: int) -> Tables:
+def empty_tables(runs: int, goals: int, dof: int) -> Tables:
     """Tables in which nothing is learned."""
-    return Tables(np.full((goals, 3, 2), -np.inf), np.full((goals, 3, 2, dof), np.nan))
+    shape = (runs, goals, 3, 2)
+    return Tables(np.full(shape, -np.inf), np.full((*shape, dof), np.nan))
 
 
-def empty_log(goals: int, dof: int) -> Log:
-    """A log without movements."""
-    rows = 2 * goals
+def empty_log(runs: int, goals: int, dof: int) -> Log:
+    """Logs without movements."""
+    goal, hand, kind, ticks = np.zeros((4, runs, 2 * goals), dtype=np.int64)
     return Log(
-        count=np.zeros(1, dtype=np.int64),
-        goal=np.zeros(rows, dtype=np.int64),
-        hand=np.zeros(rows, dtype=np.int64),
-        kind=np.zeros(rows, dtype=np.int64),
-        ticks=np.zeros(rows, dtype=np.int64),
-        target=np.zeros((rows, dof)),
-        hands=np.zeros(goals, dtype=np.int64),
-        reached=np.zeros((goals, dof)),
+        count=np.zeros(runs, dtype=np.int64),
+        goal=goal,
+        hand=hand,
+        kind=kind,
+        ticks=ticks,
+        target=np.zeros((runs, 2 * goals, dof)),
+        hands=np.zeros((runs, goals), dtype=np.int64),
+        reached=np.zeros((runs, goals, dof)),
     )
 
 
-def work_for(task: Task) -> Work:
-    """Work space of one run, all counters 0."""
-    q = np.empty(task.robot.dof)
-    counts = np.zeros(len(COUNT), dtype=np.int64)
-    return Work(q, np.empty_like(q), counts, scratch_for(task.robot))
+def work_for(runs: int, task: Task) -> Work:
+    """Work space of runs, all counters 0. ValueError for more than there are lanes."""
+    if runs > LANES:
+        raise ValueError(f"{runs} runs at once; there are {LANES} lanes")
+    q, target = np.zeros((2, runs, task.robot.dof))
+    hand, previous, total = np.zeros((3, runs), dtype=np.int64)
+    known, going, acting = np.zeros((3, runs), dtype=np.bool_)
+    return Work(
+        q=q,
+        target=target,
+        hand=hand,
+        previous=previous,
+        known=known,
+        going=going,
+        acting=acting,
+        total=total,
+        counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
+        ends=ends_of(runs),
+        lanes=lanes_for(task.robot),
+        scratch=scratch_for(task.robot),
+    )
 
 
 @inlined
-def _goal_distance(number: int, hand: int, problem: Any, work: Any) -> float:
+def _goal_distance(run: int, number: int, hand: int, problem: Any, work: Any) -> float:
     arm = arm_of(problem, hand)
     scratch = work.scratch
-    joint_chain(work.q, arm, scratch.xs, scratch.ys)
-    work.counts[COUNT.evaluations] += 1
+    joint_chain(work.q[run], arm, scratch.xs, scratch.ys)
+    work.counts[run, COUNT.evaluations] += 1
     tip = len(arm.links)
     dx = problem.goals[number, 0] - scratch.xs[tip]
     dy = problem.goals[number, 1] - scratch.ys[tip]
@@ -178,159 +206,217 @@ def _random_hand(hands: Any, rng: Any) -> int:
     return int(hands[int(rng.random() * len(hands))])
 
 
-@inner
-def _explored_hand(number: int, values: Any, problem: Any, rules: Any, rng: Any, work: Any) -> int:
-    if rules.exploration == 0 or rng.random() >= rules.epsilon:
-        return int(_greedy(values, rules.hands))
-    if rules.exploration == 1:
-        return int(_random_hand(rules.hands, rng))
+@inlined
+def _closest_hand(
+    run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any
+) -> int:
     nearest = rules.hands[0]
-    nearest_distance = _goal_distance(number, nearest, problem, work)
+    nearest_distance = _goal_distance(run, number, nearest, problem, work)
     tie = False
     for hand in rules.hands[1:]:
-        distance = _goal_distance(number, hand, problem, work)
+        distance = _goal_distance(run, number, hand, problem, work)
         tie = abs(distance - nearest_distance) <= _EQUALLY_NEAR
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
-    if tie:
-        return int(_random_hand(rules.hands, rng))
-    return int(nearest)
+    return int(_random_hand(rules.hands, rng)) if tie else int(nearest)
 
 
-@inlined
-def _record(log: Any, number: int, hand: int, kind: int, ticks: int, target: Any) -> None:
-    row = log.count[0]
-    log.goal[row] = number
-    log.hand[row] = hand
-    log.kind[row] = kind
-    log.ticks[row] = ticks
-    log.target[row] = target
-    log.count[0] = row + 1
-
-
-@inlined
-def _set_target(stored: Any, hand: int, explore: bool, rules: Any, rng: Any, work: Any) -> None:
-    """q^t = q*(s, a) + η; joints that are not to be modified keep their current values."""
-    for j in range(len(work.q)):
-        work.target[j] = work.q[j] if rules.follows[hand, j] else stored[j]
-        if explore and rules.explored[hand, j]:
-            work.target[j] += rules.noise_sd * rng.standard_normal()
-
-
-@inlined
-def _shift_target(
-    stored: Any, number: int, hand: int, problem: Any, rules: Any, work: Any
+@inner
+def _choose_hands(
+    number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
-    """Move the mean of η into the direction in which **A** would step from q*(s, a)."""
-    arm, goal = arm_of(problem, hand), goal_of(problem, number)
-    length = rules.bias * rules.noise_sd
-    shift_kernel(work.target, stored, arm, goal, rules.explored[hand], length, work.scratch)
-    work.counts[COUNT.evaluations] += 1
-    work.counts[COUNT.biased] += 1
+    """The hand of every run: greedy, or with probability ε an explored one."""
+    for run in range(len(work.q)):
+        if not work.going[run]:
+            continue
+        hand = _greedy(tables.value[run, number, work.previous[run]], rules.hands)
+        if explore and rules.exploration != 0:
+            rng = rngs[run]
+            if rng.random() < rules.epsilon:
+                if rules.exploration == 1:
+                    hand = _random_hand(rules.hands, rng)
+                else:
+                    hand = _closest_hand(run, number, problem, rules, rng, work)
+        work.hand[run] = hand
 
 
 @inlined
-def _move(
-    number: int, hand: int, kind: int, problem: Any, log: Any, work: Any
-) -> tuple[int, bool]:
-    """Move to the target and log it; ticks, goal hit."""
-    arm, goal = arm_of(problem, hand), goal_of(problem, number)
-    ticks, hit, evaluations = move_kernel(
-        work.q, work.target, arm, goal, kind == LEARNED, problem.model, work.scratch
-    )
-    work.counts[COUNT.evaluations] += evaluations
-    work.counts[COUNT.ticks] += ticks
-    _record(log, number, hand, kind, ticks, work.target)
-    return ticks, hit
+def _set_target(
+    target: Any, q: Any, stored: Any, hand: int, explore: bool, rules: Any, rng: Any
+) -> None:
+    """q^t = q*(s, a) + η; joints that are not to be modified keep their current values."""
+    for j in range(len(q)):
+        target[j] = q[j] if rules.follows[hand, j] else stored[j]
+        if explore and rules.explored[hand, j]:
+            target[j] += rules.noise_sd * rng.standard_normal()
+
+
+@inner
+def _aim(
+    number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
+) -> None:
+    """Where something is learned, set the target; elsewhere see whether the goal is hit."""
+    goal = goal_of(problem, number)
+    for run in range(len(work.q)):
+        work.acting[run] = False
+        if not work.going[run]:
+            continue
+        hand, previous = work.hand[run], work.previous[run]
+        work.known[run] = tables.value[run, number, previous, hand] > -math.inf
+        if not work.known[run]:
+            distance = _goal_distance(run, number, hand, problem, work)
+            work.ends.hit[run] = distance <= problem.radius
+            continue
+        stored = tables.target[run, number, previous, hand]
+        _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rngs[run])
+        if explore and rules.bias > 0.0:
+            # The mean of η moves into the direction in which **A** would step from q*(s, a).
+            arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd
+            explored = rules.explored[hand]
+            shift_kernel(work.target[run], stored, arm, goal, explored, length, work.scratch)
+            work.counts[run, COUNT.evaluations] += 1
+            work.counts[run, COUNT.biased] += 1
+        work.acting[run] = True
 
 
 @inlined
-def _correct(number: int, hand: int, problem: Any, work: Any) -> bool:
-    """Set the target to what **A** finds from here; whether it found anything."""
-    work.target[:] = work.q
-    arm, goal = arm_of(problem, hand), goal_of(problem, number)
-    converged, iterations = correct_kernel(
-        work.target, arm, goal, problem.corrector, problem.model, work.scratch
-    )
-    work.counts[COUNT.iterations] += iterations
-    work.counts[COUNT.evaluations] += iterations + 1
-    return converged
+def _record(log: Any, run: int, number: int, hand: int, kind: int, ticks: int, q: Any) -> None:
+    row = log.count[run]
+    log.goal[run, row] = number
+    log.hand[run, row] = hand
+    log.kind[run, row] = kind
+    log.ticks[run, row] = ticks
+    log.target[run, row] = q
+    log.count[run] = row + 1
+
+
+@inner
+def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
+    """Move the acting runs to their targets and log it."""
+    lanes, ends = work.lanes, work.ends
+    count = 0
+    for run in range(len(work.q)):
+        if work.acting[run]:
+            arm = arm_of(problem, work.hand[run])
+            depart(lanes, count, run, work.q[run], work.target[run], arm, problem.model)
+            count += 1
+    goal = goal_of(problem, number)
+    learned = kind == LEARNED
+    move_lanes(lanes, count, goal, learned, problem.model, work.q, work.target, ends)
+    for run in range(len(work.q)):
+        if work.acting[run]:
+            ticks = ends.ticks[run]
+            work.total[run] += ticks
+            work.counts[run, COUNT.ticks] += ticks
+            _record(log, run, number, work.hand[run], kind, ticks, work.target[run])
+
+
+@inner
+def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None:
+    """Set the targets of runs that missed to what **A** finds; trials fail where it does not."""
+    lanes, ends = work.lanes, work.ends
+    count = 0
+    for run in range(len(work.q)):
+        work.acting[run] = False
+        if not work.going[run]:
+            continue
+        if ends.hit[run]:
+            if not work.known[run]:
+                _record(log, run, number, work.hand[run], CORRECTIVE, 0, work.q[run])
+        elif work.known[run] and not rules.corrects:
+            work.counts[run, COUNT.failed] += 1
+            work.going[run] = False
+        else:
+            work.target[run] = work.q[run]
+            board(lanes, count, run, work.q[run], arm_of(problem, work.hand[run]))
+            count += 1
+            work.acting[run] = True
+    goal = goal_of(problem, number)
+    correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
+    for run in range(len(work.q)):
+        if work.acting[run]:
+            work.counts[run, COUNT.iterations] += ends.iterations[run]
+            converged = ends.converged[run]
+            work.counts[run, COUNT.corrections if converged else COUNT.failed] += 1
+            work.acting[run] = work.going[run] = converged
 
 
 @inner
 def _trial(
-    forced: Any,
+    first_hands: Any,
     explore: bool,
     problem: Any,
     rules: Any,
     tables: Any,
     log: Any,
-    rng: Any,
+    rngs: Any,
     work: Any,
-) -> tuple[bool, int]:
-    """One trial into ``log``; completed, ticks. ``forced`` hands, if any, are used."""
-    work.q[:] = problem.start
-    log.count[0] = 0
-    total = 0
-    previous = NO_HAND
-    for goal in range(len(problem.goals)):
-        values = tables.value[goal, previous]
-        if len(forced) > 0:
-            hand = int(forced[goal])
-        elif explore:
-            hand = _explored_hand(goal, values, problem, rules, rng, work)
+) -> None:
+    """One trial of every run into ``log``; ``first_hands``, if any, are used."""
+    for run in range(len(work.q)):
+        work.q[run] = problem.start
+        work.previous[run] = NO_HAND
+        work.going[run] = True
+        work.total[run] = 0
+        work.ends.evaluations[run] = 0
+        log.count[run] = 0
+    for number in range(len(problem.goals)):
+        if len(first_hands) > 0:
+            work.hand[:] = first_hands[number]
         else:
-            hand = _greedy(values, rules.hands)
-
-        known = values[hand] > -math.inf
-        if known:
-            stored = tables.target[goal, previous, hand]
-            _set_target(stored, hand, explore, rules, rng, work)
-            if explore and rules.bias > 0.0:
-                _shift_target(stored, goal, hand, problem, rules, work)
-            ticks, hit = _move(goal, hand, LEARNED, problem, log, work)
-            total += ticks
-        else:
-            hit = _goal_distance(goal, hand, problem, work) <= problem.radius
-            if hit:
-                _record(log, goal, hand, CORRECTIVE, 0, work.q)
-        if not hit:
-            if known and not rules.corrects:
-                work.counts[COUNT.failed] += 1
-                return False, total
-            if not _correct(goal, hand, problem, work):
-                work.counts[COUNT.failed] += 1
-                return False, total
-            work.counts[COUNT.corrections] += 1
-            # It ends inside the goal: the model's tolerance is below the radius.
-            ticks, _ = _move(goal, hand, CORRECTIVE, problem, log, work)
-            total += ticks
-        log.hands[goal] = hand
-        log.reached[goal] = work.q
-        previous = hand
-    return True, total
+            _choose_hands(number, explore, problem, rules, tables, rngs, work)
+        _aim(number, explore, problem, rules, tables, rngs, work)
+        _move(number, LEARNED, problem, log, work)
+        _correct(number, problem, rules, log, work)
+        # It ends inside the goal: the model's tolerance is below the radius.
+        _move(number, CORRECTIVE, problem, log, work)
+        for run in range(len(work.q)):
+            if work.going[run]:
+                log.hands[run, number] = work.hand[run]
+                log.reached[run, number] = work.q[run]
+                work.previous[run] = work.hand[run]
+    for run in range(len(work.q)):
+        work.counts[run, COUNT.evaluations] += work.ends.evaluations[run]
 
 
 @inner
-def _update(reward: float, tables: Any, log: Any) -> None:
+def _update(run: int, reward: float, tables: Any, log: Any) -> None:
     previous = NO_HAND
-    for goal in range(len(log.hands)):
-        hand = log.hands[goal]
-        if reward > tables.value[goal, previous, hand]:
-            tables.value[goal, previous, hand] = reward
-            tables.target[goal, previous, hand] = log.reached[goal]
+    for number in range(log.hands.shape[1]):
+        hand = log.hands[run, number]
+        if reward > tables.value[run, number, previous, hand]:
+            tables.value[run, number, previous, hand] = reward
+            tables.target[run, number, previous, hand] = log.reached[run, number]
         previous = hand
 
 
 @inner
-def _copy(source: Any, destination: Any) -> None:
-    for row in range(source.count[0]):
-        destination.goal[row] = source.goal[row]
-        destination.hand[row] = source.hand[row]
-        destination.kind[row] = source.kind[row]
-        destination.ticks[row] = source.ticks[row]
-        destination.target[row] = source.target[row]
-    destination.count[0] = source.count[0]
+def _copy(run: int, source: Any, destination: Any) -> None:
+    for row in range(source.count[run]):
+        destination.goal[run, row] = source.goal[run, row]
+        destination.hand[run, row] = source.hand[run, row]
+        destination.kind[run, row] = source.kind[run, row]
+        destination.ticks[run, row] = source.ticks[run, row]
+        destination.target[run, row] = source.target[run, row]
+    destination.count[run] = source.count[run]
+
+
+@inner
+def _learn_from(trial: int, tables: Any, kept: Any, log: Any, work: Any) -> None:
+    """Keep the rewards of a trial; where it was completed, update Q and q*."""
+    for run in range(len(work.q)):
+        reward = -work.total[run]
+        kept.rewards[run, trial] = reward
+        kept.completed[run, trial] = work.going[run]
+        if not work.going[run]:
+            continue
+        if trial == 0:
+            _copy(run, log, kept.first)
+        _update(run, float(reward), tables, log)
+        best = kept.best_trial[run]
+        if best < 0 or reward > kept.rewards[run, best]:
+            kept.best_trial[run] = trial
+            _copy(run, log, kept.best)
 
 
 @entry
@@ -341,30 +427,20 @@ def learn_kernel(
     tables: Any,
     kept: Any,
     log: Any,
-    rng: Any,
+    rngs: Any,
     work: Any,
-) -> tuple[int, bool]:
-    """All trials of one run; best trial (or -1), replay completed.
+) -> None:
+    """All trials of N runs, each with its own generator, and the replay of what they learned.
 
     ``first_hands`` (G,) are those of trial 0. ``tables`` and ``kept`` are filled; ``log``
     is overwritten by every trial.
     """
     free_choice = first_hands[:0]
-    best_trial = -1
-    for trial in range(len(kept.rewards)):
+    for trial in range(kept.rewards.shape[1]):
         forced = first_hands if trial == 0 else free_choice
-        done, ticks = _trial(forced, True, problem, rules, tables, log, rng, work)
-        kept.rewards[trial] = -ticks
-        kept.completed[trial] = done
-        if not done:
-            continue
-        if trial == 0:
-            _copy(log, kept.first)
-        _update(-float(ticks), tables, log)
-        if best_trial < 0 or -ticks > kept.rewards[best_trial]:
-            best_trial = trial
-            _copy(log, kept.best)
+        _trial(forced, True, problem, rules, tables, log, rngs, work)
+        _learn_from(trial, tables, kept, log, work)
     spent = work.counts.copy()
-    replayed, _ = _trial(free_choice, False, problem, rules, tables, kept.replay, rng, work)
-    work.counts[:] = spent  # the replay is not part of the run
-    return best_trial, replayed
+    _trial(free_choice, False, problem, rules, tables, kept.replay, rngs, work)
+    kept.replayed[:] = work.going
+    work.counts[:] = spent  # the replay is not part of the runs

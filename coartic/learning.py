@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from coartic.learner import (
     rules_of,
     work_for,
 )
+from coartic.lanes import LANES
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.problem import problem_of
 from coartic.robot import HANDS, Array
@@ -83,6 +85,7 @@ class LearningRun:
     """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
     counters: Counters
     wall_s: float
+    """Its share of the time that it and the runs beside it took."""
     cpu_s: float
 
     @property
@@ -164,83 +167,7 @@ def learn(
     ValueError for a negative seed, fewer than one trial, or a model that no movement can
     be made with. Source: paper, Figure 3.
     """
-    condition = load_condition(condition)
-    reason = condition.why_not(task)
-    if reason is not None:
-        raise NotApplicableError(reason)
-    if trials < 1:
-        raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
-    checked_model(model, radius=task.radius)
-    search = search_initial_hands(task, condition.hands, model=model)
-    if not getattr(learn_kernel, "signatures", True):
-        _Learning(task, condition, model, search.hands, seed, 0).perform()  # compiles it
-    learning = _Learning(task, condition, model, search.hands, seed, trials)
-    wall, cpu = time.perf_counter(), time.thread_time()
-    best_trial, replayed = learning.perform()
-    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
-    kept = learning.kept
-    return LearningRun(
-        task=task,
-        condition=condition,
-        model=model,
-        seed=seed,
-        initial_search=search,
-        rewards=np.ma.array(kept.rewards, mask=~kept.completed),
-        best_trial=int(best_trial) if best_trial >= 0 else None,
-        initial=_movements(kept.first),
-        solution=_movements(kept.best) if best_trial >= 0 else (),
-        replay=_movements(kept.replay),
-        replay_completed=bool(replayed),
-        values=learning.tables.value,
-        targets=learning.tables.target,
-        counters=_counters(trials, learning.work.counts),
-        wall_s=wall,
-        cpu_s=cpu,
-    )
-
-
-class _Learning:
-    """The arguments of one call of the kernel, and what it fills."""
-
-    def __init__(
-        self,
-        task: Task,
-        condition: ExplorationCondition,
-        model: MotionModel,
-        first_hands: str,
-        seed: int,
-        trials: int,
-    ) -> None:
-        goals, dof = len(task.goals), task.robot.dof
-        codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
-        self.first_hands = np.array(codes, dtype=np.int64)
-        self.problem = problem_of(task, model, nullspace_gain=condition.nullspace_gain)
-        self.rules = rules_of(task, condition)
-        self.tables = empty_tables(goals, dof)
-        self.kept = Kept(
-            rewards=np.zeros(trials, dtype=np.int64),
-            completed=np.zeros(trials, dtype=np.bool_),
-            first=empty_log(goals, dof),
-            best=empty_log(goals, dof),
-            replay=empty_log(goals, dof),
-        )
-        self.log = empty_log(goals, dof)
-        self.rng = np.random.default_rng(seed)
-        self.work = work_for(task)
-
-    def perform(self) -> tuple[int, bool]:
-        """Make all trials; best trial (or -1), replay completed."""
-        result: tuple[int, bool] = learn_kernel(
-            self.first_hands,
-            self.problem,
-            self.rules,
-            self.tables,
-            self.kept,
-            self.log,
-            self.rng,
-            self.work,
-        )
-        return result
+    return learn_many(task, condition, seeds=[seed], trials=trials, model=model, jobs=1)[0]
 
 
 def learn_many(
@@ -253,26 +180,107 @@ def learn_many(
     jobs: int = -1,
     on_done: Callable[[LearningRun], None] | None = None,
 ) -> list[LearningRun]:
-    """Run :func:`learn` for many seeds in parallel; one run per seed, in their order.
+    """Run :func:`learn` for many seeds; one run per seed, in their order.
 
-    ``jobs`` threads work at once, -1 for one per core; the kernels hold no lock and
-    the number changes nothing but the time. ``on_done`` is called after each run.
+    Runs go on side by side, on ``jobs`` threads, -1 for one per core; neither changes
+    anything but the time. ``on_done`` is called with each run that has ended. Raises what
+    :func:`learn` does.
     """
-    from joblib import Parallel, delayed
+    from joblib import Parallel, cpu_count, delayed
 
     condition = load_condition(condition)
+    reason = condition.why_not(task)
+    if reason is not None:
+        raise NotApplicableError(reason)
+    if trials < 1:
+        raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
+    checked_model(model, radius=task.radius)
+    search = search_initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(seeds)
+    threads = cpu_count() if jobs == -1 else jobs
+    beside = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
 
-    def one(seed: int) -> LearningRun:
-        run = learn(task, condition, seed=seed, trials=trials, model=model)
-        if on_done is not None:
+    def several(seeds: Sequence[int]) -> list[LearningRun]:
+        runs = _Learning(task, condition, model, search, seeds, trials).perform()
+        for run in runs if on_done is not None else ():
             on_done(run)
-        return run
+        return runs
 
-    runs: list[LearningRun] = Parallel(n_jobs=jobs, prefer="threads")(
-        delayed(one)(seed) for seed in ordered
+    if not getattr(learn_kernel, "signatures", True):
+        _Learning(task, condition, model, search, [0], 0).perform()  # compiles it
+    batches = [ordered[first : first + beside] for first in range(0, len(ordered), beside)]
+    done: Iterable[list[LearningRun]] = Parallel(n_jobs=threads, prefer="threads")(
+        delayed(several)(batch) for batch in batches
     )
-    return runs
+    return [run for runs in done for run in runs]
+
+
+class _Learning:
+    """Runs side by side: the arguments of one call of the kernel, and what it fills."""
+
+    def __init__(
+        self,
+        task: Task,
+        condition: ExplorationCondition,
+        model: MotionModel,
+        search: InitialSearch,
+        seeds: Sequence[int],
+        trials: int,
+    ) -> None:
+        runs, goals, dof = len(seeds), len(task.goals), task.robot.dof
+        self._task, self._condition, self._model = task, condition, model
+        self._search, self._seeds = search, seeds
+        codes = [HANDS.index(hand) for hand in hands_of(search.hands)]
+        self._tables = empty_tables(runs, goals, dof)
+        self._kept = Kept(
+            rewards=np.zeros((runs, trials), dtype=np.int64),
+            completed=np.zeros((runs, trials), dtype=np.bool_),
+            best_trial=np.full(runs, -1),
+            replayed=np.zeros(runs, dtype=np.bool_),
+            first=empty_log(runs, goals, dof),
+            best=empty_log(runs, goals, dof),
+            replay=empty_log(runs, goals, dof),
+        )
+        self._work = work_for(runs, task)
+        self._arguments = (
+            np.array(codes, dtype=np.int64),
+            problem_of(task, model, nullspace_gain=condition.nullspace_gain),
+            rules_of(task, condition),
+            self._tables,
+            self._kept,
+            empty_log(runs, goals, dof),
+            [np.random.default_rng(seed) for seed in seeds],
+            self._work,
+        )
+
+    def perform(self) -> list[LearningRun]:
+        """Make all trials of all runs."""
+        wall, cpu = time.perf_counter(), time.thread_time()
+        learn_kernel(*self._arguments)
+        wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+        return [self._run(number, wall, cpu) for number in range(len(self._seeds))]
+
+    def _run(self, number: int, wall: float, cpu: float) -> LearningRun:
+        kept, runs = self._kept, len(self._seeds)
+        best_trial = int(kept.best_trial[number])
+        return LearningRun(
+            task=self._task,
+            condition=self._condition,
+            model=self._model,
+            seed=self._seeds[number],
+            initial_search=self._search,
+            rewards=np.ma.array(kept.rewards[number], mask=~kept.completed[number]),
+            best_trial=best_trial if best_trial >= 0 else None,
+            initial=_movements(kept.first, number),
+            solution=_movements(kept.best, number),
+            replay=_movements(kept.replay, number),
+            replay_completed=bool(kept.replayed[number]),
+            values=self._tables.value[number],
+            targets=self._tables.target[number],
+            counters=_counters(kept.rewards.shape[1], self._work.counts[number]),
+            wall_s=wall / runs,
+            cpu_s=cpu / runs,
+        )
 
 
 def warm_up() -> None:
@@ -297,16 +305,16 @@ def _counters(trials: int, counts: NDArray[np.int64]) -> Counters:
     )
 
 
-def _movements(log: Log) -> tuple[Movement, ...]:
+def _movements(log: Log, run: int) -> tuple[Movement, ...]:
     return tuple(
         Movement(
-            goal=int(log.goal[row]) + 1,
-            hand=HANDS[log.hand[row]],
-            kind="learned" if log.kind[row] == LEARNED else "corrective",
-            target=np.array(log.target[row]),
-            ticks=int(log.ticks[row]),
+            goal=int(log.goal[run, row]) + 1,
+            hand=HANDS[log.hand[run, row]],
+            kind="learned" if log.kind[run, row] == LEARNED else "corrective",
+            target=np.array(log.target[run, row]),
+            ticks=int(log.ticks[run, row]),
         )
-        for row in range(int(log.count[0]))
+        for row in range(int(log.count[run]))
     )
 
 

@@ -23,14 +23,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import entry, inner, joint_chain
+from coartic.compiled import entry, inner, lanewise
+from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.robot import Array, Hand, Robot
+from coartic.robot import BASE_DOF, Array, Hand, Robot
 
 # Distance kept clear beyond what the bounds ask for: far above the rounding of
 # positions (1e-14 for the paper's robot, 1e-11 at coordinates of 10 000), far below any
 # step. It holds for figures up to LARGEST, so larger ones are refused.
 _CLEARANCE = 1e-9
+_HIT, _MISSED = 1.0, 2.0  # fates of a lane
 LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
@@ -72,7 +74,7 @@ def scratch_for(robot: Robot) -> Scratch:
     )
 
 
-@inner
+@lanewise
 def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
     """Number of steps during which a gap provably stays open.
 
@@ -80,100 +82,161 @@ def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
     shrinks now, ``speed`` the bound s and ``bend`` the bound c of the module's text.
     """
     gap -= _CLEARANCE
-    if gap <= 0.0:
-        return 0.0
-    steps = gap / speed if speed > 0.0 else math.inf
     root = math.sqrt(closing * closing + 2.0 * bend * gap)
-    if closing > 0.0:
-        steps = max(steps, 2.0 * gap / (closing + root))
-    elif bend > 0.0:
-        steps = max(steps, (root - closing) / bend)
-    else:
-        steps = math.inf
-    return steps * (1.0 - 1e-9)
+    approaching = 2.0 * gap / (closing + root)
+    leaving = (root - closing) / bend if bend > 0.0 else math.inf
+    curved = approaching if closing > 0.0 else leaving
+    straight = gap / speed if speed > 0.0 else math.inf
+    steps = max(straight, curved) * (1.0 - 1e-9)
+    return steps if gap > 0.0 else 0.0
 
 
-def _move(
-    q: Any, target: Any, arm: Any, goal: Any, stop_on_arrival: bool, model: Any, scratch: Any
-) -> tuple[int, bool, int]:
-    """Move ``q`` in place; ticks, goal hit, forward-kinematics evaluations."""
-    xs, ys, rates, start = scratch
-    tip = len(arm.links)
-    evaluations = 0
+@inner
+def depart(
+    lanes: Any, lane: int, run: int, q: Any, target: Any, arm: Any, model: Any
+) -> None:
+    """Put an arm into a lane, on its way from ``q`` to ``target``."""
+    board(lanes, lane, run, q, arm)
+    at = lanes.at
+    for j in range(len(at.q)):
+        joint = j if j < BASE_DOF else j - BASE_DOF + arm.first
+        own = j < BASE_DOF + len(arm.links)
+        at.start[j, lane] = q[joint] if own else 0.0
+        at.target[j, lane] = target[joint] if own else 0.0
 
     square = 0.0
     for j in range(len(q)):
-        start[j] = q[j]
         delta = target[j] - q[j]
         square += delta * delta
     distance = math.sqrt(square)
-    last = math.ceil(distance / model.step)
-
-    end_x = 0.0
-    end_y = 0.0
-    if stop_on_arrival:
-        joint_chain(target, arm, xs, ys)
-        evaluations += 1
-        end_x = xs[tip]
-        end_y = ys[tip]
-
     per_step = model.step / distance if distance > 0.0 else 0.0
-    base_x = (target[0] - start[0]) * per_step
-    base_y = (target[1] - start[1]) * per_step
+    base_x = (target[0] - q[0]) * per_step
+    base_y = (target[1] - q[1]) * per_step
     speed = math.sqrt(base_x * base_x + base_y * base_y)
     bend = 0.0
     rate = 0.0
-    for link in range(tip):
-        joint = arm.first + link
-        rate += (target[joint] - start[joint]) * per_step
-        rates[link] = rate
-        speed += arm.links[link] * abs(rate)
-        bend += arm.links[link] * rate * rate
+    for k in range(len(at.length)):
+        rate += (at.target[BASE_DOF + k, lane] - at.start[BASE_DOF + k, lane]) * per_step
+        at.rate[k, lane] = rate
+        speed += at.length[k, lane] * abs(rate)
+        bend += at.length[k, lane] * rate * rate
+    at.base_rate[0, lane], at.base_rate[1, lane] = base_x, base_y
+    at.distance[lane], at.speed[lane], at.bend[lane] = distance, speed, bend
+    at.step[lane], at.last[lane] = 0.0, math.ceil(distance / model.step)
 
-    k = 0
-    while True:
-        if k >= last:
-            k = last
-            for j in range(len(q)):
-                q[j] = target[j]
-        else:
-            fraction = k * model.step / distance
-            for j in range(len(q)):
-                q[j] = start[j] + fraction * (target[j] - start[j])
-        joint_chain(q, arm, xs, ys)
-        evaluations += 1
 
-        goal_dx = goal.x - xs[tip]
-        goal_dy = goal.y - ys[tip]
+@lanewise
+def _go(at: Any, count: int, model: Any) -> None:
+    """The point at which each lane is now."""
+    for i in range(whole(count)):
+        fraction = at.step[i] * model.step / at.distance[i]
+        for j in range(len(at.q)):
+            begin, end = at.start[j, i], at.target[j, i]
+            between = begin + fraction * (end - begin)
+            at.q[j, i] = end if at.step[i] == at.last[i] else between
+
+
+@lanewise
+def _look(at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any) -> int:
+    """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended."""
+    ended = 0
+    tip = len(at.length)
+    for i in range(whole(count)):
+        goal_dx = goal.x - at.x[tip, i]
+        goal_dy = goal.y - at.y[tip, i]
         goal_distance = math.sqrt(goal_dx * goal_dx + goal_dy * goal_dy)
-        if goal_distance <= goal.radius:
-            return k + 1, True, evaluations
-        if k == last:
-            return k + 1, False, evaluations
-
-        velocity_x = base_x
-        velocity_y = base_y
-        for link in range(tip):
-            velocity_x -= rates[link] * (ys[link + 1] - ys[link])
-            velocity_y += rates[link] * (xs[link + 1] - xs[link])
-
+        velocity_x = at.base_rate[0, i]
+        velocity_y = at.base_rate[1, i]
+        for k in range(tip):
+            velocity_x -= at.rate[k, i] * (at.y[k + 1, i] - at.y[k, i])
+            velocity_y += at.rate[k, i] * (at.x[k + 1, i] - at.x[k, i])
         closing = (velocity_x * goal_dx + velocity_y * goal_dy) / goal_distance
-        clear = clear_steps(goal_distance - goal.radius, closing, speed, bend)
+        clear = clear_steps(goal_distance - goal.radius, closing, at.speed[i], at.bend[i])
+        stop = at.step[i] == at.last[i]
         if stop_on_arrival:
-            end_dx = end_x - xs[tip]
-            end_dy = end_y - ys[tip]
+            end_dx = at.end[0, i] - at.x[tip, i]
+            end_dy = at.end[1, i] - at.y[tip, i]
             end_distance = math.sqrt(end_dx * end_dx + end_dy * end_dy)
-            if end_distance <= model.arrival_tolerance:
-                return k + 1, False, evaluations
+            stop |= end_distance <= model.arrival_tolerance
             closing = (velocity_x * end_dx + velocity_y * end_dy) / end_distance
             gap = end_distance - model.arrival_tolerance
-            clear = min(clear, clear_steps(gap, closing, speed, bend))
-        # Every step up to k + clear is clear of both discs.
-        k += 1 + int(min(clear, float(last)))
+            clear = min(clear, clear_steps(gap, closing, at.speed[i], at.bend[i]))
+        fate = _MISSED if stop else GOING
+        fate = _HIT if goal_distance <= goal.radius else fate
+        # Every step up to step + clear is clear of both discs.
+        after = min(at.step[i] + 1.0 + math.floor(min(clear, at.last[i])), at.last[i])
+        at.step[i] = after if fate == GOING else at.step[i]
+        at.fate[i] = fate
+        ended += 0 if (fate == GOING) | (i >= count) else 1
+    return ended
 
 
-move_kernel = inner(_move)
-_compiled_move = entry(_move)
+@inner
+def move_lanes(
+    lanes: Any,
+    count: int,
+    goal: Any,
+    stop_on_arrival: bool,
+    model: Any,
+    q: Any,
+    target: Any,
+    ends: Any,
+) -> None:
+    """Move the first ``count`` lanes until each has ended.
+
+    Each run's configuration in ``q`` (N, dof), from which it departed to that in ``target``,
+    becomes the one in which it stopped; its ``ends`` says how.
+    """
+    at = lanes.at
+    first_row = len(at.q) + 1
+    rows = 2 * len(at.q) + 2 * len(at.length) + 11
+    evaluations = 0
+    if stop_on_arrival:
+        at.q[:] = at.target
+        place(at, count)
+        at.end[0] = at.x[-1]
+        at.end[1] = at.y[-1]
+        evaluations += 1
+    while count > 0:
+        _go(at, count, model)
+        place(at, count)
+        evaluations += 1
+        if _look(at, count, goal, stop_on_arrival, model) == 0:
+            continue
+        for lane in range(count - 1, -1, -1):
+            if at.fate[lane] == GOING:
+                continue
+            run = lanes.run[lane]
+            whole = at.step[lane] == at.last[lane]
+            fraction = 0.0 if whole else at.step[lane] * model.step / at.distance[lane]
+            for j in range(q.shape[1]):
+                between = q[run, j] + fraction * (target[run, j] - q[run, j])
+                q[run, j] = target[run, j] if whole else between
+            ends.hit[run] = at.fate[lane] == _HIT
+            ends.ticks[run] = int(at.step[lane]) + 1
+            ends.evaluations[run] += evaluations
+            count -= 1
+            fill(lanes, lane, count, first_row, first_row + rows)
+
+
+@entry
+def _move_one(
+    q: Any,
+    target: Any,
+    arm: Any,
+    goal: Any,
+    stop_on_arrival: bool,
+    model: Any,
+    lanes: Any,
+    ends: Any,
+) -> Ends:
+    """Move ``q`` in place."""
+    depart(lanes, 0, 0, q, target, arm, model)
+    shape = (1, len(q))
+    move_lanes(
+        lanes, 1, goal, stop_on_arrival, model, q.reshape(shape), target.reshape(shape), ends
+    )
+    return ends
 
 
 def move(
@@ -197,16 +260,17 @@ def move(
     """
     position = configuration(robot, q)
     end = configuration(robot, target)
-    ticks, hit, evaluations = _compiled_move(
+    ends = _move_one(
         position,
         end,
         robot.arm(hand),
         checked_goal(goal, radius),
         stop_on_arrival,
         checked_model(model),
-        scratch_for(robot),
+        lanes_for(robot),
+        ends_of(1),
     )
-    return MoveResult(position, int(ticks), bool(hit), int(evaluations))
+    return MoveResult(position, int(ends.ticks[0]), bool(ends.hit[0]), int(ends.evaluations[0]))
 
 
 def follow(

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import entry, inlined
-from coartic.corrective import correct_kernel
+from coartic.compiled import entry, inner
+from coartic.corrective import correct_lanes
+from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import LARGEST, move_kernel, scratch_for
+from coartic.movement import LARGEST, depart, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array
 from coartic.task import Task, hands_of
@@ -42,17 +43,6 @@ class Trials(NamedTuple):
     """Forward-kinematics evaluations the kernel made."""
 
 
-class _Count(NamedTuple):
-    """Indices of the counters."""
-
-    corrections: int = 0
-    iterations: int = 1
-    evaluations: int = 2
-
-
-_C = _Count()
-
-
 class _Made(NamedTuple):
     """What the kernel fills; see :class:`Trials`."""
 
@@ -60,68 +50,106 @@ class _Made(NamedTuple):
     reached: Any
     ticks: Any
     completed: Any
-    counts: Any
+    corrections: Any  # (1,)
+    iterations: Any  # (1,)
 
 
-@inlined
-def _attempt(
-    q: Any, found: Any, target: Any, arm: Any, goal: Any, made: Any, model: Any, scratch: Any
-) -> tuple[int, bool]:
-    """Move to a goal's target, where it has one; ticks, goal hit."""
-    given = False
-    for j in range(len(q)):
-        given = given or not math.isnan(target[j])
-    if given:
-        for j in range(len(q)):
-            if math.isnan(target[j]):
-                target[j] = q[j]
-        ticks, hit, evaluations = move_kernel(q, target, arm, goal, True, model, scratch)
-    else:  # a movement to where it is tells whether the goal is hit
-        found[:] = q
-        _, hit, evaluations = move_kernel(q, found, arm, goal, False, model, scratch)
-        ticks = 0
-    made.counts[_C.evaluations] += evaluations
-    return ticks, hit
+class _Work(NamedTuple):
+    """What a lot of trials works on, each now at the same goal."""
+
+    q: Any  # (N, dof)
+    target: Any  # (N, dof)
+    going: Any  # (N,) whether no goal was missed so far
+    acting: Any  # (N,) whether it is among those that are moved next
+    ends: Ends
+    lanes: Lanes
 
 
-@inlined
-def _finish(
-    q: Any, found: Any, arm: Any, goal: Any, problem: Any, made: Any, scratch: Any
-) -> tuple[int, bool]:
-    """Have **A** finish what was missed; ticks, goal hit."""
-    found[:] = q
-    converged, iterations = correct_kernel(
-        found, arm, goal, problem.corrector, problem.model, scratch
-    )
-    made.counts[_C.iterations] += iterations
-    made.counts[_C.evaluations] += iterations + 1
-    ticks, hit = 0, False
-    if converged:
-        ticks, hit, evaluations = move_kernel(q, found, arm, goal, False, problem.model, scratch)
-        made.counts[_C.corrections] += 1
-        made.counts[_C.evaluations] += evaluations
-    return ticks, hit
+@inner
+def _depart(arm: Any, problem: Any, work: Any) -> int:
+    """Put the acting trials on their way; how many."""
+    count = 0
+    for trial in range(len(work.q)):
+        if work.acting[trial]:
+            q, target = work.q[trial], work.target[trial]
+            depart(work.lanes, count, trial, q, target, arm, problem.model)
+            count += 1
+    return count
+
+
+@inner
+def _attempt(first: int, number: int, arm: Any, problem: Any, made: Any, work: Any) -> None:
+    """Move to the targets; a trial without one moves to where it is."""
+    goal = goal_of(problem, number)
+    for given in (True, False):
+        for trial in range(len(work.q)):
+            work.acting[trial] = work.going[trial]
+            if not work.going[trial]:
+                continue
+            target = made.targets[first + trial, number]
+            work.acting[trial] = given != np.isnan(target).all()
+            if work.acting[trial]:
+                for j in range(len(target)):
+                    at = work.q[trial, j]
+                    work.target[trial, j] = at if math.isnan(target[j]) else target[j]
+                if given:
+                    target[:] = work.target[trial]
+        count = _depart(arm, problem, work)
+        move_lanes(
+            work.lanes, count, goal, given, problem.model, work.q, work.target, work.ends
+        )
+        for trial in range(len(work.q)):
+            if work.acting[trial] and given:
+                made.ticks[first + trial] += work.ends.ticks[trial]
+
+
+@inner
+def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: Any) -> None:
+    """Have **A** finish what was missed."""
+    goal, lanes, ends = goal_of(problem, number), work.lanes, work.ends
+    count = 0
+    for trial in range(len(work.q)):
+        work.acting[trial] = work.going[trial] and not ends.hit[trial]
+        if work.acting[trial]:
+            work.target[trial] = work.q[trial]
+            board(lanes, count, trial, work.q[trial], arm)
+            count += 1
+    correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
+    for trial in range(len(work.q)):
+        if work.acting[trial]:
+            made.iterations[0] += ends.iterations[trial]
+            made.corrections[0] += ends.converged[trial]
+            work.acting[trial] = ends.converged[trial]
+    count = _depart(arm, problem, work)
+    move_lanes(lanes, count, goal, False, problem.model, work.q, work.target, ends)
+    for trial in range(len(work.q)):
+        if work.acting[trial]:
+            made.ticks[first + trial] += ends.ticks[trial]
+
+
+@inner
+def _make_lot(first: int, hands: Any, problem: Any, made: Any, work: Any) -> None:
+    """Make the trials from ``first`` on, as many as there is room for."""
+    goals = len(problem.goals)
+    for trial in range(len(work.q)):
+        work.q[trial] = problem.start
+        work.going[trial] = first + trial < len(made.targets)
+    for number in range(goals):
+        arm = arm_of(problem, hands[number])
+        _attempt(first, number, arm, problem, made, work)
+        _finish(first, number, arm, problem, made, work)
+        for trial in range(len(work.q)):
+            work.going[trial] = work.going[trial] and work.ends.hit[trial]
+            if work.going[trial]:
+                made.reached[first + trial, number] = work.q[trial]
+                made.completed[first + trial] = number == goals - 1
 
 
 @entry
-def _make(hands: Any, problem: Any, made: Any, scratch: Any) -> None:
+def _make(hands: Any, problem: Any, made: Any, work: Any) -> None:
     """Make every trial of ``made.targets``, and fill the rest."""
-    q = np.empty_like(problem.start)
-    found = np.empty_like(problem.start)
-    for trial in range(len(made.targets)):
-        q[:] = problem.start
-        for number in range(len(problem.goals)):
-            arm, goal = arm_of(problem, hands[number]), goal_of(problem, number)
-            target = made.targets[trial, number]
-            ticks, hit = _attempt(q, found, target, arm, goal, made, problem.model, scratch)
-            made.ticks[trial] += ticks
-            if not hit:
-                ticks, hit = _finish(q, found, arm, goal, problem, made, scratch)
-                made.ticks[trial] += ticks
-            if not hit:
-                break
-            made.reached[trial, number] = q
-            made.completed[trial] = number == len(problem.goals) - 1
+    for first in range(0, len(made.targets), len(work.q)):
+        _make_lot(first, hands, problem, made, work)
 
 
 def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = PAPER) -> Trials:
@@ -142,11 +170,20 @@ def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = 
         reached=np.full_like(given, np.nan),
         ticks=np.zeros(len(given), dtype=np.int64),
         completed=np.zeros(len(given), dtype=np.bool_),
-        counts=np.zeros(len(_C), dtype=np.int64),
+        corrections=np.zeros(1, dtype=np.int64),
+        iterations=np.zeros(1, dtype=np.int64),
     )
     codes = np.array([HANDS.index(hand) for hand in names], dtype=np.int64)
-    _make(codes, problem_of(task, model), made, scratch_for(task.robot))
-    return Trials(made.ticks, made.completed, given, made.reached, *map(int, made.counts))
+    work = _work_for(max(min(len(given), LANES), 1), task)
+    _make(codes, problem_of(task, model), made, work)
+    counts = (made.corrections[0], made.iterations[0], work.ends.evaluations.sum())
+    return Trials(made.ticks, made.completed, given, made.reached, *map(int, counts))
+
+
+def _work_for(trials: int, task: Task) -> _Work:
+    q, target = np.zeros((2, trials, task.robot.dof))
+    going, acting = np.zeros((2, trials), dtype=np.bool_)
+    return _Work(q, target, going, acting, ends_of(trials), lanes_for(task.robot))
 
 
 def _checked_targets(task: Task, targets: Array) -> Array:

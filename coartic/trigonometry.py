@@ -49,20 +49,28 @@ def _reduced(angle: float) -> tuple[float, float, int]:
 
 
 @njit(nogil=True)
-def cosine(angle: float) -> float:
-    """cos(angle), angle in rad."""
-    if not abs(angle) < LARGEST:
-        return math.cos(angle)
+def near_cosine(angle: float) -> float:
+    """cos(angle) for |angle| < LARGEST, without a branch."""
     sin, cos, quarter = _reduced(angle)
     value: float = sin if quarter & 1 else cos
     return -value if (quarter + 1) & 2 else value
 
 
 @njit(nogil=True)
-def sine(angle: float) -> float:
-    """sin(angle), angle in rad."""
-    if not abs(angle) < LARGEST:
-        return math.sin(angle)
+def near_sine(angle: float) -> float:
+    """sin(angle) for |angle| < LARGEST, without a branch."""
     sin, cos, quarter = _reduced(angle)
     value: float = cos if quarter & 1 else sin
     return -value if quarter & 2 else value
+
+
+@njit(nogil=True)
+def cosine(angle: float) -> float:
+    """cos(angle), angle in rad."""
+    return near_cosine(angle) if abs(angle) < LARGEST else math.cos(angle)
+
+
+@njit(nogil=True)
+def sine(angle: float) -> float:
+    """sin(angle), angle in rad."""
+    return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
