@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba import njit
+import numpy as np
+from numba import njit, typeof, types
+from numba.extending import typeof_impl
 
 from coartic.robot import chain, lever
 from coartic.trigonometry import cosine, sine
@@ -122,6 +124,22 @@ def entry(function: F) -> F:
     finally:
         numba.config.CACHE_DIR = before
     return compiled
+
+
+class Generators(list[np.random.Generator]):
+    """NumPy generators, one a run, as kernels take them."""
+
+
+@typeof_impl.register(Generators)
+def _type_of_generators(generators: Generators, _: Any) -> types.List:
+    return types.List(typeof(generators[0]))  # a plain list would be copied back after the call
+
+
+@inlined
+def fill_row(row: Any, values: Any) -> None:
+    """row[:] = values, without the slices' checks, which cost seconds to compile."""
+    for j in range(len(row)):
+        row[j] = values[j]
 
 
 _chain = inner(chain)

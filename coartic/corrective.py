@@ -19,9 +19,20 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from coartic.compiled import entry, inner, joint_chain, joint_lever, lanewise
-from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, leave, place, whole
+from coartic.lanes import (
+    GOING,
+    Ends,
+    board,
+    copy_lanes,
+    ends_of,
+    fill,
+    lanes_for,
+    leave,
+    place,
+    whole,
+)
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import checked_goal, configuration, scratch_for
+from coartic.movement import checked_goal, configuration
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
 _CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
@@ -149,6 +160,8 @@ def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> int:
         at.fate[i] = _STUCK if stuck else at.fate[i]
         ended += 0 if (going & moved) | (i >= count) else 1
     return ended
+
+
 @inner
 def correct_lanes(
     lanes: Any, count: int, goal: Any, how: Any, model: Any, found: Any, ends: Any
@@ -159,7 +172,7 @@ def correct_lanes(
     """
     at = lanes.at
     if how.nullspace_gain > 0.0:
-        at.start[:] = at.q
+        copy_lanes(at.q, at.start)
     rows = 2 * len(at.q) + len(at.length) + 3  # down to its start
     iteration = 0
     while count > 0:
@@ -185,9 +198,7 @@ def correct_lanes(
 
 
 @entry
-def _correct_one(
-    q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any
-) -> Ends:
+def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> Ends:
     """Correct ``q`` in place."""
     board(lanes, 0, 0, q, arm)
     correct_lanes(lanes, 1, goal, how, model, q.reshape((1, len(q))), ends)

@@ -19,7 +19,7 @@ from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
 LANES = 40
 """Most lanes at once: they and their rows stay in the innermost cache."""
-_VECTOR = 4  # lanes that vectors hold, or a multiple; LANES is a multiple of it
+_VECTOR = 8  # lanes that vectors hold; LANES is a multiple of it
 GOING = 0.0
 """Fate of a lane that has not ended."""
 
@@ -71,7 +71,9 @@ def lanes_for(robot: Robot) -> Lanes:
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     height = corrected | shared | moved | passing
     rows = np.zeros(1, [(name, np.float64, (*shape, LANES)) for name, shape in height.items()])
-    return Lanes(rows[0], rows.view(np.float64).reshape(-1, LANES), *np.zeros((3, LANES), np.int64))
+    return Lanes(
+        rows[0], rows.view(np.float64).reshape(-1, LANES), *np.zeros((3, LANES), np.int64)
+    )
 
 
 @inner
@@ -100,6 +102,14 @@ def leave(lanes: Any, lane: int, q: Any) -> None:
 
 
 @inner
+def copy_lanes(source: Any, destination: Any) -> None:
+    """Copy rows of every lane."""
+    for j in range(len(source)):
+        for i in range(LANES):
+            destination[j, i] = source[j, i]
+
+
+@inner
 def fill(lanes: Any, lane: int, last: int, first_row: int, end_row: int) -> None:
     """Move the last lane into one that has ended."""
     if lane == last:
@@ -117,7 +127,7 @@ def whole(count: int) -> int:
 
     A loop over whole vectors leaves no lanes over that would be worked on one by one.
     """
-    return (count + _VECTOR - 1) // _VECTOR * _VECTOR
+    return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
 _chain = inner(chain)

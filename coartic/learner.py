@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import entry, inlined, inner, joint_chain
+from coartic.compiled import entry, fill_row, inlined, inner, joint_chain
 from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
 from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
@@ -75,6 +75,7 @@ class Kept(NamedTuple):
     completed: Any  # (N, T)
     best_trial: Any  # (N,), -1 for none
     replayed: Any  # (N,) whether the replay hit every goal
+    counts: Any  # (N, counters) what was spent, without the replay
     first: Log
     best: Log
     replay: Log
@@ -207,9 +208,7 @@ def _random_hand(hands: Any, rng: Any) -> int:
 
 
 @inlined
-def _closest_hand(
-    run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any
-) -> int:
+def _closest_hand(run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
     nearest = rules.hands[0]
     nearest_distance = _goal_distance(run, number, nearest, problem, work)
     tie = False
@@ -221,7 +220,7 @@ def _closest_hand(
     return int(_random_hand(rules.hands, rng)) if tie else int(nearest)
 
 
-@inner
+@inlined
 def _choose_hands(
     number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
@@ -251,7 +250,7 @@ def _set_target(
             target[j] += rules.noise_sd * rng.standard_normal()
 
 
-@inner
+@inlined
 def _aim(
     number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
@@ -286,11 +285,11 @@ def _record(log: Any, run: int, number: int, hand: int, kind: int, ticks: int, q
     log.hand[run, row] = hand
     log.kind[run, row] = kind
     log.ticks[run, row] = ticks
-    log.target[run, row] = q
+    fill_row(log.target[run, row], q)
     log.count[run] = row + 1
 
 
-@inner
+@inlined
 def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
     """Move the acting runs to their targets and log it."""
     lanes, ends = work.lanes, work.ends
@@ -311,7 +310,7 @@ def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
             _record(log, run, number, work.hand[run], kind, ticks, work.target[run])
 
 
-@inner
+@inlined
 def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None:
     """Set the targets of runs that missed to what **A** finds; trials fail where it does not."""
     lanes, ends = work.lanes, work.ends
@@ -327,7 +326,7 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
             work.counts[run, COUNT.failed] += 1
             work.going[run] = False
         else:
-            work.target[run] = work.q[run]
+            fill_row(work.target[run], work.q[run])
             board(lanes, count, run, work.q[run], arm_of(problem, work.hand[run]))
             count += 1
             work.acting[run] = True
@@ -341,10 +340,11 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
             work.acting[run] = work.going[run] = converged
 
 
-@inner
+@inlined
 def _trial(
-    first_hands: Any,
+    first: bool,
     explore: bool,
+    first_hands: Any,
     problem: Any,
     rules: Any,
     tables: Any,
@@ -352,56 +352,56 @@ def _trial(
     rngs: Any,
     work: Any,
 ) -> None:
-    """One trial of every run into ``log``; ``first_hands``, if any, are used."""
+    """One trial of every run into ``log``; the ``first`` one with ``first_hands``."""
     for run in range(len(work.q)):
-        work.q[run] = problem.start
+        fill_row(work.q[run], problem.start)
         work.previous[run] = NO_HAND
         work.going[run] = True
         work.total[run] = 0
         work.ends.evaluations[run] = 0
         log.count[run] = 0
     for number in range(len(problem.goals)):
-        if len(first_hands) > 0:
+        if first:
             work.hand[:] = first_hands[number]
         else:
             _choose_hands(number, explore, problem, rules, tables, rngs, work)
         _aim(number, explore, problem, rules, tables, rngs, work)
-        _move(number, LEARNED, problem, log, work)
-        _correct(number, problem, rules, log, work)
-        # It ends inside the goal: the model's tolerance is below the radius.
-        _move(number, CORRECTIVE, problem, log, work)
+        for kind in range(2):
+            if kind == CORRECTIVE:  # it ends inside the goal: its tolerance is below the radius
+                _correct(number, problem, rules, log, work)
+            _move(number, kind, problem, log, work)
         for run in range(len(work.q)):
             if work.going[run]:
                 log.hands[run, number] = work.hand[run]
-                log.reached[run, number] = work.q[run]
+                fill_row(log.reached[run, number], work.q[run])
                 work.previous[run] = work.hand[run]
     for run in range(len(work.q)):
         work.counts[run, COUNT.evaluations] += work.ends.evaluations[run]
 
 
-@inner
+@inlined
 def _update(run: int, reward: float, tables: Any, log: Any) -> None:
     previous = NO_HAND
     for number in range(log.hands.shape[1]):
         hand = log.hands[run, number]
         if reward > tables.value[run, number, previous, hand]:
             tables.value[run, number, previous, hand] = reward
-            tables.target[run, number, previous, hand] = log.reached[run, number]
+            fill_row(tables.target[run, number, previous, hand], log.reached[run, number])
         previous = hand
 
 
-@inner
+@inlined
 def _copy(run: int, source: Any, destination: Any) -> None:
     for row in range(source.count[run]):
         destination.goal[run, row] = source.goal[run, row]
         destination.hand[run, row] = source.hand[run, row]
         destination.kind[run, row] = source.kind[run, row]
         destination.ticks[run, row] = source.ticks[run, row]
-        destination.target[run, row] = source.target[run, row]
+        fill_row(destination.target[run, row], source.target[run, row])
     destination.count[run] = source.count[run]
 
 
-@inner
+@inlined
 def _learn_from(trial: int, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*."""
     for run in range(len(work.q)):
@@ -435,12 +435,14 @@ def learn_kernel(
     ``first_hands`` (G,) are those of trial 0. ``tables`` and ``kept`` are filled; ``log``
     is overwritten by every trial.
     """
-    free_choice = first_hands[:0]
-    for trial in range(kept.rewards.shape[1]):
-        forced = first_hands if trial == 0 else free_choice
-        _trial(forced, True, problem, rules, tables, log, rngs, work)
-        _learn_from(trial, tables, kept, log, work)
-    spent = work.counts.copy()
-    _trial(free_choice, False, problem, rules, tables, kept.replay, rngs, work)
-    kept.replayed[:] = work.going
-    work.counts[:] = spent  # the replay is not part of the runs
+    trials = kept.rewards.shape[1]
+    for trial in range(trials + 1):
+        replay = trial == trials
+        for run in range(len(work.q) if replay else 0):  # which is not part of the runs
+            fill_row(kept.counts[run], work.counts[run])
+        _trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
+        if not replay:
+            _learn_from(trial, tables, kept, log, work)
+    for run in range(len(work.q)):
+        kept.replayed[run] = work.going[run]
+        _copy(run, log, kept.replay)

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.compiled import Generators
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.exploration import ExplorationCondition, load_condition
 from coartic.initial import InitialSearch, search_initial_hands
+from coartic.lanes import LANES
 from coartic.learner import (
     COUNT,
     LEARNED,
@@ -25,7 +27,6 @@ from coartic.learner import (
     rules_of,
     work_for,
 )
-from coartic.lanes import LANES
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.problem import problem_of
 from coartic.robot import HANDS, Array
@@ -237,6 +238,7 @@ class _Learning:
             completed=np.zeros((runs, trials), dtype=np.bool_),
             best_trial=np.full(runs, -1),
             replayed=np.zeros(runs, dtype=np.bool_),
+            counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
             first=empty_log(runs, goals, dof),
             best=empty_log(runs, goals, dof),
             replay=empty_log(runs, goals, dof),
@@ -249,7 +251,7 @@ class _Learning:
             self._tables,
             self._kept,
             empty_log(runs, goals, dof),
-            [np.random.default_rng(seed) for seed in seeds],
+            Generators(map(np.random.default_rng, seeds)),
             self._work,
         )
 
@@ -277,7 +279,7 @@ class _Learning:
             replay_completed=bool(kept.replayed[number]),
             values=self._tables.value[number],
             targets=self._tables.target[number],
-            counters=_counters(kept.rewards.shape[1], self._work.counts[number]),
+            counters=_counters(kept.rewards.shape[1], kept.counts[number]),
             wall_s=wall / runs,
             cpu_s=cpu / runs,
         )

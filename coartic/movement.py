@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic.compiled import entry, inner, lanewise
-from coartic.lanes import GOING, Ends, board, ends_of, fill, lanes_for, place, whole
+from coartic.lanes import GOING, Ends, board, copy_lanes, ends_of, fill, lanes_for, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
@@ -92,9 +92,7 @@ def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
 
 
 @inner
-def depart(
-    lanes: Any, lane: int, run: int, q: Any, target: Any, arm: Any, model: Any
-) -> None:
+def depart(lanes: Any, lane: int, run: int, q: Any, target: Any, arm: Any, model: Any) -> None:
     """Put an arm into a lane, on its way from ``q`` to ``target``."""
     board(lanes, lane, run, q, arm)
     at = lanes.at
@@ -192,7 +190,7 @@ def move_lanes(
     rows = 2 * len(at.q) + 2 * len(at.length) + 11
     evaluations = 0
     if stop_on_arrival:
-        at.q[:] = at.target
+        copy_lanes(at.target, at.q)
         place(at, count)
         at.end[0] = at.x[-1]
         at.end[1] = at.y[-1]

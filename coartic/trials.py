@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import entry, inner
+from coartic.compiled import entry, fill_row, inner
 from coartic.corrective import correct_lanes
 from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
 from coartic.model import PAPER, MotionModel, checked_model
@@ -93,11 +93,9 @@ def _attempt(first: int, number: int, arm: Any, problem: Any, made: Any, work: A
                     at = work.q[trial, j]
                     work.target[trial, j] = at if math.isnan(target[j]) else target[j]
                 if given:
-                    target[:] = work.target[trial]
+                    fill_row(target, work.target[trial])
         count = _depart(arm, problem, work)
-        move_lanes(
-            work.lanes, count, goal, given, problem.model, work.q, work.target, work.ends
-        )
+        move_lanes(work.lanes, count, goal, given, problem.model, work.q, work.target, work.ends)
         for trial in range(len(work.q)):
             if work.acting[trial] and given:
                 made.ticks[first + trial] += work.ends.ticks[trial]
@@ -111,7 +109,7 @@ def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: An
     for trial in range(len(work.q)):
         work.acting[trial] = work.going[trial] and not ends.hit[trial]
         if work.acting[trial]:
-            work.target[trial] = work.q[trial]
+            fill_row(work.target[trial], work.q[trial])
             board(lanes, count, trial, work.q[trial], arm)
             count += 1
     correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
@@ -132,7 +130,7 @@ def _make_lot(first: int, hands: Any, problem: Any, made: Any, work: Any) -> Non
     """Make the trials from ``first`` on, as many as there is room for."""
     goals = len(problem.goals)
     for trial in range(len(work.q)):
-        work.q[trial] = problem.start
+        fill_row(work.q[trial], problem.start)
         work.going[trial] = first + trial < len(made.targets)
     for number in range(goals):
         arm = arm_of(problem, hands[number])
@@ -141,7 +139,7 @@ def _make_lot(first: int, hands: Any, problem: Any, made: Any, work: Any) -> Non
         for trial in range(len(work.q)):
             work.going[trial] = work.going[trial] and work.ends.hit[trial]
             if work.going[trial]:
-                made.reached[first + trial, number] = work.q[trial]
+                fill_row(made.reached[first + trial, number], work.q[trial])
                 made.completed[first + trial] = number == goals - 1
 
 
