@@ -7,6 +7,7 @@ declares holds under all its parameters.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import chain
 from typing import Annotated, ClassVar
@@ -21,9 +22,12 @@ from coartic.exploration import (
     ExplorationCondition,
 )
 from coartic.initial import InitialSearch, search_initial_hands
-from coartic.learning import METHOD_PREFIX, TRIALS, learn
+from coartic.lanes import LANES
+from coartic.learning import METHOD_PREFIX, TRIALS, LearningRun, learn_many
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.task import Task
+
+_MOST_TRIALS = 4_000_000  # of runs that are performed together
 
 
 class DualProcessParameters(Parameters):
@@ -66,34 +70,51 @@ class DualProcess(Method):
 
     def solve(self, session: Session) -> Result:
         """Learn; the solution is the best trial's."""
+        (result,) = self.solve_together([session])
+        if isinstance(result, MethodError):
+            raise result
+        return result
+
+    def most_together(self) -> int:
+        """As many as there are lanes, if their rewards fit into one answer."""
+        return max(1, min(LANES, _MOST_TRIALS // self.parameters.trials))
+
+    def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
+        """Learn in each session; a solution is the best trial's."""
         parameters: DualProcessParameters = self.parameters
         condition = replace(self.condition, **parameters.model_dump(exclude={"trials"}))
-        task = session.hand_over(*self.told)
-        spend_search(session, search_initial_hands(task, condition.hands, model=session.model))
-        trials = parameters.trials
-        if session.trials_left is not None:
-            trials = min(trials, session.trials_left)
+        tasks = [session.hand_over(*self.told) for session in sessions]
+        task, model = tasks[0], sessions[0].model
+        search = search_initial_hands(task, condition.hands, model=model)
+        for session in sessions:
+            spend_search(session, search)
+        left = sessions[0].trials_left
+        trials = parameters.trials if left is None else min(parameters.trials, left)
         if trials < 1:
-            raise MethodError(
-                "infeasible", "the trial budget ends with the search for initial hands"
-            )
-        with session.solving():
-            run = learn(
-                task,
-                condition,
-                seed=session.seed,
-                trials=trials,
-                model=session.model,
-            )
-        session.spend(**asdict(run.counters))
-        session.record_rewards(run.rewards.tolist())  # None where a trial failed
-        if run.best_trial is None:
-            raise MethodError("infeasible", run.reason)
-        return Result(
-            run.solution,
-            initial=run.initial,
-            replay=run.replay if run.replay_completed else (),
+            spent = "the trial budget ends with the search for initial hands"
+            return [MethodError("infeasible", spent) for _ in sessions]
+        runs = learn_many(
+            task,
+            condition,
+            seeds=[session.seed for session in sessions],
+            trials=trials,
+            model=model,
+            jobs=1,
         )
+        return [_result(*pair) for pair in zip(sessions, runs, strict=True)]
+
+
+def _result(session: Session, run: LearningRun) -> Result | MethodError:
+    session.add_solving(run.wall_s)
+    session.spend(**asdict(run.counters))
+    session.record_rewards(run.rewards.tolist())  # None where a trial failed
+    if run.best_trial is None:
+        return MethodError("infeasible", run.reason)
+    return Result(
+        run.solution,
+        initial=run.initial,
+        replay=run.replay if run.replay_completed else (),
+    )
 
 
 def spend_search(session: Session, search: InitialSearch) -> None:

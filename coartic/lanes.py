@@ -57,7 +57,7 @@ def ends_of(runs: int) -> Ends:
 
 def lanes_for(robot: Robot) -> Lanes:
     """Lanes for either arm of a robot; the shorter one ends in links of length 0."""
-    links = max(len(robot.left_links), len(robot.right_links))
+    links = robot.most_links
     joints = (BASE_DOF + links,)
     corrected = {"q": joints, "pulled": ()}  # base x and y, then the joints of the arm
     shared = {"length": (links,), "shoulder": (2,), "start": joints}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -187,8 +188,6 @@ def learn_many(
     anything but the time. ``on_done`` is called with each run that has ended. Raises what
     :func:`learn` does.
     """
-    from joblib import Parallel, cpu_count, delayed
-
     condition = load_condition(condition)
     reason = condition.why_not(task)
     if reason is not None:
@@ -198,22 +197,35 @@ def learn_many(
     checked_model(model, radius=task.radius)
     search = search_initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(seeds)
-    threads = cpu_count() if jobs == -1 else jobs
-    beside = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
+    threads = _threads(jobs)
+    together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
+    lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
-    def several(seeds: Sequence[int]) -> list[LearningRun]:
+    def perform(seeds: Sequence[int]) -> list[LearningRun]:
         runs = _Learning(task, condition, model, search, seeds, trials).perform()
         for run in runs if on_done is not None else ():
             on_done(run)
         return runs
 
-    if not getattr(learn_kernel, "signatures", True):
-        _Learning(task, condition, model, search, [0], 0).perform()  # compiles it
-    batches = [ordered[first : first + beside] for first in range(0, len(ordered), beside)]
-    done: Iterable[list[LearningRun]] = Parallel(n_jobs=threads, prefer="threads")(
-        delayed(several)(batch) for batch in batches
-    )
-    return [run for runs in done for run in runs]
+    if (links := task.robot.most_links) not in _compiled_for:
+        _Learning(task, condition, model, search, [0], 0).perform()
+        _compiled_for.add(links)
+    if threads == 1:
+        return [run for lot in lots for run in perform(lot)]
+    with ThreadPoolExecutor(threads) as pool:
+        return [run for runs in pool.map(perform, lots) for run in runs]
+
+
+_compiled_for: set[int] = set()
+"""Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
+
+
+def _threads(jobs: int) -> int:
+    if jobs == 1:
+        return 1
+    from joblib import effective_n_jobs
+
+    return int(effective_n_jobs(jobs))
 
 
 class _Learning:

@@ -350,6 +350,11 @@ class Session:
                 raise ValueError(f"counter {name!r}: {count} is negative")
             setattr(self._meter, name, getattr(self._meter, name) + int(count))
 
+    def add_solving(self, wall_s: float) -> None:
+        """Count wall time as solving: of runs that are solved side by side, each has its share."""
+        self._needs_trust("add_solving")
+        self._meter.solve_s += wall_s
+
     def record_rewards(self, rewards: Iterable[int | None]) -> None:
         """Rewards of the trials of a compiled method (trusted methods only)."""
         self._needs_trust("record_rewards")
@@ -430,3 +435,23 @@ class Method(ABC):
     @abstractmethod
     def solve(self, session: Session) -> Result:
         """Find a solution. Raises MethodError where there is none to be found."""
+
+    def most_together(self) -> int:
+        """Number of runs, at most, that :meth:`solve_together` is given.
+
+        The methods of others are given one.
+        """
+        return 1
+
+    def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
+        """What :meth:`solve` gives for each of several sessions that differ in their seeds alone.
+
+        An error in place of a result is what it would raise.
+        """
+        return [self._result(session) for session in sessions]
+
+    def _result(self, session: Session) -> Result | MethodError:
+        try:
+            return self.solve(session)
+        except MethodError as error:
+            return error

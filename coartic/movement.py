@@ -68,7 +68,7 @@ class MoveResult(NamedTuple):
 
 def scratch_for(robot: Robot) -> Scratch:
     """Work space large enough for either arm of ``robot``."""
-    longest = max(len(robot.left_links), len(robot.right_links))
+    longest = robot.most_links
     return Scratch(
         np.empty(longest + 1), np.empty(longest + 1), np.empty(longest), np.empty(robot.dof)
     )

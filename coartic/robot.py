@@ -92,6 +92,11 @@ class Robot:
         """Number of degrees of freedom, the length of ``q``."""
         return BASE_DOF + len(self.left_links) + len(self.right_links)
 
+    @property
+    def most_links(self) -> int:
+        """Number of links of the longer arm."""
+        return max(len(self.left_links), len(self.right_links))
+
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the entries of ``q``: base_x, base_y, left_1, ..., right_n."""
