@@ -81,11 +81,12 @@ class _Comparison:
     def pages(self, folder: Path) -> dict[str, bytes]:
         """What is written beside the tables."""
         self._display.end_runs()
-        from analysis import load
+        from analysis import Study
         from analysis.report.comparison import comparison_document
         from analysis.report.formats.markdown import markdown
+        from analysis.results.folder import made_here
 
-        study = load(folder)
+        study = Study(made_here(folder))
         self._made, self._page = comparison_document(study), folder / "comparison.md"
         return {
             "comparison.md": markdown(self._made, tables="").encode(),
@@ -159,7 +160,7 @@ def show(run_id: given.RunId, folder: given.Records = Path("results")) -> None:
     shown = record.model_dump(mode="json")
     trials = counted(len(record.rewards), "trial")
     shown["rewards"] = f"{trials}, in learning.parquet and in the record"
-    shown["record"] = str(store.path(record.run_id))
+    shown["record"] = str(store.packs().path(record.run_id))
     say(*json_text(shown, indent=2).split("\n"))
     say("", f"Reproduce it with: {command_for(record, store.folder)}")
 
