@@ -110,6 +110,8 @@ def check_tables(folder: Path, manifest: Manifest) -> None:
 def _checked(folder: Path, manifest: Manifest) -> Iterator[Planned]:
     """The runs of a plan with their records, each of them and all together checked."""
     packs, proofs = Packs(folder), _Proofs(folder)
+    for reason in packs.damaged.values():
+        raise CoarticError(f"{reason}; {AGAIN}")
     for cell in manifest.specification.cells:
         method = manifest.specification.methods[cell.method]
         for run, run_id in enumerate(manifest.run_ids(cell)):
