@@ -81,6 +81,10 @@ class Store:
             self._packs = Packs(self.folder)
         return self._packs
 
+    def path(self, run_id: str) -> Path:
+        """The pack that a run's record is in. Raises RecordError where there is none."""
+        return self.packs().path(run_id)
+
     def read(self, run_id: str) -> Record:
         """A record, checked against its checksum. Raises RecordError otherwise."""
         return self.packs()[run_id]

@@ -84,14 +84,14 @@ def _hold(file: IO[bytes]) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def clear_leftovers(folder: Path) -> None:
+def clear_leftovers(folder: Path, kept: Collection[Path] = ()) -> None:
     """Remove the temporary files in ``folder``, not below, whose writers were killed.
 
-    Those of writers at work stay. Raises OSError.
+    Those of writers at work stay, and ``kept``. Raises OSError.
     """
     with os.scandir(folder) as entries:
-        parts = [Path(entry.path) for entry in entries if _is_leftover(entry)]
-    for part in parts:
+        parts = {Path(entry.path) for entry in entries if _is_leftover(entry)}
+    for part in parts.difference(kept):
         with contextlib.suppress(FileNotFoundError, BlockingIOError, PermissionError):
             with part.open("r+b") as file:
                 _hold(file)
@@ -128,6 +128,7 @@ def publish(
     if unfit:
         raise ValueError(f"no names for files: {', '.join(map(repr, unfit))}")
     digests = {name: digest_of(content) for name, content in files.items()}
+    own = {Path(part.name) for part in files.values() if not isinstance(part, bytes)}
     with _errors(folder):
         _check_place(folder, alone)
         folder.mkdir(parents=True, exist_ok=True)
@@ -135,7 +136,7 @@ def publish(
             listing = _read_listing(folder)
             found = _survey(folder, digests, listing.get(owner, {}), owner, alone, derived)
             for place in ("", *found.folders):
-                clear_leftovers(folder / place)
+                clear_leftovers(folder / place, own)
             kept = {} if alone else listing.get(owner, {})
             final = {**listing, owner: kept | {name: [known] for name, known in digests.items()}}
             fresh = [name for name in files if found.digests.get(name) != digests[name]]

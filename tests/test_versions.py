@@ -23,7 +23,7 @@ from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
 from coartic.tables import FORMAT, Manifest
 from tests.support.commands import call
-from tests.support.packs import records_of, write_pack
+from tests.support.packs import packs_of, records_of, write_pack
 from tests.support.reports import shown
 from tests.support.suites import Failing, InProcess, run_and_write
 
@@ -214,8 +214,10 @@ def test_other_code_is_said_and_never_mixed(first, tmp_path):
     assert (row.verdict, row.remarks) == ("identical", "other code")
     assert [line[0] for line in comparison.differing] == [f"code of {LEARNED}"]
     folder = other.results.folder
-    for pack in (folder / "records").glob("*.pack"):
-        pack.rename(pack.with_stem(f"{90 + int(pack.stem):08}"))
+    for number, pack in enumerate(packs_of(folder)):
+        pack.rename(pack.with_stem(f"{90 + number:08}"))
+    for pack in packs_of(folder)[RUNS:]:  # what both versions have alike
+        pack.unlink()
     copied(first, folder)  # its tables and manifest, with both versions' records
     load_results(folder)
     replanned(folder, code="c0ffeec0ffed")

@@ -17,6 +17,7 @@ from coartic.files import folder_named
 from coartic.text import counted, json_text
 
 if TYPE_CHECKING:
+    from analysis.report.document import Document
     from benchmarks.executors import Executor
     from benchmarks.registry import Entry
     from coartic import Task
@@ -77,6 +78,7 @@ class _Comparison:
 
     def __init__(self, display: Display) -> None:
         self._display = display
+        self._made: Document | None = None
 
     def pages(self, folder: Path) -> dict[str, bytes]:
         """What is written beside the tables."""
@@ -94,9 +96,11 @@ class _Comparison:
         }
 
     def show(self) -> None:
-        """Print what fits the terminal."""
+        """Print what fits the terminal; nothing where nothing was made anew."""
         from analysis.report.comparison import notes_of
 
+        if self._made is None:
+            return
         show_data(self._made.tables(), f"see {self._page}")
         show_lines(f"- {note}" for note in notes_of(self._made))
 
@@ -160,7 +164,7 @@ def show(run_id: given.RunId, folder: given.Records = Path("results")) -> None:
     shown = record.model_dump(mode="json")
     trials = counted(len(record.rewards), "trial")
     shown["rewards"] = f"{trials}, in learning.parquet and in the record"
-    shown["record"] = str(store.packs().path(record.run_id))
+    shown["record"] = str(store.path(record.run_id))
     say(*json_text(shown, indent=2).split("\n"))
     say("", f"Reproduce it with: {command_for(record, store.folder)}")
 
