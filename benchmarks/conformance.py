@@ -20,7 +20,7 @@ from benchmarks.harness import record_of
 from benchmarks.registry import Entry, Registry
 from benchmarks.reproduce import differences, perform_once
 from benchmarks.sandbox import Keeper, keeper
-from benchmarks.specification import Limits, RunSpec
+from benchmarks.specification import Limits, RunSpec, Setting
 from coartic import (
     CoarticError,
     NotApplicableError,
@@ -119,14 +119,8 @@ class _MethodChecks:
         return found
 
     def spec(self, task: Task, seed: int = 1, budget: int | None = None) -> RunSpec:
-        return RunSpec(
-            task,
-            self.entry,
-            tuple(self.defaults.items()),
-            0,
-            seed,
-            Limits(CHECK_LIMIT_S, budget),
-        )
+        limits = Limits(CHECK_LIMIT_S, budget)
+        return Setting(task, self.entry, tuple(self.defaults.items()), limits).spec(0, seed)
 
     def record(self, task: Task, seed: int = 1, budget: int | None = None) -> Record:
         """A run in the process that lives through the whole check."""

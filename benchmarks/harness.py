@@ -65,13 +65,13 @@ def perform_missing(
     """
     by_id = {spec.run_id: spec for spec in specs}
     progress = Progress(total=len(by_id))
-    progress.stale = store.stale(list(by_id))
+    progress.stale = store.stale(by_id)
     missing = dict(by_id)
     if not redo:
-        for record in store.read_known(list(by_id)):
+        for record in store.read_known(by_id):
             if isinstance(record, Damage):
                 progress.damaged.append(record)
-                store.set_aside(record.path)
+                store.set_aside(record)
             elif not _to_redo(record, by_id[record.run_id], retry_failed):
                 del missing[record.run_id]
                 progress.present += 1
@@ -83,7 +83,7 @@ def perform_missing(
         for answer in executor.perform([spec.job() for spec in missing.values()]):
             spec = missing.pop(answer["run_id"])
             record = record_of(answer, spec)
-            store.write(record)
+            store.write([record])
             progress.done += 1
             progress.failed += record.status != "ok"
             idle = 0

@@ -26,7 +26,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.store import Store
+from coartic.packs import Packs
 from coartic.tables import TIMINGS
 
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
@@ -133,7 +133,7 @@ class _Killer:
             if path.is_file() and path.stat().st_mtime >= started
         ]
         self.counts.kills += 1
-        self.counts.mid_runs += 0 < len(Store(folder).ids()) < self.total
+        self.counts.mid_runs += 0 < len(Packs(folder)) < self.total
         self.counts.mid_tables += 0 < len(anew) < self.files
         deadline = time.monotonic() + _GRACE_S
         while (left := _marked(folder)) and time.monotonic() < deadline:
@@ -172,8 +172,7 @@ def _marked(folder: Path) -> list[int]:
 
 def _same(whole: Path, interrupted: Path, total: int) -> bool:
     """Whether two folders hold the same runs, each once, the same tables, and no more files."""
-    store = Store(interrupted)
-    if len(store.ids()) != total or list(interrupted.rglob("*.part")):
+    if len(Packs(interrupted)) != total or list(interrupted.rglob("*.part")):
         return False
     for table in TABLES:
         a, b = (pd.read_parquet(path / f"{table}.parquet") for path in (whole, interrupted))

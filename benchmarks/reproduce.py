@@ -9,9 +9,10 @@ from typing import Any
 from benchmarks.harness import record_of
 from benchmarks.registry import Registry, unknown
 from benchmarks.sandbox import supervise
-from benchmarks.specification import Limits, RunSpec
+from benchmarks.specification import Limits, RunSpec, Setting
 from benchmarks.store import Store
 from coartic import CoarticError, Trajectory, trajectory
+from coartic.packs import Packs
 from coartic.record import Record, RecordError
 from coartic.text import shell_line
 
@@ -21,14 +22,19 @@ def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
 
     Raises RecordError where there is none, more than one, or it is damaged or forged.
     """
-    found = sorted(folder.glob(f"**/records/{_safe(prefix)}*.json"))
-    ids = sorted({path.stem for path in found})
+    wanted = _safe(prefix)
+    folders = sorted({path.parent for path in folder.glob("**/records") if path.is_dir()})
+    packs = [(Store(place), Packs(place)) for place in folders]
+    found = [
+        (store, run_id) for store, own in packs for run_id in own if run_id.startswith(wanted)
+    ]
+    ids = sorted({run_id for _, run_id in found})
     if not ids:
         raise RecordError(f"no run {prefix!r} below {folder}; name another folder with --in")
     if len(ids) > 1:
         shown = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
         raise RecordError(f"{prefix!r} is the beginning of {len(ids)} runs: {shown}")
-    store = Store(found[0].parent.parent)
+    store = found[0][0]
     record = store.read(ids[0])
     record.check()
     return store, record
@@ -51,14 +57,13 @@ def spec_of(record: Record, known: Registry, limits: Limits) -> RunSpec:
     if record.method not in known:
         raise unknown("method", record.method, known)
     specification = record.specification
-    return RunSpec(
+    setting = Setting(
         task=record.task,
         entry=known[record.method],
         parameters=tuple(specification.parameters.items()),
-        run=record.run,
-        seed=specification.seed,
         limits=Limits(limits.time_s, specification.trial_budget),
     )
+    return setting.spec(record.run, specification.seed)
 
 
 def perform_once(spec: RunSpec) -> Record:

@@ -18,10 +18,11 @@ from benchmarks.registry import registry
 from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import Store
 from benchmarks.suites import Cell, Suite, load_suite, manifest_of, run_specs, select_cells
-from benchmarks.tables import OWNER, check_results_folder, write_tables
+from benchmarks.tables import OWNER, PAGES, check_results_folder, is_done, statuses, write_tables
 from coartic import CoarticError
 from coartic.files import folder_named, publish
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.packs import Packs
 from coartic.record import Record
 from coartic.tables import Manifest
 from coartic.text import counted
@@ -65,13 +66,18 @@ class RunReport:
     progress: Progress
     wall_s: float
     """Seconds from the first run to the last."""
-    records: Mapping[str, Record]
-    """All records of the plan by run id, those that were there before among them."""
+    run_ids: Sequence[str]
+    """Of all runs of the plan, in its order."""
+
+    @property
+    def records(self) -> Mapping[str, Record]:
+        """The records of the plan by run id, in its order, each read when it is asked for."""
+        return Packs(self.folder).only(self.run_ids)
 
     @property
     def crashed(self) -> int:
         """Runs that crashed, now or before."""
-        return sum(record.status == "crashed" for record in self.records.values())
+        return statuses(self.folder)["crashed"]
 
     def __repr__(self) -> str:
         progress = self.progress
@@ -117,21 +123,29 @@ class SuitePlan:
         folder = folder_named(folder)
         manifest, clock = self._manifest(), time.perf_counter()
         check_results_folder(folder)
-        store = Store(folder)
+        store, run_ids = Store(folder), [spec.run_id for _, spec in self.planned]
         with store.locked():
+            watch = watch or (lambda progress, spec: None)
+            names = () if pages is None else PAGES
+            if not (retry_failed or redo) and is_done(store, manifest, names):
+                progress = Progress(len(self.planned), present=len(self.planned))
+                progress.failed = len(self.planned) - statuses(folder)["ok"]
+                watch(progress, None)
+                return RunReport(folder, progress, time.perf_counter() - clock, run_ids)
             progress = perform_missing(
                 [spec for _, spec in self.planned],
                 store,
                 executor or Local(),
                 retry_failed=retry_failed,
                 redo=redo,
-                watch=watch or (lambda progress, spec: None),
+                watch=watch,
             )
             wall_s = time.perf_counter() - clock
-            records = write_tables(store, manifest)
+            store.drop_superseded()
+            write_tables(store, manifest)
             if pages is not None:
                 publish(folder, pages(folder), owner=OWNER, alone=False)
-        return RunReport(folder, progress, wall_s, records)
+        return RunReport(folder, progress, wall_s, run_ids)
 
     def _manifest(self) -> Manifest:
         return manifest_of(self.suite, self.runs, self.seed, self.planned, self.limits)

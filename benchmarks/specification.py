@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from benchmarks.provenance import command
 from benchmarks.registry import Entry
 from coartic import PAPER, MotionModel, Task
-from coartic.record import RECORD_FORMAT, Specification
+from coartic.record import RECORD_FORMAT, Asked, Specification
 
 
 @dataclass(frozen=True)
@@ -26,17 +27,82 @@ UNLIMITED = Limits()
 
 
 @dataclass(frozen=True)
-class RunSpec:
-    """One run: a method with parameters on a task with a seed."""
+class Setting:
+    """What the runs of a cell share: a method with parameters on a task, under limits."""
 
     task: Task
     entry: Entry
     parameters: tuple[tuple[str, Any], ...]
     """Parameters that differ from the method's defaults."""
+    limits: Limits = UNLIMITED
+
+    @cached_property
+    def all_parameters(self) -> dict[str, Any]:
+        """All parameters, defaults included, as plain data."""
+        return self.entry.complete(dict(self.parameters))
+
+    @cached_property
+    def asked(self) -> Asked:
+        """Everything that results depend on, but for seed and code.
+
+        The time limit is not part of it: it decides whether there is a result, not
+        which.
+        """
+        return Asked(
+            format=RECORD_FORMAT,
+            task=self.task.model_dump(mode="json"),
+            method=self.entry.name,
+            parameters=self.all_parameters,
+            model=PAPER._asdict(),
+            trial_budget=self.limits.trials,
+        )
+
+    @cached_property
+    def job(self) -> dict[str, Any]:
+        """What the runs' jobs share."""
+        foreign, name, code = self.entry.foreign, self.entry.name, self.entry.code
+        return {
+            "specification": self.asked.model_dump(mode="json"),
+            "code": code,
+            "told": list(self.entry.declared.told),
+            "time_limit_s": self.limits.time_s,
+            "foreign": None if foreign is None else foreign.model_dump(mode="json"),
+            "owner": None if foreign is None else f"{name} {code}",
+            "command": command(),
+            "reach": True,
+        }
+
+    def specs(self, seeds: Sequence[int]) -> Iterator[RunSpec]:
+        """The runs with these seeds, numbered from 0."""
+        for run, (seed, key) in enumerate(zip(seeds, self.asked.keys(seeds), strict=True)):
+            yield RunSpec(self, run, seed, f"{key}-{self.entry.code}")
+
+    def spec(self, run: int, seed: int) -> RunSpec:
+        """One run."""
+        (key,) = self.asked.keys([seed])
+        return RunSpec(self, run, seed, f"{key}-{self.entry.code}")
+
+
+@dataclass(frozen=True, slots=True)
+class RunSpec:
+    """One run: a setting with a seed."""
+
+    setting: Setting
     run: int
     """Number of the run, from 0."""
     seed: int
-    limits: Limits = UNLIMITED
+    run_id: str
+    """Address of the run's record: hash of its specification, then of the code."""
+
+    @property
+    def task(self) -> Task:
+        """The task."""
+        return self.setting.task
+
+    @property
+    def entry(self) -> Entry:
+        """The method."""
+        return self.setting.entry
 
     @property
     def method(self) -> str:
@@ -44,53 +110,22 @@ class RunSpec:
         return self.entry.name
 
     @property
+    def limits(self) -> Limits:
+        """Bounds enforced from outside."""
+        return self.setting.limits
+
+    @property
     def model(self) -> MotionModel:
         """The constants of movement."""
         return PAPER
 
     @property
-    def all_parameters(self) -> dict[str, Any]:
-        """All parameters, defaults included, as plain data."""
-        return self.entry.complete(dict(self.parameters))
-
-    @property
     def specification(self) -> Specification:
-        """Everything the result depends on, but for the code.
-
-        The time limit is not part of it: it decides whether there is a result, not
-        which.
-        """
-        return Specification(
-            format=RECORD_FORMAT,
-            task=self.task.model_dump(mode="json"),
-            method=self.method,
-            parameters=self.all_parameters,
-            model=self.model._asdict(),
-            seed=self.seed,
-            trial_budget=self.limits.trials,
-        )
-
-    @cached_property
-    def key(self) -> str:
-        """Hash of the specification."""
-        return self.specification.key()
-
-    @property
-    def run_id(self) -> str:
-        """Address of the run's record: specification, then code."""
-        return f"{self.key}-{self.entry.code}"
+        """Everything the result depends on, but for the code."""
+        return self.setting.asked.with_seed(self.seed)
 
     def job(self) -> dict[str, Any]:
         """What a worker needs to perform the run, as plain data."""
-        foreign = self.entry.foreign
-        return {
-            "run_id": self.run_id,
-            "specification": self.specification.model_dump(mode="json"),
-            "code": self.entry.code,
-            "told": list(self.entry.declared.told),
-            "time_limit_s": self.limits.time_s,
-            "foreign": None if foreign is None else foreign.model_dump(mode="json"),
-            "owner": None if foreign is None else f"{self.method} {self.entry.code}",
-            "command": command(),
-            "reach": True,
-        }
+        shared = self.setting.job
+        specification = {**shared["specification"], "seed": self.seed}
+        return {**shared, "run_id": self.run_id, "specification": specification}

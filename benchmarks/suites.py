@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 from benchmarks.provenance import surroundings
 from benchmarks.registry import Entry, Registry, unknown
-from benchmarks.specification import UNLIMITED, Limits, RunSpec
+from benchmarks.specification import UNLIMITED, Limits, RunSpec, Setting
 from coartic import (
     CONDITIONS,
     VARIANTS,
@@ -42,7 +42,7 @@ from coartic.inputs import (
     read_toml,
 )
 from coartic.learning import METHOD_PREFIX
-from coartic.record import run_seed
+from coartic.record import run_seeds
 from coartic.robot import Finite
 from coartic.tables import (
     DeclaredMethod,
@@ -385,16 +385,10 @@ def run_specs(
                 f"{cell.task.name} x {cell.label}: {asked:_} trials a run; "
                 f"at most {MOST_TRIALS:_} are kept"
             )
-        for run in range(runs if cell.stochastic else 1):
-            spec = RunSpec(
-                task=cell.task,
-                entry=cell.entry,
-                parameters=tuple(parameters.items()),
-                run=run,
-                seed=run_seed(seed, cell.task.name, run),
-                limits=limits,
-            )
-            if run == 0 and (first := names.setdefault(spec.run_id, cell)) is not cell:
+        setting = Setting(cell.task, cell.entry, tuple(parameters.items()), limits)
+        count = runs if cell.stochastic else 1
+        for spec in setting.specs(run_seeds(seed, cell.task.name, count)):
+            if spec.run == 0 and (first := names.setdefault(spec.run_id, cell)) is not cell:
                 raise CoarticError(
                     f"{first.label!r} and {cell.label!r} on task {cell.task.name!r} are the "
                     "same runs; leave one of them out"
@@ -485,28 +479,27 @@ def manifest_of(
         specification=_plan(suite, runs, seed, planned),
         limits=PlanLimits(time_s=limits.time_s, trials=limits.trials),
         environment=surroundings(),
-        tables={},  # until they are written
+        records="",  # until they are written
+        tables={},
     )
 
 
 def _plan(suite: Suite, runs: int, seed: int, planned: Sequence[tuple[Cell, RunSpec]]) -> Plan:
-    by_cell: dict[tuple[str, str], tuple[Cell, list[RunSpec]]] = {}
-    for cell, spec in planned:
-        by_cell.setdefault((cell.task.name, cell.label), (cell, []))[1].append(spec)
-    cells = [cell for cell, _ in by_cell.values()]
+    settings = {(cell.task.name, cell.label): (cell, spec.setting) for cell, spec in planned}
+    complete = [(cell, setting.all_parameters) for cell, setting in settings.values()]
     return Plan(
         suite=suite.name,
         runs=runs,
         seed=seed,
-        trials=max((trials_in(spec.all_parameters) for _, spec in planned), default=0),
-        tasks={cell.task.name: cell.task.model_dump(mode="json") for cell in cells},
+        trials=max((trials_in(parameters) for _, parameters in complete), default=0),
+        tasks={cell.task.name: cell.task.model_dump(mode="json") for cell, _ in complete},
         methods={
             cell.method: DeclaredMethod(
                 **cell.entry.declared.model_dump(exclude={"name", "frozen", "quick"}),
                 origin=cell.entry.origin,
                 code=cell.entry.code,
             )
-            for cell in cells
+            for cell, _ in complete
         },
         cells=tuple(
             PlannedCell(
@@ -514,9 +507,8 @@ def _plan(suite: Suite, runs: int, seed: int, planned: Sequence[tuple[Cell, RunS
                 method=cell.method,
                 variant=cell.variant,
                 parameters=dict(cell.parameters),
-                complete=specs[0].all_parameters,
-                run_ids=tuple(spec.run_id for spec in specs),
+                complete=parameters,
             )
-            for cell, specs in by_cell.values()
+            for cell, parameters in complete
         ),
     )

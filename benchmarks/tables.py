@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
+import contextlib
+import json
+from collections import Counter
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pyarrow.parquet as pq
 
 from benchmarks.store import Store
-from coartic.files import check_folder, check_no_report, publish
-from coartic.record import Record
-from coartic.tables import TABLES, Manifest, parquet_options, tables_of
+from coartic.files import check_folder, check_no_report, digest_of, holds, publish, temporary
+from coartic.packs import Packs
+from coartic.tables import (
+    TABLES,
+    Manifest,
+    Planned,
+    parquet_options,
+    row_groups,
+    schemas,
+)
 
 OWNER = "run"
 """Whose files of a results folder these are, and ``comparison.md`` and ``methods.csv``."""
@@ -27,22 +36,74 @@ def check_results_folder(folder: Path) -> None:
     check_no_report(folder)
 
 
-def write_tables(store: Store, manifest: Manifest) -> dict[str, Record]:
-    """Write all tables of a plan from its records, each atomically, and the manifest last.
+def is_done(store: Store, manifest: Manifest, pages: Collection[str]) -> bool:
+    """Whether a folder holds the tables of a plan, and ``pages``, made of the records that it
+    has now by this very version: what was checked then need not be checked again.
 
-    Returns the records by run id. Raises CoarticError where one contradicts itself, and where
-    the disk does not take a table.
+    Raises CoarticError where the list of its files is damaged.
     """
-    records = {run_id: store.read(run_id) for run_id in manifest.specification.run_ids}
-    for record in records.values():
-        record.check()
-    files = {}
-    for name, table in tables_of(manifest, records).items():
-        sink = io.BytesIO()
-        pq.write_table(table, sink, **parquet_options(name))
-        files[f"{name}.parquet"] = sink.getvalue()
-    digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
-    text = manifest.model_copy(update={"tables": digests}).text()
-    files["manifest.json"] = text.encode()
-    publish(store.folder, files, owner=OWNER, alone=False, derived=files)
-    return records
+    now = manifest.environment
+    if now.commit is not None and now.commit.dirty:
+        return False  # nobody knows which code made them
+    if not holds(store.folder, (*DERIVED, *pages), owner=OWNER):
+        return False  # the list has tables and manifest as they were written together
+    text = (store.folder / "manifest.json").read_text(encoding="utf-8")
+    with contextlib.suppress(ValueError, LookupError, TypeError):
+        found = json.loads(text)
+        then = {
+            "date": found["environment"]["date"],
+            "command": tuple(found["environment"]["command"]),
+        }
+        made = {
+            "environment": now.model_copy(update=then),
+            "records": store.packs().digest,
+            "tables": found["tables"],
+        }
+        return manifest.model_copy(update=made).text() == text
+    return False
+
+
+def write_tables(store: Store, manifest: Manifest) -> None:
+    """Write all tables of a plan from its records, and the manifest last, all at once.
+
+    Raises CoarticError where a record contradicts itself, and where the disk does not take a
+    table.
+    """
+    plan, packs = manifest.specification, store.packs()
+    with contextlib.ExitStack() as stack:
+        parts = {name: stack.enter_context(temporary(store.folder)) for name in TABLES}
+        writers = {
+            name: stack.enter_context(
+                pq.ParquetWriter(parts[name], schema, **parquet_options(name))
+            )
+            for name, schema in schemas(plan).items()
+        }
+        for name, table in row_groups(plan, _checked(manifest, packs)):
+            writers[name].write_table(table)
+        for writer in writers.values():
+            writer.close()
+        digests = {f"{name}.parquet": digest_of(part) for name, part in parts.items()}
+        whole = manifest.model_copy(update={"records": packs.digest, "tables": digests})
+        files = {f"{name}.parquet": part for name, part in parts.items()}
+        publish(
+            store.folder,
+            {**files, "manifest.json": whole.text().encode()},
+            owner=OWNER,
+            alone=False,
+            derived=DERIVED,
+        )
+
+
+def statuses(folder: Path) -> Counter[str]:
+    """How many runs of a finished folder ended in which way."""
+    table = pq.read_table(folder / "runs.parquet", columns=["status"])
+    counts = table["status"].value_counts().to_pylist()
+    return Counter({row["values"]: row["counts"] for row in counts})
+
+
+def _checked(manifest: Manifest, packs: Packs) -> Iterator[Planned]:
+    for cell in manifest.specification.cells:
+        for run_id in manifest.run_ids(cell):
+            record = packs[run_id]
+            record.check()
+            yield cell, record

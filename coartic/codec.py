@@ -1,50 +1,120 @@
-"""Records on disk: two lines, the SHA-256 of the second, and JSON.
+"""Records as bytes: a *pack* of lines, each with its own SHA-256.
 
-Whoever changes the second line alone is noticed; whoever makes the first line anew still has
-to state a solution that gives the score.
+A line is a name, a checksum and JSON, with a space between. ``common`` names what all the lines
+after it have in common, up to the next such line; every other line is a run, named by its id,
+and its checksum is of both JSONs. A line that was changed, or stands under another common one,
+is noticed, and the others are as good as before. Whoever makes the checksums anew still has to
+state a solution that gives the score.
 """
 
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
 
 from pydantic import ValidationError
 
-from coartic.inputs import problems_inline, read_bytes
-from coartic.record import Record, RecordError
+from coartic.inputs import problems_inline
+from coartic.record import Asked, Common, Own, Record, RecordError
+from coartic.stored import Seed
 
-LARGEST_RECORD = 1 << 28
-"""Bytes of a record: rewards of ten million trials, twice over."""
-_PREFIX = "sha256:"
-
-
-def encode(record: Record) -> bytes:
-    """A record as it is kept on disk."""
-    body = record.model_dump_json().encode()
-    return f"{_PREFIX}{hashlib.sha256(body).hexdigest()}\n".encode() + body + b"\n"
+FULL = 1 << 26
+"""Bytes of a pack from which on another one is begun."""
+_COMMON = b"common"
+_LINE = re.compile(rb"(common|[0-9a-f]{16}-[0-9a-f]+) ([0-9a-f]{64}) (.+)", re.DOTALL)
 
 
-def decode(data: bytes, source: Path) -> Record:
-    """A record from its bytes. Raises RecordError where they are not what was written."""
-    head, _, body = data.partition(b"\n")
-    body = body.removesuffix(b"\n")
-    if not head.startswith(_PREFIX.encode()):
-        raise RecordError(f"{source}: is not a run record")
-    if head.decode(errors="replace") != f"{_PREFIX}{hashlib.sha256(body).hexdigest()}":
-        raise RecordError(f"{source}: is damaged: its checksum does not fit")
+class _CommonLine(Common):
+    asked: Asked
+
+
+class _RunLine(Own):
+    seed: Seed
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The record of a run as it was found, not yet read."""
+
+    run_id: str
+    common: bytes
+    """The JSON before it, whatever it is; empty where there is none."""
+    checksum: bytes
+    own: bytes
+
+
+def encode(records: Iterable[Record]) -> Iterator[bytes]:
+    """Packs of records, each of at most :data:`FULL` bytes or of one run."""
+    pack: list[bytes] = []
+    size, before = 0, b""
+    for record in records:
+        common, own = _parts(record)
+        line = _line(record.run_id.encode(), own, common, own)
+        if pack and size + len(line) + len(common) > FULL:
+            yield b"".join(pack)
+            pack, size, before = [], 0, b""
+        if common != before:
+            line = _line(_COMMON, common, common) + line
+        pack.append(line)
+        size, before = size + len(line), common
+    if pack:
+        yield b"".join(pack)
+
+
+def lines(data: bytes) -> tuple[list[Line], bool]:
+    """The runs of a pack, and whether there is nothing else in it."""
+    found, common, clean = [], b"", data.endswith(b"\n")
+    for line in data.split(b"\n")[:-1] if clean else data.split(b"\n"):
+        parts = _LINE.fullmatch(line)
+        if parts is None:
+            clean = False
+        elif parts[1] == _COMMON:
+            common = parts[3]
+            clean = clean and parts[2] == _checksum(common)
+        else:
+            found.append(Line(parts[1].decode(), common, parts[2], parts[3]))
+    return found, clean
+
+
+def decode(line: Line) -> Record:
+    """The record of a line. Raises RecordError where it is not what was written."""
+    if line.checksum != _checksum(line.common, line.own):
+        raise RecordError(f"run {line.run_id} is damaged: its checksum does not fit")
     try:
-        return Record.model_validate_json(body)
+        common = _common(line.common)
+        own = _RunLine.model_validate_json(line.own)
     except ValidationError as error:
-        raise RecordError(f"{source}: is damaged: {problems_inline(error)}") from None
+        raise RecordError(f"run {line.run_id} is damaged: {problems_inline(error)}") from None
+    if own.run_id != line.run_id:
+        raise RecordError(f"run {line.run_id} is damaged: it holds the record of {own.run_id}")
+    fields = {**common.__dict__, **own.__dict__}
+    fields["specification"] = fields.pop("asked").with_seed(fields.pop("seed"))
+    return Record.model_construct(**fields)
 
 
-def read_record(path: Path) -> Record:
-    """The record of a file, which is named by the run's id. Raises RecordError otherwise."""
-    if not path.exists():
-        raise RecordError(f"no record of run {path.stem} in {path.parent.parent}")
-    data = read_bytes(path, LARGEST_RECORD, error=RecordError)
-    record = decode(data, path)
-    if record.run_id != path.stem:
-        raise RecordError(f"{path}: holds the record of run {record.run_id}")
-    return record
+@lru_cache(maxsize=64)
+def _common(text: bytes) -> _CommonLine:
+    """Read once for all the runs that share it."""
+    return _CommonLine.model_validate_json(text)
+
+
+def _parts(record: Record) -> tuple[bytes, bytes]:
+    """What a record has in common with others, and its own, as JSON."""
+    asked, shared, own = (
+        {name: getattr(of, name) for name in kind.model_fields}
+        for of, kind in ((record.specification, Asked), (record, Common), (record, Own))
+    )
+    common = _CommonLine.model_construct(asked=Asked.model_construct(**asked), **shared)
+    line = _RunLine.model_construct(seed=record.specification.seed, **own)
+    return common.model_dump_json().encode(), line.model_dump_json().encode()
+
+
+def _line(name: bytes, content: bytes, *checked: bytes) -> bytes:
+    return b"%s %s %s\n" % (name, _checksum(*checked), content)
+
+
+def _checksum(*parts: bytes) -> bytes:
+    return hashlib.sha256(b"\n".join(parts)).hexdigest().encode()

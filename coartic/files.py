@@ -17,6 +17,7 @@ import stat
 import uuid
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from io import BufferedRandom
 from pathlib import Path
 from typing import IO, TypeGuard
 
@@ -48,20 +49,33 @@ def write_atomically(path: Path, data: bytes) -> None:
 
     A power cut may undo the rename; then the old file, or none, is there. Raises OSError.
     """
-    part = path.parent / f".coartic-{uuid.uuid4().hex}.part"
+    with temporary(path.parent) as part:
+        part.write(data)
+        _put(part, path)
+
+
+@contextlib.contextmanager
+def temporary(folder: Path) -> Iterator[BufferedRandom]:
+    """A file to be written and then published (:func:`publish`); what is not is removed.
+
+    Raises OSError.
+    """
+    path = folder / f".coartic-{uuid.uuid4().hex}.part"
     try:
-        with part.open("xb") as file:
+        with path.open("x+b") as file:
             _hold(file)  # for clear_leftovers: its writer lives
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-            if fcntl is not None:
-                part.replace(path)
-        if fcntl is None:
-            part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+            yield file
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def _put(part: BufferedRandom, path: Path) -> None:
+    """Give a temporary file its name, once it is on the disk."""
+    part.flush()
+    os.fsync(part.fileno())
+    if fcntl is None:
+        part.close()
+    os.replace(part.name, path)
 
 
 def _hold(file: IO[bytes]) -> None:
@@ -70,14 +84,14 @@ def _hold(file: IO[bytes]) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def clear_leftovers(folder: Path) -> None:
+def clear_leftovers(folder: Path, kept: Collection[Path] = ()) -> None:
     """Remove the temporary files in ``folder``, not below, whose writers were killed.
 
-    Those of writers at work stay. Raises OSError.
+    Those of writers at work stay, and ``kept``. Raises OSError.
     """
     with os.scandir(folder) as entries:
-        parts = [Path(entry.path) for entry in entries if _is_leftover(entry)]
-    for part in parts:
+        parts = {Path(entry.path) for entry in entries if _is_leftover(entry)}
+    for part in parts.difference(kept):
         with contextlib.suppress(FileNotFoundError, BlockingIOError, PermissionError):
             with part.open("r+b") as file:
                 _hold(file)
@@ -89,7 +103,7 @@ def clear_leftovers(folder: Path) -> None:
 
 def publish(
     folder: Path,
-    files: Mapping[str, bytes],
+    files: Mapping[str, bytes | BufferedRandom],
     *,
     owner: str,
     alone: bool,
@@ -97,7 +111,8 @@ def publish(
 ) -> None:
     """Write a command's files into ``folder`` and list them there (:data:`LISTING`).
 
-    ``files`` are contents by path below the folder, with slashes; ``owner`` is the command. A
+    ``files`` are contents, or files that are :func:`temporary` in the folder and move, by path
+    below the folder, with slashes; ``owner`` is the command. A
     file that is there is replaced if the listing has it as this command's, unchanged since.
     ``alone``: the folder is this command's alone. What it wrote earlier and writes no longer
     is removed. Without, other files are left alone. Killed at any moment, the next call
@@ -112,7 +127,8 @@ def publish(
     unfit = [name for name in files if not _is_fit(name)]
     if unfit:
         raise ValueError(f"no names for files: {', '.join(map(repr, unfit))}")
-    digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
+    digests = {name: digest_of(content) for name, content in files.items()}
+    own = {Path(part.name) for part in files.values() if not isinstance(part, bytes)}
     with _errors(folder):
         _check_place(folder, alone)
         folder.mkdir(parents=True, exist_ok=True)
@@ -120,7 +136,7 @@ def publish(
             listing = _read_listing(folder)
             found = _survey(folder, digests, listing.get(owner, {}), owner, alone, derived)
             for place in ("", *found.folders):
-                clear_leftovers(folder / place)
+                clear_leftovers(folder / place, own)
             kept = {} if alone else listing.get(owner, {})
             final = {**listing, owner: kept | {name: [known] for name, known in digests.items()}}
             fresh = [name for name in files if found.digests.get(name) != digests[name]]
@@ -132,7 +148,11 @@ def publish(
                 _write_listing(folder, listing | {owner: kept | both})
             for name in fresh:
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                write_atomically(folder / name, files[name])
+                content = files[name]
+                if isinstance(content, bytes):
+                    write_atomically(folder / name, content)
+                else:
+                    _put(content, folder / name)
             for name in gone:
                 (folder / name).unlink()
             for place in reversed(found.folders):
@@ -140,6 +160,31 @@ def publish(
                     (folder / place).rmdir()
             if final != listing:
                 _write_listing(folder, final)
+
+
+def digest_of(content: bytes | IO[bytes]) -> str:
+    """SHA-256 of bytes, or of a file from its beginning."""
+    if isinstance(content, bytes):
+        return hashlib.sha256(content).hexdigest()
+    content.seek(0)
+    return hashlib.file_digest(content, "sha256").hexdigest()  # type: ignore[arg-type]
+
+
+def holds(folder: Path, names: Iterable[str], *, owner: str) -> bool:
+    """Whether files of these names are all there as the command ``owner`` wrote them last.
+
+    Raises CoarticError where the list of them is damaged.
+    """
+    with _errors(folder):
+        listed = _read_listing(folder).get(owner, {})
+        for name in names:
+            path = folder / name
+            if path.is_symlink() or not path.is_file():
+                return False
+            with path.open("rb") as file:
+                if listed.get(name) != [digest_of(file)]:
+                    return False
+    return True
 
 
 def check_folder(
@@ -252,7 +297,7 @@ def _survey(
                 continue
             if name in ours and entry.is_file(follow_symlinks=False):
                 with open(entry.path, "rb") as file:
-                    digest = hashlib.file_digest(file, "sha256").hexdigest()
+                    digest = digest_of(file)
                 known = listed.get(name, [])
                 ours_still = digest in known or (known and name in derived)
                 if ours_still or digest == digests.get(name):

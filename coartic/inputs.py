@@ -9,6 +9,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Callable, Iterable
+from io import BufferedReader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,18 +57,29 @@ def read_text(
 def read_bytes(path: str | Path, most: int, *, error: type[CoarticError] = CoarticError) -> bytes:
     """The content of a regular file of at most ``most`` bytes; raises ``error`` otherwise."""
     shown = plain(str(path))
-    try:
-        with open(path, "rb", opener=_open_at_once) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise error(f"{shown}: is not a regular file")
+    with open_regular(path, error=error) as file:
+        try:
             content = file.read(most + 1)
+        except OSError as failure:
+            raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
+    if len(content) > most:
+        raise error(f"{shown}: is longer than {most:_} bytes, the most that is read")
+    return content
+
+
+def open_regular(path: str | Path, *, error: type[CoarticError] = CoarticError) -> BufferedReader:
+    """A regular file, open to be read, and to be closed; raises ``error`` for anything else."""
+    shown = plain(str(path))
+    try:
+        file = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
     except OSError as failure:
         raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
     except ValueError:  # what no file can be named
         raise error(f"{shown}: is not the name of a file") from None
-    if len(content) > most:
-        raise error(f"{shown}: is longer than {most:_} bytes, the most that is read")
-    return content
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise error(f"{shown}: is not a regular file")
+    return file
 
 
 def _open_at_once(path: str, flags: int) -> int:

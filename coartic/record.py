@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic.errors import CoarticError
@@ -33,6 +34,7 @@ from coartic.stored import (
     Spent,
     TaskContent,
     Values,
+    canonical,
     content_hash,
 )
 from coartic.task import INITIAL_POLICIES, Task, parse_task
@@ -43,6 +45,7 @@ BUILT_IN = "built in"
 """Origin of this project's methods."""
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
+_KEY = 16  # digits
 _OUTCOME = ("status", "solution", "initial", "replay", "bound", "rewards")
 
 Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
@@ -52,20 +55,42 @@ class RecordError(CoarticError):
     """A record that is missing or cannot be trusted."""
 
 
-class Specification(Plain):
-    """Everything the result of a run depends on, but for the code."""
+class Asked(Plain):
+    """Everything the results of a cell's runs depend on, but for their seeds and the code."""
 
     format: Literal[2]
     task: TaskContent
     method: Line
     parameters: Values
     model: dict[str, float | int]
-    seed: Seed
     trial_budget: Annotated[int, Field(gt=0)] | None
+
+    def with_seed(self, seed: int) -> Specification:
+        """The specification of one run, of a seed that is one."""
+        return Specification.model_construct(**self.__dict__, seed=seed)
+
+    def keys(self, seeds: Iterable[int]) -> Iterator[str]:
+        """:meth:`Specification.key` with each seed, at a fiftieth of its cost."""
+        content = self.model_dump(mode="json")
+        before, after = (
+            canonical({name: content[name] for name in content if (name < "seed") == first})
+            for first in (True, False)
+        )
+        start, end = hashlib.sha256(before[:-1] + b',"seed":'), b"," + after[1:]
+        for seed in seeds:
+            whole = start.copy()
+            whole.update(b"%d" % seed + end)
+            yield whole.hexdigest()[:_KEY]
+
+
+class Specification(Asked):
+    """Everything the result of a run depends on, but for the code."""
+
+    seed: Seed
 
     def key(self) -> str:
         """Hash of the specification, the first part of a run's id."""
-        return content_hash(self.model_dump(mode="json"))[:16]
+        return content_hash(self.model_dump(mode="json"))[:_KEY]
 
 
 class Commit(Plain):
@@ -104,14 +129,23 @@ class Timing(Plain):
     time_limit_s: Annotated[float, Field(gt=0)] | None = None
 
 
-class Record(Plain):
-    """One run."""
+class Common(Plain):
+    """What runs of one cell, performed by one process, have in common beside what they ask."""
+
+    code: Annotated[str, Field(pattern="^[0-9a-f]+$")]
+    told: tuple[Information, ...]
+    secondary: tuple[Line, ...]
+    origin: Line
+    """``built in``, a plug-in's distribution, or the path of a method file."""
+    environment: Environment
+
+
+class Own(Plain):
+    """What is a run's own."""
 
     run_id: Annotated[str, Field(pattern="^[0-9a-f]{16}-[0-9a-f]+$")]
     run: Count
     """Number of the run within its cell, from 0."""
-    specification: Specification
-    code: Annotated[str, Field(pattern="^[0-9a-f]+$")]
     status: Status
     reason: Reason
     """Empty where the status is ok."""
@@ -122,8 +156,6 @@ class Record(Plain):
     """One noiseless greedy trial of a learner with what it has learned."""
     bound: Reward | None
     """Reward that no solution exceeds, where the method proved one."""
-    told: tuple[Information, ...]
-    secondary: tuple[Line, ...]
     used: tuple[Information, ...]
     meter: Spent | None
     """None where it went with the process."""
@@ -131,9 +163,12 @@ class Record(Plain):
     rewards: tuple[Reward | None, ...]
     """Of each trial; None where it failed."""
     timing: Timing
-    origin: Line
-    """``built in``, a plug-in's distribution, or the path of a method file."""
-    environment: Environment
+
+
+class Record(Common, Own):
+    """One run."""
+
+    specification: Specification
 
     @property
     def method(self) -> str:
@@ -280,11 +315,39 @@ def _executed(task: str, movements: tuple[PlainMovement, ...], model: MotionMode
     return solved(_parsed(task), [row.movement() for row in movements], model)
 
 
-def run_seed(root: int, task: str, run: int) -> int:
-    """Seed of one run, from the suite's seed, the task's name and the run's number alone.
+def run_seeds(root: int, task: str, count: int) -> list[int]:
+    """Seeds of the runs of a task, from the suite's seed, the task's name and their numbers alone.
 
-    Every method gets the same seed for the same task and run, so runs are paired.
+    Every method gets the same seed for the same task and run, so runs are paired. Run ``k`` has
+    the first 63 bits of NumPy's ``SeedSequence(root, spawn_key=(*words, k))``, ``words`` being
+    four of the SHA-256 of the name; all are made at once, as that class takes in the last word.
     """
     words = np.frombuffer(hashlib.sha256(task.encode()).digest()[:16], dtype="<u4")
-    sequence = np.random.SeedSequence(root, spawn_key=(*map(int, words), run))
-    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+    pool = np.random.SeedSequence(root, spawn_key=tuple(map(int, words))).pool
+    taken = 4 * (1 + 3 + len(words))  # steps so far: the root, its parts together, the name
+    factor = _ENTER * pow(_ENTER_BY, taken, 1 << 32) & _WORD
+    number, mixed = np.arange(count, dtype=np.uint32), []
+    for part in pool.tolist():
+        hashed, factor = _hashed(number, factor, _ENTER_BY)
+        both = np.uint32(_MIX_LEFT * part & _WORD) - np.uint32(_MIX_RIGHT) * hashed
+        mixed.append(both ^ both >> _HALF)
+    (low, factor), high = _hashed(mixed[0], _LEAVE, _LEAVE_BY), mixed[1]
+    high, _ = _hashed(high, factor, _LEAVE_BY)
+    whole = high.astype(np.uint64) << np.uint64(32) | low
+    found: list[int] = (whole >> np.uint64(1)).tolist()
+    return found
+
+
+# Of NumPy's SeedSequence, which promises to stay as it is.
+_ENTER, _ENTER_BY = 0x43B0D7E5, 0x931E8875
+_LEAVE, _LEAVE_BY = 0x8B51F9DD, 0x58F38DED
+_MIX_LEFT, _MIX_RIGHT = 0xCA01F9DD, 0x4973F715
+_WORD, _HALF = (1 << 32) - 1, np.uint32(16)
+_Words = NDArray[np.uint32]
+
+
+def _hashed(words: _Words, factor: int, by: int) -> tuple[_Words, int]:
+    """A step of SeedSequence's hash: the words (n,), and the factor of the next step."""
+    following = factor * by & _WORD
+    found = (words ^ np.uint32(factor)) * np.uint32(following)
+    return found ^ found >> _HALF, following

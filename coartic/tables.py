@@ -3,16 +3,17 @@
 ``runs.parquet`` has one row a run, ``solutions.parquet`` one row a movement of each run's
 solution, ``paths.parquet`` one row a waypoint of movements that follow a path,
 ``learning.parquet`` one row a trial, ``sequences.parquet`` one row per task and hand
-sequence of the corrective process alone. :func:`tables_of` makes them; those who read a
-folder make them again and compare, so a table never says anything that its records do not.
+sequence of the corrective process alone. :func:`row_groups` makes them piece by piece, so that
+a million runs need no more memory than a thousand; those who read a folder make them again and
+compare, so a table never says anything that its records do not.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -22,13 +23,14 @@ from pydantic import Field
 from coartic.errors import NotApplicableError
 from coartic.initial import hand_sequences, ranked_sequences
 from coartic.method import Information, Meter
-from coartic.record import Environment, Record
+from coartic.model import PAPER
+from coartic.record import RECORD_FORMAT, Asked, Environment, Record, run_seeds
 from coartic.scores import PlainMovement
 from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
 from coartic.task import parse_task
 from coartic.text import Line
 
-FORMAT: Literal[5] = 5  # of manifest and tables; raised when one of them changes its meaning
+FORMAT: Literal[6] = 6  # of manifest and tables; raised when one of them changes its meaning
 
 RUNS = pa.schema(
     [
@@ -100,6 +102,16 @@ SEQUENCES = pa.schema(
 )
 
 
+LEARNING = pa.schema(
+    [
+        ("run_id", pa.dictionary(pa.int32(), pa.string())),
+        ("trial", pa.int32()),
+        ("reward", pa.int32()),
+    ]
+)
+GROUP_RUNS, GROUP_TRIALS = 5_000, 1_000_000
+"""Most runs, and trials of more than one run, in a row group of the tables."""
+
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
 """Names of the tables."""
 
@@ -129,7 +141,6 @@ class PlannedCell(Plain):
     """What the suite says of its parameters."""
     complete: Values
     """All of them, as its runs have them."""
-    run_ids: tuple[Line, ...]
 
     @property
     def label(self) -> str:
@@ -148,11 +159,6 @@ class Plan(Plain):
     methods: dict[Line, DeclaredMethod]
     cells: tuple[PlannedCell, ...]
 
-    @property
-    def run_ids(self) -> list[str]:
-        """Ids of all runs, in the order of the plan, which has each once."""
-        return [run_id for cell in self.cells for run_id in cell.run_ids]
-
 
 class PlanLimits(Plain):
     """Bounds that runs were performed under."""
@@ -164,12 +170,29 @@ class PlanLimits(Plain):
 class Manifest(Plain):
     """``manifest.json``: what was asked for and with what it was made."""
 
-    format: Literal[5] = FORMAT
+    format: Literal[6] = FORMAT
     specification: Plan
     limits: PlanLimits
     environment: Environment
+    records: Annotated[str, Field(pattern="^([0-9a-f]{64})?$")]
+    """:attr:`coartic.packs.Packs.digest` of what the tables were made of."""
     tables: dict[Line, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
     """SHA-256 of each table's file, by its name."""
+
+    def run_ids(self, cell: PlannedCell) -> list[str]:
+        """Ids of a cell's runs, in their order."""
+        plan = self.specification
+        method = plan.methods[cell.method]
+        asked = Asked(
+            format=RECORD_FORMAT,
+            task=plan.tasks[cell.task],
+            method=cell.method,
+            parameters=cell.complete,
+            model=PAPER._asdict(),
+            trial_budget=self.limits.trials,
+        )
+        seeds = run_seeds(plan.seed, cell.task, plan.runs if method.stochastic else 1)
+        return [f"{key}-{method.code}" for key in asked.keys(seeds)]
 
     def seal(self) -> str:
         """Hash of the whole content, kept beside it: a changed manifest is noticed."""
@@ -201,21 +224,57 @@ def label_of(method: str, variant: str) -> str:
     return f"{method} {variant}".strip()
 
 
-def tables_of(manifest: Manifest, records: Mapping[str, Record]) -> dict[str, pa.Table]:
-    """All tables by name (``runs``, ...); ``records`` by run id has the plan's at least."""
-    plan = manifest.specification
-    rows = [(cell, records[run_id]) for cell in plan.cells for run_id in cell.run_ids]
-    distinct = [records[run_id] for run_id in plan.run_ids]
-    sequences = [row for task in plan.tasks.values() for row in _sequence_rows(json.dumps(task))]
+Planned = tuple[PlannedCell, Record]
+"""A run of a plan."""
+
+
+def schemas(plan: Plan) -> dict[str, pa.Schema]:
+    """Columns of the tables by name, in the order of :data:`TABLES`."""
+    robots = [parse_task(task, "manifest").robot for task in plan.tasks.values()]
+    names = dict.fromkeys(name for robot in robots for name in robot.joint_names)
+    joints = pa.schema([(name, pa.float64()) for name in _ordered(names)])
     return {
-        "runs": pa.Table.from_pylist(
-            [_run_row(plan.suite, cell, record) for cell, record in rows], schema=RUNS
-        ),
-        "solutions": _joint_table(_solution_rows(distinct), SOLUTIONS),
-        "paths": _joint_table(_path_rows(distinct), PATHS),
-        "learning": _learning_table(distinct),
-        "sequences": pa.Table.from_pylist(sequences, schema=SEQUENCES),
+        "runs": RUNS,
+        "solutions": pa.unify_schemas([SOLUTIONS, joints]),
+        "paths": pa.unify_schemas([PATHS, joints]),
+        "learning": LEARNING,
+        "sequences": SEQUENCES,
     }
+
+
+def row_groups(plan: Plan, runs: Iterable[Planned]) -> Iterator[tuple[str, pa.Table]]:
+    """The tables' row groups, none of them empty, by name, each table's in order.
+
+    ``runs`` are those of the plan in its order, and are held :data:`GROUP_RUNS` and
+    :data:`GROUP_TRIALS` at a time.
+    """
+    columns = schemas(plan)
+    makers: dict[str, Callable[[Sequence[Planned]], pa.Table]] = {
+        "runs": partial(_runs_table, plan.suite),
+        "solutions": partial(_table, _solution_rows, columns["solutions"]),
+        "paths": partial(_table, _path_rows, columns["paths"]),
+        "learning": _learning_table,
+    }
+    for group in _groups(runs):
+        for name, make in makers.items():
+            if len(table := make(group)):
+                yield name, table
+    sequences = [row for task in plan.tasks.values() for row in _sequence_rows(json.dumps(task))]
+    if sequences:
+        yield "sequences", pa.Table.from_pylist(sequences, schema=SEQUENCES)
+
+
+def _groups(runs: Iterable[Planned]) -> Iterator[list[Planned]]:
+    group: list[Planned] = []
+    trials = 0
+    for cell, record in runs:
+        trials += len(record.rewards)
+        if group and (len(group) == GROUP_RUNS or trials > GROUP_TRIALS):
+            yield group
+            group, trials = [], len(record.rewards)
+        group.append((cell, record))
+    if group:
+        yield group
 
 
 def parquet_options(name: str) -> dict[str, Any]:
@@ -274,9 +333,22 @@ def _best_trial(record: Record) -> int | None:
     return record.rewards.index(record.solution.reward)
 
 
-def _solution_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
-    return [
-        {
+def _runs_table(suite: str, runs: Sequence[Planned]) -> pa.Table:
+    return pa.Table.from_pylist([_run_row(suite, *run) for run in runs], schema=RUNS)
+
+
+def _table(
+    rows: Callable[[Record], Iterable[dict[str, Any]]],
+    schema: pa.Schema,
+    runs: Sequence[Planned],
+) -> pa.Table:
+    return pa.Table.from_pylist([row for _, record in runs for row in rows(record)], schema=schema)
+
+
+def _solution_rows(record: Record) -> Iterator[dict[str, Any]]:
+    joints = record.task.robot.joint_names
+    for order, row in enumerate(_movements(record)):
+        yield {
             "run_id": record.run_id,
             "order": order,
             "goal": row.goal,
@@ -285,37 +357,18 @@ def _solution_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
             "ticks": row.ticks,
             **dict(zip(joints, row.target or (), strict=True)),
         }
-        for record in records
-        for joints in [record.task.robot.joint_names]
-        for order, row in enumerate(_movements(record))
-    ]
 
 
-def _path_rows(records: Iterable[Record]) -> list[dict[str, Any]]:
-    return [
-        {
-            "run_id": record.run_id,
-            "order": order,
-            "waypoint": index,
-            **dict(zip(joints, point, strict=True)),
-        }
-        for record in records
-        for joints in [record.task.robot.joint_names]
-        for order, row in enumerate(_movements(record))
-        for index, point in enumerate(row.waypoints or ())
-    ]
+def _path_rows(record: Record) -> Iterator[dict[str, Any]]:
+    joints = record.task.robot.joint_names
+    for order, row in enumerate(_movements(record)):
+        for index, point in enumerate(row.waypoints or ()):
+            place = {"run_id": record.run_id, "order": order, "waypoint": index}
+            yield place | dict(zip(joints, point, strict=True))
 
 
 def _movements(record: Record) -> tuple[PlainMovement, ...]:
     return () if record.solution is None else record.solution.movements
-
-
-def _joint_table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
-    """A table with one further column per joint that its rows have."""
-    joints = dict.fromkeys(key for row in rows for key in row if key not in schema.names)
-    for name in _ordered(joints):
-        schema = schema.append(pa.field(name, pa.float64()))
-    return pa.Table.from_pylist(rows, schema=schema)
 
 
 def _ordered(joints: Iterable[str]) -> list[str]:
@@ -328,21 +381,16 @@ def _ordered(joints: Iterable[str]) -> list[str]:
     return sorted(joints, key=key)
 
 
-def _learning_table(records: Sequence[Record]) -> pa.Table:
-    rewards = [pa.array(record.rewards, pa.int32()) for record in records]
-    lengths = [len(array) for array in rewards]
+def _learning_table(runs: Sequence[Planned]) -> pa.Table:
+    learning = [record for _, record in runs if record.rewards]
+    lengths = [len(record.rewards) for record in learning]
     ids = pa.DictionaryArray.from_arrays(
-        pa.array(np.repeat(np.arange(len(records), dtype=np.int32), lengths)),
-        pa.array([record.run_id for record in records], pa.string()),
+        pa.array(np.repeat(np.arange(len(learning), dtype=np.int32), lengths)),
+        pa.array([record.run_id for record in learning], pa.string()),
     )
-    trials = np.concatenate([np.zeros(0, np.int64), *(np.arange(n) for n in lengths)])
-    return pa.table(
-        {
-            "run_id": ids,
-            "trial": pa.array(trials, pa.int32()),
-            "reward": pa.chunked_array(rewards, pa.int32()),
-        }
-    )
+    trials = np.concatenate([np.zeros(0, np.int32), *(np.arange(n) for n in lengths)])
+    rewards = pa.chunked_array([pa.array(r.rewards, pa.int32()) for r in learning], pa.int32())
+    return pa.table([ids, pa.array(trials, pa.int32()), rewards], schema=LEARNING)
 
 
 @lru_cache(maxsize=64)

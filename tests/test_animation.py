@@ -24,9 +24,10 @@ from coartic import (
     load_task,
     trajectory,
 )
-from coartic.codec import decode, encode
+from coartic.codec import decode, encode, lines
 from coartic.scores import solved
 from tests.support.commands import call
+from tests.support.packs import pack_of
 from tests.support.suites import BROKEN, run_and_write
 
 TASK = load_task("two-armed-1")
@@ -171,7 +172,9 @@ def test_a_path_is_followed_from_its_waypoints(folder):
     place, ids = folder
     record = Store(place).read(ids["nullspace-qp/none"])
     record = record.model_copy(update={"solution": solved(task, movements, PAPER)})
-    found = trajectory_of(decode(encode(record), place))
+    found = trajectory_of(
+        next(decode(line) for pack in encode([record]) for line in lines(pack)[0])
+    )
     assert found.ticks == -record.solution.reward == -execute(task, movements).reward
     assert np.abs(found.configurations - detour).max(axis=1).min() < 0.01
 
@@ -199,7 +202,8 @@ def test_command(folder, tmp_path, monkeypatch, capsys):
     assert text.startswith("two-armed-1: initial solution beside two-armed-1: dual-process/EC3")
     broken = tmp_path / "damaged" / "records"
     broken.mkdir(parents=True)
-    (broken / f"{one}.json").write_bytes((place / "records" / f"{one}.json").read_bytes()[:-9])
+    pack = pack_of(place, one)
+    (broken / pack.name).write_bytes(pack.read_bytes()[:-9])
     with rc_context({"animation.ffmpeg_path": str(tmp_path / "no-ffmpeg")}):
         for arguments, words in (
             (("abcdef", "--in", place, "--out", out), "no run 'abcdef' below"),

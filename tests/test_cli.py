@@ -17,9 +17,10 @@ from benchmarks.conformance import Law
 from benchmarks.store import Store
 from coartic import __version__
 from coartic.files import LISTING
-from coartic.record import run_seed
+from coartic.record import run_seeds
 from tests.support import commands
 from tests.support.commands import call
+from tests.support.packs import packs_of, records_of
 from tests.support.suites import BROKEN, ROOT, InProcess
 
 from .attacks.inputs import GOOD
@@ -62,14 +63,14 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
     assert "already there: 14 of 14 runs" in error
     assert tables == {path: path.read_bytes() for path in out.glob("*.parquet")}
     # A larger one does what is missing; a damaged record is reported and done again.
-    record = next(iter(out.glob("records/*.json")))
-    record.write_bytes(record.read_bytes()[:-20])
+    (pack, *_) = packs_of(out)
+    pack.write_bytes(pack.read_bytes()[:-20])
     code, text, error = call(
         monkeypatch, capsys, "run", "paper", "--out", out, "--runs", 3, "--trials", 60
     )
     assert code == 0
     assert "21 runs: 13 were there, 8 done in" in text
-    assert f"{record}: is damaged" in error
+    assert f"{pack}: a line of it is damaged" in error
     assert len(pd.read_parquet(out / "runs.parquet")) == 21
 
 
@@ -110,8 +111,8 @@ def test_seed_and_jobs_reach_the_runs(monkeypatch, capsys, tmp_path):
         )
     first, second = (pd.read_parquet(tmp_path / f"{seed}" / "runs.parquet") for seed in (0, 5))
     assert asked == [3, 3]
-    assert list(first.seed) == [run_seed(0, "ascending", run) for run in (0, 1)]
-    assert list(second.seed) == [run_seed(5, "ascending", run) for run in (0, 1)]
+    assert list(first.seed) == run_seeds(0, "ascending", 2)
+    assert list(second.seed) == run_seeds(5, "ascending", 2)
 
 
 def test_the_commit_is_recorded(monkeypatch, capsys, tmp_path, in_this_process):
@@ -189,7 +190,7 @@ def test_an_interrupt_that_gets_lost_is_raised_again(monkeypatch, capsys, tmp_pa
     assert dropped == [KeyboardInterrupt]
     assert code == 130
     assert f"interrupted; 1 run done now is kept in {tmp_path}" in error
-    assert len(list(tmp_path.glob("records/*.json"))) == 1
+    assert len(records_of(tmp_path)) == 1
     assert signal.getsignal(signal.SIGINT) is before
 
 
@@ -271,7 +272,7 @@ def test_show_and_reproduce(monkeypatch, capsys, tmp_path, in_this_process):
     rewards = list(record.rewards)
     rewards[worst] -= 1
     spent = replace(record.meter, movement_ticks=record.meter.movement_ticks + 1)
-    store.write(record.model_copy(update={"rewards": tuple(rewards), "meter": spent}))
+    store.write([record.model_copy(update={"rewards": tuple(rewards), "meter": spent})])
     code, text, _ = call(monkeypatch, capsys, "reproduce", second, "--in", tmp_path)
     assert code == 1
     assert "different." in text
@@ -279,7 +280,7 @@ def test_show_and_reproduce(monkeypatch, capsys, tmp_path, in_this_process):
     assert f"- rewards by trial differ, first at trial {worst}" in text
     # One that contradicts itself, with a checksum that fits.
     solution = record.solution.model_copy(update={"reward": record.solution.reward + 1})
-    store.write(record.model_copy(update={"solution": solution}))
+    store.write([record.model_copy(update={"solution": solution})])
     for command in ("show", "reproduce"):
         code, _, error = call(monkeypatch, capsys, command, second, "--in", tmp_path)
         assert code == 2

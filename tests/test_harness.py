@@ -1,5 +1,6 @@
 """Suites, the harness, and the tables it leaves behind."""
 
+import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -33,7 +34,7 @@ from coartic import CoarticError, Movement, execute, files, hand_sequences, lear
 from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
 from coartic.method import Information, Parameters, Session
-from coartic.record import run_seed
+from coartic.record import run_seeds
 from coartic.rows import movements_from
 from coartic.tables import FORMAT, RUNS
 from tests.support.strategies import tiny_task
@@ -154,8 +155,12 @@ def test_seeds_are_paired_by_task_and_run(results):
     seeds = results.runs.groupby(["task", "run"]).seed.nunique()
     assert (seeds == 1).all()
     assert results.runs.seed.nunique() == 8  # 4 tasks x 2 runs
-    assert run_seed(0, "ascending", 0) != run_seed(1, "ascending", 0)
-    assert 0 <= run_seed(0, "x", 10**6) < 2**63
+    for root, task in ((0, "ascending"), (1, "ascending"), (2**40 + 5, "x"), (2**63 - 1, "é")):
+        digest = hashlib.sha256(task.encode()).digest()
+        words = [int.from_bytes(digest[4 * k : 4 * k + 4], "little") for k in range(4)]
+        for run, seed in list(enumerate(run_seeds(root, task, 10**5)))[::9973]:
+            sequence = np.random.SeedSequence(root, spawn_key=(*words, run))
+            assert seed == int(sequence.generate_state(1, np.uint64)[0]) >> 1
 
 
 def test_a_run_is_reproduced_from_its_row(results):
@@ -186,8 +191,8 @@ def test_run_ids_name_what_the_run_depends_on():
         first(cells=[Cell(base.task, base.entry, (("noise_sd", 0.1),))]),
         first(cells=[Cell(base.task.model_copy(update={"radius": 0.2}), base.entry)]),
     ]
-    assert len({spec.key for spec in [base, *others]}) == 7
-    assert base.run_id == f"{base.key}-{base.entry.code}"
+    assert len({spec.run_id for spec in [base, *others]}) == 7
+    assert base.run_id == f"{base.specification.key()}-{base.entry.code}"
 
 
 def test_failures_are_kept_as_data(tmp_path):
@@ -576,7 +581,10 @@ def test_manifest(results):
     assert specification["seed"] == 0
     assert specification["tasks"]["ascending"]["provenance"]["goals"]["status"] == "printed"
     assert "goals" in specification["methods"]["dual-process/EC2"]["told"]
-    assert sum(len(cell["run_ids"]) for cell in specification["cells"]) == 14
+    planned = results.manifest.specification.cells
+    ids = [run_id for cell in planned for run_id in results.manifest.run_ids(cell)]
+    assert ids == list(results.runs.run_id)
+    assert len(set(ids)) == 14
     assert np.isfinite(manifest["format"])
 
 

@@ -19,6 +19,7 @@ from benchmarks.suites import Cell, load_suite, select_cells
 from coartic import CoarticError, builtin_tasks
 from coartic.cli.arguments import labels_in
 from tests.support.commands import call
+from tests.support.packs import records_of
 from tests.support.reports import compiled, report_of
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, Failing, run_and_write, with_environment
@@ -154,7 +155,7 @@ def test_the_commands(monkeypatch, capsys, tmp_path, odd, few_figures):
         assert f"results: {folder}" in out
         assert f"--in '{folder}'" in out
     run = out.split()[-1]
-    assert (folder / "records" / f"{run}.json").is_file()
+    assert run in records_of(folder)
     row = ("methods-a-b", "dual-process/EC4", "reward")
     code, out, _ = call(monkeypatch, capsys, "trace", *row, "--in", folder)
     assert code == 0

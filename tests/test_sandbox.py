@@ -22,6 +22,7 @@ from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
 from benchmarks.specification import Limits
 from benchmarks.store import Store
 from coartic import CoarticError
+from tests.support.packs import packs_of
 from tests.support.suites import InProcess, ask_here, perform_plan, spec_of
 
 ROOT = Path(__file__).parent.parent
@@ -192,7 +193,7 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     deadline = time.monotonic() + 120
     try:
         if moment == "at work":
-            while not list(tmp_path.glob("records/*.json")):
+            while not packs_of(tmp_path):
                 assert suite.poll() is None
                 assert time.monotonic() < deadline
                 time.sleep(0.05)

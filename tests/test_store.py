@@ -1,19 +1,30 @@
 """Records: whole or not at all, checked, and never mixed with those of other code."""
 
+import contextlib
 import dataclasses
-import hashlib
 import json
 import os
 import re
+import uuid
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from benchmarks.harness import record_of
 from benchmarks.specification import Limits
 from benchmarks.store import Damage, RecordError, Store
 from benchmarks.suites import run_specs
-from coartic import CoarticError, files
+from coartic import CoarticError, codec, files
+from tests.support.packs import (
+    pack_lines,
+    packs_of,
+    read_pack,
+    records_of,
+    write_lines,
+    write_pack,
+)
 from tests.support.suites import InProcess, paper_cells, perform_plan
 
 ROOT = Path(__file__).parent.parent
@@ -45,10 +56,12 @@ def test_a_record_comes_back(tmp_path):
     answers = InProcess().perform([spec.job()])
     record = record_of(next(answers), spec)
     with store.locked():
-        store.write(record)
+        store.write([record])
     assert store.read(spec.run_id) == record
-    assert store.ids() == {spec.run_id}
-    assert [path.name for path in store.records.glob("[!.]*")] == [f"{spec.run_id}.json"]
+    assert set(store.packs()) == {spec.run_id}
+    assert [path.name for path in store.records.glob("[!.]*")] == ["00000001.pack"]
+    ((run_id, found),) = read_pack(store.records / "00000001.pack").items()
+    assert (run_id, found) == (spec.run_id, record.model_dump(mode="json"))
 
 
 @pytest.mark.parametrize(
@@ -59,16 +72,17 @@ def test_a_record_comes_back(tmp_path):
         lambda data: b"",
         lambda data: data.replace(b"-3", b"-4"),
         lambda data: b"\x80\x04pickle",
-        lambda data: data.replace(b"sha256:", b"sha257:"),
+        lambda data: data.replace(b"common", b"uncommon"),
+        lambda data: data.replace(b" ", b"  "),
     ],
 )
 def test_damage_is_noticed_reported_and_redone(harm, tmp_path):
     store, planned = Store(tmp_path), specs()
     perform_counting(store, planned)
     whole = store.read(planned[1].run_id)
-    path = store.path(planned[1].run_id)
+    path = store.packs().path(planned[1].run_id)
     path.write_bytes(harm(path.read_bytes()))
-    with pytest.raises(RecordError, match=re.escape(str(path))):
+    with pytest.raises(RecordError, match=planned[1].run_id):
         store.read(planned[1].run_id)
     progress, performed = perform_counting(store, planned)
     assert [damage.path for damage in progress.damaged] == [path]
@@ -80,10 +94,11 @@ def test_damage_is_noticed_reported_and_redone(harm, tmp_path):
 def test_a_record_under_a_wrong_name_is_damage(tmp_path):
     store, planned = Store(tmp_path), specs(runs=2)
     perform_counting(store, planned)
-    first, second = (store.path(spec.run_id) for spec in planned)
-    first.write_bytes(second.read_bytes())
+    first, second = (store.packs().path(spec.run_id) for spec in planned)
+    (shared, (name, _, _)), (_, (_, _, other)) = map(pack_lines, (first, second))
+    write_lines(first, [(shared[0], shared[2]), (name, other)])
     (found,) = [r for r in store.read_known([planned[0].run_id]) if isinstance(r, Damage)]
-    assert "holds the record of run" in found.reason
+    assert f"it holds the record of {planned[1].run_id}" in found.reason
 
 
 def test_only_missing_runs_are_done(tmp_path):
@@ -94,6 +109,11 @@ def test_only_missing_runs_are_done(tmp_path):
     assert (progress.total, progress.present, progress.done) == (4, 2, 2)
     assert perform_counting(store, planned)[1] == []
     assert len(perform_counting(store, planned, redo=True)[1]) == 4
+
+
+def of_other_code(spec):
+    entry = dataclasses.replace(spec.entry, code="c0ffee")
+    return dataclasses.replace(spec.setting, entry=entry).spec(spec.run, spec.seed)
 
 
 def test_other_code_makes_records_stale(tmp_path):
@@ -107,22 +127,17 @@ def test_other_code_makes_records_stale(tmp_path):
         def perform(self, jobs):
             yield from super().perform({**job, "code": planned[0].entry.code} for job in jobs)
 
-    changed = [
-        dataclasses.replace(spec, entry=dataclasses.replace(spec.entry, code="c0ffee"))
-        for spec in planned
-    ]
+    changed = [of_other_code(spec) for spec in planned]
     progress = perform_plan(changed, store, Pretend())
     assert set(progress.stale) == old
     assert progress.done == 2
-    assert store.ids() == old | {spec.run_id for spec in changed}
+    assert set(store.packs()) == old | {spec.run_id for spec in changed}
     assert not perform_counting(store, planned)[1]  # the old ones serve the old code
 
 
 def test_workers_with_other_code_are_refused(tmp_path):
     planned = specs(runs=1)
-    foreign = dataclasses.replace(
-        planned[0], entry=dataclasses.replace(planned[0].entry, code="c0ffee")
-    )
+    foreign = of_other_code(planned[0])
 
     class Elsewhere:
         def perform(self, jobs):
@@ -200,7 +215,7 @@ def test_a_full_disk_loses_nothing_that_was_there(tmp_path, monkeypatch):
     with pytest.raises(CoarticError, match="No space left on device"):
         perform_counting(store, planned)
     monkeypatch.undo()
-    assert store.ids() == {planned[0].run_id}
+    assert set(store.packs()) == {planned[0].run_id}
     assert list(store.records.glob("*.part")) == []
     assert perform_counting(store, planned)[1] == [spec.run_id for spec in planned[1:]]
 
@@ -225,11 +240,14 @@ def test_one_suite_at_a_time(tmp_path):
 
 
 @pytest.mark.parametrize("body", [b'{"a":1}', b"[]", b"not json", b'{"run_id":"x"}'])
-def test_a_checksum_that_fits_no_record(body, tmp_path):
+@pytest.mark.parametrize("line", [0, 1])
+def test_a_checksum_that_fits_no_record(body, line, tmp_path):
     store, planned = Store(tmp_path), specs(runs=1)
     perform_counting(store, planned)
-    head = b"sha256:" + hashlib.sha256(body).hexdigest().encode() + b"\n"
-    store.path(planned[0].run_id).write_bytes(head + body + b"\n")
+    path = store.packs().path(planned[0].run_id)
+    lines = [(name, content) for name, _, content in pack_lines(path)]
+    lines[line] = (lines[line][0], body)
+    write_lines(path, lines)
     progress, performed = perform_counting(store, planned)
     assert (len(progress.damaged), len(performed)) == (1, 1)
     assert len(list(store.records.glob("damaged-*"))) == 1  # kept, out of the way
@@ -240,22 +258,196 @@ def test_a_record_holds_numbers_alone(number, tmp_path):
     """Python's JSON reads words that no number is written with."""
     store, (spec,) = Store(tmp_path), specs(runs=1)
     perform_counting(store, [spec])
-    body = store.path(spec.run_id).read_bytes().partition(b"\n")[2].rstrip(b"\n")
+    path = store.packs().path(spec.run_id)
+    shared, (name, _, body) = pack_lines(path)
     body = re.sub(rb'"wall_s":[-+.e0-9]+', b'"wall_s":' + number, body, count=1)
     assert number in body
-    head = b"sha256:" + hashlib.sha256(body).hexdigest().encode() + b"\n"
-    store.path(spec.run_id).write_bytes(head + body + b"\n")
+    write_lines(path, [(shared[0], shared[2]), (name, body)])
     with pytest.raises(RecordError, match=spec.run_id):
         store.read(spec.run_id)
 
 
-def test_something_else_in_place_of_a_record(tmp_path):
+def test_something_else_in_place_of_a_pack(tmp_path):
     store, planned = Store(tmp_path), specs(runs=2)
     store.records.mkdir(parents=True)
-    store.path(planned[0].run_id).mkdir()
-    os.mkfifo(store.path(planned[1].run_id))
+    (store.records / "00000001.pack").mkdir()
+    os.mkfifo(store.records / "00000007.pack")
     progress, performed = perform_counting(store, planned)
     assert len(progress.damaged) == len(performed) == 2
+    assert not perform_counting(store, planned)[1]
+
+
+def done(count=4):
+    """Specifications, and records of them by run id."""
+    planned = specs(runs=count)
+    answers = InProcess().perform([spec.job() for spec in planned])
+    return planned, [record_of(*pair) for pair in zip(answers, planned, strict=True)]
+
+
+def test_a_pack_says_what_is_common_once(tmp_path):
+    store, (_, records) = Store(tmp_path), done()
+    with store.locked():
+        store.write(records)
+    (path,) = packs_of(tmp_path)
+    names = [name.decode() for name, _, _ in pack_lines(path)]
+    dates = [record.environment.date for record in records]
+    assert names.count("common") == len(set(dates))
+    assert [name for name in names if name != "common"] == [r.run_id for r in records]
+    assert {r.run_id: r.model_dump(mode="json") for r in records} == records_of(tmp_path)
+    assert dict(store.packs()) == {record.run_id: record for record in records}
+
+
+def test_packs_are_bounded(tmp_path, monkeypatch):
+    store, (_, records) = Store(tmp_path), done()
+    monkeypatch.setattr(codec, "FULL", 1)
+    with store.locked():
+        store.write(records)
+    assert [list(read_pack(path)) for path in packs_of(tmp_path)] == [[r.run_id] for r in records]
+
+
+PLANNED, RECORDS = done()
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_damaged_pack_loses_the_damaged_lines_alone(data, tmp_path):
+    """Wherever a byte is changed or the pack is cut."""
+    folder = tmp_path / uuid.uuid4().hex
+    store = Store(folder)
+    with store.locked():
+        store.write(RECORDS)
+    (path,) = packs_of(folder)
+    content = path.read_bytes()
+    at = data.draw(st.integers(0, len(content) - 1), label="at")
+    if data.draw(st.booleans(), label="cut"):
+        harmed = content[:at]
+    else:
+        byte = data.draw(st.integers(0, 255).filter(lambda b: b != content[at]), label="byte")
+        harmed = content[:at] + bytes([byte]) + content[at + 1 :]
+    path.write_bytes(harmed)
+    whole, common, found = set(), False, harmed.splitlines(keepends=True)
+    for line in content.splitlines(keepends=True):
+        if line.startswith(b"common"):
+            common = line in found
+        elif common and line in found:
+            whole.add(line.split(b" ")[0].decode())
+    with store.locked():
+        known = list(store.read_known([spec.run_id for spec in PLANNED]))
+        kept = {r.run_id: r for r in known if not isinstance(r, Damage)}
+        for damage in known:
+            if isinstance(damage, Damage):
+                store.set_aside(damage)
+    assert kept == {r.run_id: r for r in RECORDS if r.run_id in kept}
+    assert kept.keys() >= whole
+    assert dict(store.packs()) == kept
+    assert not store.packs().damaged
+    assert {p.read_bytes() for p in store.records.glob("damaged-*")} <= {harmed}
+
+
+class KilledError(BaseException):
+    """In place of SIGKILL."""
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_sequence_of_writes_and_kills(data, tmp_path):
+    """What was written last of a run is what is there, or what was there before the kill."""
+    folder = tmp_path / uuid.uuid4().hex
+    now: dict[str, tuple[object, ...]] = {}
+    steps = data.draw(
+        st.lists(
+            st.tuples(
+                st.lists(st.sampled_from(RECORDS), min_size=1, max_size=4, unique_by=id),
+                st.sampled_from([None, "write", "rename", "rename done", "drop"]),
+            ),
+            min_size=1,
+            max_size=6,
+        )
+    )
+    for number, (lot, killed) in enumerate(steps):
+        store = Store(folder)
+        timed = [
+            record.model_copy(
+                update={"timing": record.timing.model_copy(update={"wall_s": number})}
+            )
+            for record in lot
+        ]
+        with pytest.MonkeyPatch.context() as patch:
+            kill_at(patch, killed)
+            with contextlib.suppress(KilledError), store.locked():
+                store.write(timed)
+                store.drop_superseded()
+        found = dict(Store(folder).packs())
+        for record in timed:
+            before = now.get(record.run_id, (None,))
+            sure = killed in (None, "drop", "rename done")
+            now[record.run_id] = (record,) if sure else (*before, record)
+        for run_id, possible in now.items():
+            assert found.get(run_id) in possible
+            now[run_id] = (found.get(run_id),)
+    with Store(folder).locked():
+        pass
+    assert not list(folder.rglob("*.part"))
+
+
+def kill_at(patch, moment):
+    """Have the next write end at a moment, and leave things as they are then."""
+    replace_, unlink = os.replace, Path.unlink
+
+    def replaced(source, target):
+        if moment == "rename":
+            raise KilledError
+        replace_(source, target)
+        if moment == "rename done":
+            raise KilledError
+
+    def synced(descriptor):
+        if moment == "write":
+            raise KilledError
+
+    def unlinked(path, missing_ok=False):
+        if moment == "drop" and path.suffix == ".pack":
+            raise KilledError
+        if path.suffix == ".pack":
+            unlink(path, missing_ok=missing_ok)
+
+    if moment is not None:
+        patch.setattr(files.os, "replace", replaced)
+        patch.setattr(files.os, "fsync", synced)
+        patch.setattr(Path, "unlink", unlinked)  # of temporary files, which a kill leaves behind
+
+
+def test_what_is_written_anew_replaces_what_was_there(tmp_path):
+    store, planned = Store(tmp_path), specs(runs=3)
+    perform_counting(store, planned)
+    assert len(packs_of(tmp_path)) == 3
+    perform_counting(store, planned[:2], redo=True)
+    with store.locked():
+        store.drop_superseded()
+    assert [path.name for path in packs_of(tmp_path)] == [
+        "00000003.pack", "00000004.pack", "00000005.pack",
+    ]  # fmt: skip
+    assert not perform_counting(store, planned)[1]
+
+
+def test_a_bad_record_above_a_good_one(tmp_path):
+    """A forged pack of a higher number replaces nothing."""
+    store, planned = Store(tmp_path), specs(runs=2)
+    perform_counting(store, planned)
+    good = store.read(planned[0].run_id)
+    forged = records_of(tmp_path)[planned[0].run_id]
+    forged["solution"]["reward"] += 10
+    write_pack(store.records / "00000050.pack", {planned[0].run_id: forged})
+    progress, performed = perform_counting(store, planned)
+    assert ([d.path.name for d in progress.damaged], performed) == (["00000050.pack"], [])
+    assert store.read(planned[0].run_id) == good
+
+
+def test_records_of_an_older_version_are_refused(tmp_path):
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / f"{'0' * 16}-{'0' * 12}.json").write_text("sha256:")
+    with pytest.raises(CoarticError, match="has records of an older version.*another --out"):
+        perform_counting(Store(tmp_path), specs(runs=1))
 
 
 def test_unwritable_folder(tmp_path):

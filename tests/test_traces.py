@@ -23,6 +23,7 @@ from analysis.study import Study
 from benchmarks.suites import Cell
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
 from tests.support.made_up import MadeUp
+from tests.support.packs import records_of
 from tests.support.reports import compiled, document_of, report_of, without_figures
 from tests.support.suites import KNOWN, run_and_write, with_environment
 
@@ -93,8 +94,7 @@ class Records:
 
     def __init__(self, folder):
         self.by_cell = {}
-        for path in sorted((folder / "records").glob("*.json")):
-            record = json.loads(path.read_text(encoding="utf-8").split("\n", 1)[1])
+        for record in records_of(folder).values():
             specification = record["specification"]
             label = specification["method"]
             if specification["parameters"].get("noise_sd", 0.05) != 0.05:

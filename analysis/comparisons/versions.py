@@ -24,6 +24,7 @@ from analysis.statistics.estimates import FEWEST, SEED, difference_of_means, pai
 from analysis.statistics.hypotheses import bootstrap_test, holm
 from analysis.study import Study, load
 from coartic import CoarticError
+from coartic.packs import Packs
 from coartic.robot import Array
 
 SPENT = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solve_s")
@@ -232,10 +233,8 @@ def _only(study: Study, other: Study) -> dict[str, list[str]]:
 def _stale(study: Study) -> int:
     planned = set(study.runs.run_id)
     keys = {run_id.partition("-")[0] for run_id in planned}
-    return sum(
-        path.stem not in planned and path.stem.partition("-")[0] in keys
-        for path in (study.results.folder / "records").glob("*.json")
-    )
+    others = (run_id for run_id in Packs(study.results.folder) if run_id not in planned)
+    return sum(run_id.partition("-")[0] in keys for run_id in others)
 
 
 def _parameters(first: CellRuns, second: CellRuns) -> str:

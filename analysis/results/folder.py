@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.results.laws import check_tables, read_manifest, read_records
+from analysis.results.laws import check_tables, read_manifest
 from coartic import CoarticError, Task, parse_task
 from coartic.robot import Array
 from coartic.tables import Manifest, label_of
@@ -102,8 +102,16 @@ def load_results(folder: Path) -> Results:
         )
     if not folder.is_dir():
         raise CoarticError(f"{folder} is a file, not a results folder")
+    check_tables(folder, read_manifest(folder))
+    return made_here(folder)
+
+
+def made_here(folder: Path) -> Results:
+    """A results folder that this process has just written, from records that it checked.
+
+    Raises CoarticError where it has no manifest.
+    """
     manifest = read_manifest(folder)
-    check_tables(folder, manifest, read_records(folder, manifest))
     return Results(folder, manifest, read_table(folder, "runs"), read_table(folder, "sequences"))
 
 

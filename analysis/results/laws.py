@@ -8,9 +8,9 @@ afterwards; every check raises CoarticError that says what, and how it is made a
 
 from __future__ import annotations
 
-import hashlib
+import contextlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -18,23 +18,30 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import ValidationError
 
-from coartic import PAPER, CoarticError, parse_task
-from coartic.codec import read_record
-from coartic.inputs import problems_inline, read_bytes
-from coartic.record import BUILT_IN, Record, RecordError, run_seed
+from coartic import CoarticError, parse_task
+from coartic.files import digest_of
+from coartic.inputs import open_regular, problems_inline, read_bytes
+from coartic.packs import Packs
+from coartic.record import BUILT_IN, Record, RecordError
 from coartic.tables import (
     FORMAT,
+    DeclaredMethod,
     Manifest,
     Plan,
-    PlannedCell,
-    tables_of,
+    Planned,
+    row_groups,
+    schemas,
     trials_in,
     variant_of,
 )
 
 ANEW = "start the same `coartic run` again: it makes the tables anew from the records"
-LARGEST_TABLE = 1 << 32
-"""Bytes of a table or a manifest."""
+AGAIN = (
+    "start the same `coartic run` again, without the file manifest.json where it finds nothing "
+    "to do"
+)
+LARGEST_MANIFEST = 1 << 28
+"""Bytes."""
 BASE = "task"  # base locked as the task has it: the case that rewards compare with
 
 
@@ -57,7 +64,7 @@ def read_manifest(folder: Path) -> Manifest:
     if not path.exists():
         raise CoarticError(f"{folder} is not a results folder: {path} is missing")
     try:
-        content = json.loads(read_bytes(path, LARGEST_TABLE), parse_constant=_no_number)
+        content = json.loads(read_bytes(path, LARGEST_MANIFEST), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         raise CoarticError(f"{path}: results cannot be read: {error}") from None
     if not isinstance(content, dict):
@@ -81,48 +88,92 @@ def _no_number(text: str) -> NoReturn:
     raise ValueError(f"{text} is no number")
 
 
-def read_records(folder: Path, manifest: Manifest) -> dict[str, Record]:
-    """The records of a plan by run id: each whole, as planned, and true to its solution.
+def check_tables(folder: Path, manifest: Manifest) -> None:
+    """Every table of a folder is what follows from its manifest and records, in all columns.
 
-    Raises CoarticError that names the run otherwise.
+    Each record is whole, as planned, and true to its solution. Raises CoarticError that names
+    the run or the table otherwise.
     """
-    path = folder / "manifest.json"
-    _check_plan(path, manifest.specification)
-    records: dict[str, Record] = {}
+    plan = manifest.specification
+    _check_plan(folder / "manifest.json", plan)
+    with contextlib.ExitStack() as stack:
+        tables = {
+            name: _Table(folder / f"{name}.parquet", schema, stack)
+            for name, schema in schemas(plan).items()
+        }
+        for name, due in row_groups(plan, _checked(folder, manifest)):
+            tables[name].check_next(due)
+        for table in tables.values():
+            table.check_end(manifest)
+
+
+def _checked(folder: Path, manifest: Manifest) -> Iterator[Planned]:
+    """The runs of a plan with their records, each of them and all together checked."""
+    packs, proofs = Packs(folder), _Proofs(folder)
+    for reason in packs.damaged.values():
+        raise CoarticError(f"{reason}; {AGAIN}")
     for cell in manifest.specification.cells:
-        for run, run_id in enumerate(cell.run_ids):
+        method = manifest.specification.methods[cell.method]
+        for run, run_id in enumerate(manifest.run_ids(cell)):
             try:
-                record = read_record(folder / "records" / f"{run_id}.json")
+                record = packs[run_id]
                 record.check()
             except RecordError as error:
-                raise CoarticError(f"{error}; start the same `coartic run` again") from None
-            problem = _departure(manifest, cell, run, record)
+                raise CoarticError(f"{error}; {AGAIN}") from None
+            problem = _departure(method, run, record)
             if problem is not None:
-                damaged(path, f"run {run_id} is not as planned: it has another {problem}")
-            records[run_id] = record
-    _check_bounds(folder, records)
-    return records
+                why = f"run {run_id} is not as planned: it has another {problem}"
+                damaged(folder / "manifest.json", why)
+            proofs.add(cell.task, record)
+            yield cell, record
+    proofs.check()
 
 
-def check_tables(folder: Path, manifest: Manifest, records: Mapping[str, Record]) -> None:
-    """Every table of a folder is what follows from its manifest and records, in all columns."""
-    for name, due in tables_of(manifest, records).items():
-        path = folder / f"{name}.parquet"
+class _Table:
+    """A table of a folder, compared with what it has to be, row group by row group."""
+
+    def __init__(self, path: Path, schema: pa.Schema, stack: contextlib.ExitStack) -> None:
         if not path.exists():
             raise CoarticError(f"{path} is missing; {ANEW}")
-        data = read_bytes(path, LARGEST_TABLE)
-        try:
-            found = pq.read_table(pa.BufferReader(data))
-        except (OSError, ValueError, pa.ArrowException) as error:
-            damaged(path, str(error).splitlines()[0] if str(error) else type(error).__name__)
-        if not found.schema.equals(due.schema, check_metadata=True):
-            differing = {*map(str, found.schema)} ^ {*map(str, due.schema)}
+        self._path, self._row = path, 0
+        self._bytes = stack.enter_context(open_regular(path))
+        with self._readable():
+            self._file = pq.ParquetFile(self._bytes)
+            found, meta = self._file.schema_arrow, self._file.metadata
+            sizes = [meta.row_group(group).num_rows for group in range(meta.num_row_groups)]
+        self._groups = iter([(group, rows) for group, rows in enumerate(sizes) if rows])
+        if not found.equals(schema, check_metadata=True):
+            differing = {*map(str, found)} ^ {*map(str, schema)}
             what = ", ".join(sorted(differing)[:3]) or "their metadata"
             damaged(path, f"its columns are not those of this table: {what}")
+
+    def check_next(self, due: pa.Table) -> None:
+        """The next row group is this one."""
+        group, rows = next(self._groups, (-1, 0))
+        if rows != len(due):
+            damaged(self._path, "it has not the rows that its records give")
+        with self._readable():
+            found = self._file.read_row_group(group)
         if not found.equals(due):
-            damaged(path, _difference(found, due))
-        if hashlib.sha256(data).hexdigest() != manifest.tables.get(path.name):
-            damaged(path, "it says what its records say, but is not the file that was written")
+            damaged(self._path, _difference(found, due, self._row))
+        self._row += rows
+
+    def check_end(self, manifest: Manifest) -> None:
+        """There is no more, and the file is the one that was written."""
+        if next(self._groups, None) is not None:
+            damaged(self._path, "it has more rows than its records give")
+        if digest_of(self._bytes) != manifest.tables.get(self._path.name):
+            damaged(
+                self._path, "it says what its records say, but is not the file that was written"
+            )
+
+    @contextlib.contextmanager
+    def _readable(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, ValueError, pa.ArrowException) as error:
+            words = str(error).splitlines()
+            damaged(self._path, words[0] if words else type(error).__name__)
 
 
 def _check_plan(path: Path, plan: Plan) -> None:
@@ -130,7 +181,6 @@ def _check_plan(path: Path, plan: Plan) -> None:
     for name, content in plan.tasks.items():
         if parse_task(content, str(path)).name != name:
             damaged(path, f"its task {name!r} has another name")
-    seen: set[str] = set()
     labels = {(cell.task, cell.method, cell.variant) for cell in plan.cells}
     if len(labels) < len(plan.cells):
         damaged(path, "two of its cells have the same task, method and variant")
@@ -141,38 +191,28 @@ def _check_plan(path: Path, plan: Plan) -> None:
         method = plan.methods[cell.method]
         # What a suite sets: parameters of the cell, and trials, which are the suite's.
         given = {k: v for k, v in cell.complete.items() if k == "trials"} | cell.parameters
-        runs = plan.runs if method.stochastic else 1
         laws = (
-            (len(cell.run_ids) == runs, "has another number of runs"),
             (cell.variant == variant_of(cell.parameters, method.defaults), "has another variant"),
             (
                 method.origin != BUILT_IN or cell.complete == method.defaults | given,
                 "has parameters that nobody set",
             ),
             (trials_in(cell.complete) <= plan.trials, "makes more trials than planned"),
-            (seen.isdisjoint(cell.run_ids), "has a run that is planned twice"),
         )
         problem = next((words for holds, words in laws if not holds), None)
         if problem is not None:
             damaged(path, f"{where} {problem}")
-        seen.update(cell.run_ids)
     if plan.trials != max((trials_in(cell.complete) for cell in plan.cells), default=0):
         damaged(path, "no cell makes as many trials as it says")
 
 
-def _departure(manifest: Manifest, cell: PlannedCell, run: int, record: Record) -> str | None:
-    """In what a record is not the run that the plan has at its place; None where it is."""
-    plan, own = manifest.specification, record.specification
-    method = plan.methods[cell.method]
+def _departure(method: DeclaredMethod, run: int, record: Record) -> str | None:
+    """In what a record is not the run that the plan has at its place; None where it is.
+
+    What the run's id is the hash of agrees already.
+    """
     agreements = (
-        ("task", own.task, plan.tasks[cell.task]),
-        ("method", own.method, cell.method),
-        ("parameters", own.parameters, cell.complete),
-        ("model", own.model, PAPER._asdict()),
         ("number", record.run, run),
-        ("seed", own.seed, run_seed(plan.seed, cell.task, run)),
-        ("trial budget", own.trial_budget, manifest.limits.trials),
-        ("code", record.code, method.code),
         ("origin", record.origin, method.origin),
         ("information", record.told, method.told),
         ("secondary objectives", record.secondary, method.secondary),
@@ -180,32 +220,44 @@ def _departure(manifest: Manifest, cell: PlannedCell, run: int, record: Record) 
     return next((what for what, found, due in agreements if found != due), None)
 
 
-def _check_bounds(folder: Path, records: Mapping[str, Record]) -> None:
+class _Proofs:
     """No run is better than what another one proves that none can be."""
-    for proof in records.values():
-        parameters = proof.specification.parameters
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._best: dict[str, tuple[int, str]] = {}
+        self._bounds: dict[str, tuple[int, str]] = {}
+
+    def add(self, task: str, record: Record) -> None:
+        """One more run of a task."""
+        if record.solution is not None:
+            own = record.solution.reward, record.run_id
+            self._best[task] = max(self._best.get(task, own), own)
+        parameters = record.specification.parameters
         narrower = parameters.get("base", BASE) != BASE or parameters.get("other_arm") == "still"
-        if proof.bound is None or narrower:
-            continue
-        for record in records.values():
-            same = record.specification.task == proof.specification.task
-            if same and record.solution and record.solution.reward > proof.bound:
+        if record.bound is not None and not narrower:
+            proof = record.bound, record.run_id
+            self._bounds[task] = min(self._bounds.get(task, proof), proof)
+
+    def check(self) -> None:
+        """After the last run."""
+        for task, (bound, proof) in self._bounds.items():
+            reward, run_id = self._best.get(task, (bound, ""))
+            if reward > bound:
                 raise CoarticError(
-                    f"{folder}: run {record.run_id} has reward {record.solution.reward}, and run "
-                    f"{proof.run_id} proves that none exceeds {proof.bound}: one of them is "
-                    "false; `coartic reproduce` tells which"
+                    f"{self._folder}: run {run_id} has reward {reward}, and run {proof} proves "
+                    f"that none exceeds {bound}: one of them is false; `coartic reproduce` "
+                    "tells which"
                 )
 
 
-def _difference(found: pa.Table, due: pa.Table) -> str:
-    """The first place where two tables of the same columns differ."""
-    if len(found) != len(due):
-        return f"it has {len(found)} rows where its records give {len(due)}"
+def _difference(found: pa.Table, due: pa.Table, start: int) -> str:
+    """The first place where two tables of the same columns and rows differ."""
     for name in due.column_names:
         if found[name].equals(due[name]):
             continue
         pairs = zip(found[name].to_pylist(), due[name].to_pylist(), strict=True)
         row = next((index for index, (a, b) in enumerate(pairs) if a != b), 0)
         who = f" (run {due['run_id'][row]})" if "run_id" in due.column_names else ""
-        return f"column {name!r} is not as its records have it, first in row {row}{who}"
+        return f"column {name!r} is not as its records have it, first in row {start + row}{who}"
     return "it is not as its records have it"

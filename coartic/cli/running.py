@@ -17,6 +17,7 @@ from coartic.files import folder_named
 from coartic.text import counted, json_text
 
 if TYPE_CHECKING:
+    from analysis.report.document import Document
     from benchmarks.executors import Executor
     from benchmarks.registry import Entry
     from coartic import Task
@@ -77,15 +78,17 @@ class _Comparison:
 
     def __init__(self, display: Display) -> None:
         self._display = display
+        self._made: Document | None = None
 
     def pages(self, folder: Path) -> dict[str, bytes]:
         """What is written beside the tables."""
         self._display.end_runs()
-        from analysis import load
+        from analysis import Study
         from analysis.report.comparison import comparison_document
         from analysis.report.formats.markdown import markdown
+        from analysis.results.folder import made_here
 
-        study = load(folder)
+        study = Study(made_here(folder))
         self._made, self._page = comparison_document(study), folder / "comparison.md"
         return {
             "comparison.md": markdown(self._made, tables="").encode(),
@@ -93,9 +96,11 @@ class _Comparison:
         }
 
     def show(self) -> None:
-        """Print what fits the terminal."""
+        """Print what fits the terminal; nothing where nothing was made anew."""
         from analysis.report.comparison import notes_of
 
+        if self._made is None:
+            return
         show_data(self._made.tables(), f"see {self._page}")
         show_lines(f"- {note}" for note in notes_of(self._made))
 

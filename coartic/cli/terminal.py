@@ -211,7 +211,7 @@ class Display:
         self.done = progress.done
         if spec is None:
             for damage in progress.damaged:
-                self.line(f"{damage.reason}; this run is performed again")
+                self.line(f"{damage.reason}; what is lost is performed again")
             if progress.stale:
                 self.line(
                     f"not used, made by other code: {counted(len(progress.stale), 'record')}"

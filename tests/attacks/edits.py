@@ -19,6 +19,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from tests.support.packs import pack_of, packs_of, read_pack, records_of, write_pack
+
 from .checkout import Driver, Ended, read_json, run
 
 Edit = Callable[[Path], None]
@@ -322,10 +324,9 @@ def manifest_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
     yield one("cells reversed", "cells", change=lambda x: x[::-1])
     yield one("cell doubled", "cells", change=lambda x: [*x, x[0]])
     yield one("cell dropped", "cells", change=lambda x: x[1:])
-    runs = ("cells", 0, "run_ids")
-    yield one("runs reversed", *runs, change=lambda x: x[::-1])
-    yield one("run doubled", *runs, change=lambda x: [*x, x[0]])
-    yield one("run left out", *runs, change=lambda x: x[:-1])
+    yield one("a run more", "runs", change=lambda x: x + 1)
+    yield one("a run less", "runs", change=lambda x: x - 1)
+    yield one("code", "methods", "dual-process/EC1", "code", change=lambda x: "0" * len(x))
     yield one("variant", "cells", 0, "variant", change=lambda x: "noise_sd=0.1")
     yield one("parameters", "cells", 0, "parameters", change=lambda x: {"noise_sd": 0.1})
     yield one("told all", "methods", "dual-process/EC1", "told", change=lambda x: [*x, "goals"])
@@ -340,50 +341,66 @@ def manifest_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
 # Records.
 
 
-def records_of(folder: Path) -> list[Path]:
-    """The records of a folder's learner runs, then the others."""
-    paths = sorted((folder / "records").glob("*.json"))
-    return sorted(paths, key=lambda path: b'"method":"dual-process' not in path.read_bytes())
+def learner_first(folder: Path) -> list[str]:
+    """Ids of the runs of a folder, those of learners before the others."""
+    records = records_of(folder)
+    return sorted(records, key=lambda run: not method_of(records[run]).startswith("dual-process"))
+
+
+def method_of(record: dict[str, Any]) -> str:
+    """Id of the method of a record."""
+    return str(record["specification"]["method"])
 
 
 def record_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
     """One record harmed, or in the wrong place."""
-    path, second = (path.relative_to(folder) for path in records_of(folder)[:2])
+    first, second = learner_first(folder)[:2]
+    pack = pack_of(folder, first)
+    path = str(pack.relative_to(folder))
+    others = [other for other in packs_of(folder) if other != pack]
     for what, harm in HARM.items():
-        yield f"records/{what}", partial(_harm, str(path), harm)
+        yield f"records/{what}", partial(_harm, path, harm)
     for what, harm in {
         "figure changed": lambda data: data.replace(b'"reward":-3', b'"reward":-2', 1),
         "head gone": lambda data: data.partition(b"\n")[2],
-        "line added": lambda data: data + b"{}\n",
         "lines as of Windows": lambda data: data.replace(b"\n", b"\r\n"),
-        "not JSON": lambda data: b"sha256:" + b"0" * 64 + b"\nnothing\n",
+        "not JSON": lambda data: b"%s %s nothing\n" % (first.encode(), b"0" * 64),
+        "checksum of nothing": lambda data: re.sub(
+            rb" [0-9a-f]{64} ", b" %b " % (b"0" * 64), data
+        ),
     }.items():
-        yield f"records/{what}", partial(_harm, str(path), harm)
+        yield f"records/{what}", partial(_harm, path, harm)
+    yield "packs/a line more", partial(_harm, path, lambda data: data + b"{}\n")
     yield (
-        "records/renamed",
-        lambda f: (f / path).rename(f / "records" / f"{'0' * 16}-{'0' * 12}.json"),
+        "records/under a name that is none",
+        lambda f: (f / path).rename(f / "records" / "1.pack"),
     )
-    yield "records/of another run", lambda f: shutil.copy(f / second, f / path)
-    yield "records/exchanged", partial(_exchange_files, path, second)
+    yield "records/under another's name", partial(_renamed_line, first, second)
+    yield "records/names exchanged", partial(_exchanged_names, first, second)
     yield "records/a folder", partial(_folder_instead, path)
-    yield "records/a link to another", partial(_link_instead, path, second)
+    if others:
+        yield "records/a link to another", partial(_link_instead, path, others[0].name)
     yield "records/all gone", lambda f: shutil.rmtree(f / "records")
 
 
-def _exchange_files(first: Path, second: Path, folder: Path) -> None:
-    a, b = (folder / first).read_bytes(), (folder / second).read_bytes()
-    (folder / first).write_bytes(b)
-    (folder / second).write_bytes(a)
+def _renamed_line(first: str, second: str, folder: Path) -> None:
+    for path in packs_of(folder):
+        path.write_bytes(path.read_bytes().replace(f"{first} ".encode(), f"{second} ".encode()))
 
 
-def _folder_instead(path: Path, folder: Path) -> None:
+def _exchanged_names(first: str, second: str, folder: Path) -> None:
+    for old, new in ((first, "?"), (second, first), ("?", second)):
+        _renamed_line(old, new, folder)
+
+
+def _folder_instead(path: str, folder: Path) -> None:
     (folder / path).unlink()
     (folder / path).mkdir()
 
 
-def _link_instead(path: Path, second: Path, folder: Path) -> None:
+def _link_instead(path: str, other: str, folder: Path) -> None:
     (folder / path).unlink()
-    (folder / path).symlink_to(folder / second)
+    (folder / path).symlink_to(other)
 
 
 # More than one file at once.
@@ -394,12 +411,8 @@ def dropped_everywhere(run_id: str, folder: Path) -> None:
     for name in TABLES[:-1]:
         change_rows(name, lambda rows: [r for r in rows if r["run_id"] != run_id], folder)
 
-    def leave_out(manifest: dict[str, Any]) -> None:
-        for cell in manifest["specification"]["cells"]:
-            cell["run_ids"] = [other for other in cell["run_ids"] if other != run_id]
-
-    change_manifest(leave_out, folder)
-    (folder / "records" / f"{run_id}.json").unlink()
+    path = pack_of(folder, run_id)
+    write_pack(path, {other: kept for other, kept in read_pack(path).items() if other != run_id})
 
 
 def consistent_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
@@ -440,10 +453,10 @@ def consistent_edits(folder: Path) -> Iterator[tuple[str, Edit]]:
 
 
 UNSEEN = re.compile(
-    r"sealed/manifest/(environment.*|limits/time_s|specification/(suite|methods/\*/(title|citation|defaults/trials)))"
+    r"sealed/manifest/(environment.*|records.*|limits/time_s|specification/(suite|methods/\*/(title|citation|defaults/trials)))"
 )
 """Edits of a manifest whose seal was made anew, of words and surroundings that nothing else in a
-folder repeats."""
+folder repeats, and of the hash of the records, which who reads them needs not."""
 
 
 def _sealed(edit: Edit, folder: Path) -> None:
@@ -497,7 +510,7 @@ def accepted(command: Command, whole: Path, edited: Path, name: str) -> list[str
         ("analyse", edited),
     ]
     if name.startswith("records/"):
-        asked.append(("show", records_of(whole)[0].stem, "--in", edited))
+        asked.append(("show", learner_first(whole)[0], "--in", edited))
     for words in asked:
         ended = command(*words)
         if not ended.refused:

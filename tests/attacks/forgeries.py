@@ -8,8 +8,6 @@ again, so that the folder says what it said before.
 from __future__ import annotations
 
 import copy
-import hashlib
-import json
 import math
 import shutil
 from collections.abc import Callable, Iterator
@@ -20,8 +18,10 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
+from tests.support.packs import pack_of, read_pack, records_of, write_pack
+
 from .checkout import Driver
-from .edits import SUITE, Command, accepted, at, finished, other
+from .edits import SUITE, Command, accepted, at, finished, method_of, other
 
 Record = dict[str, Any]
 LEARNER, PATHS = "dual-process/EC1", "nullspace-qp/none"
@@ -328,38 +328,22 @@ for _key in ("solution", "replay", "rewards", "details", "meter", "timing", "env
     forge(f"no {_key}", gone(_key))
 
 
-def read(path: Path) -> Record:
-    """A record, whatever its checksum."""
-    record: Record = json.loads(path.read_bytes().partition(b"\n")[2])
-    return record
+def runs_by_method(folder: Path) -> dict[str, list[str]]:
+    """Ids of the runs, by method, in the order of run numbers."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for run_id, record in records_of(folder).items():
+        found.setdefault(method_of(record), []).append((record["run"], run_id))
+    return {method: [run_id for _, run_id in sorted(runs)] for method, runs in found.items()}
 
 
-def write(path: Path, record: Any) -> None:
-    """A record with a checksum that fits."""
-    body = json.dumps(record, separators=(",", ":"), ensure_ascii=False).encode(
-        errors="surrogatepass"
-    )
-    head = b"sha256:" + hashlib.sha256(body).hexdigest().encode()
-    path.write_bytes(head + b"\n" + body + b"\n")
-
-
-def records_by_method(folder: Path) -> dict[str, list[Path]]:
-    """Paths of the records, by method, in the order of run numbers."""
-    found: dict[str, list[tuple[int, Path]]] = {}
-    for path in (folder / "records").glob("*.json"):
-        record = read(path)
-        key = record["specification"]["method"]
-        found.setdefault(key, []).append((record["run"], path))
-    return {method: [path for _, path in sorted(runs)] for method, runs in found.items()}
-
-
-def forge_in(folder: Path, forgery: Forgery) -> Path:
+def forge_in(folder: Path, forgery: Forgery) -> str:
     """Forge a record of a folder. Raises LookupError or TypeError where it has no such key."""
-    path = records_by_method(folder)[forgery.method][0]
-    record = read(path)
-    forgery.change(record)
-    write(path, record)
-    return path
+    run_id = runs_by_method(folder)[forgery.method][0]
+    path = pack_of(folder, run_id)
+    records = read_pack(path)
+    forgery.change(records[run_id])
+    write_pack(path, records)
+    return run_id
 
 
 def solution_of_another(record: Record, source: Record) -> None:
@@ -380,16 +364,18 @@ def says(folder: Path) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def got_through(command: Command, whole: Path, forged: Path, suite: Path, path: Path) -> list[str]:
+def got_through(
+    command: Command, whole: Path, forged: Path, suite: Path, run_id: str
+) -> list[str]:
     """What came of a forged record after the suite's own command; empty where it held."""
-    before = path.read_bytes()
+    before = records_of(forged)[run_id]
     ended = command("run", suite, "--out", forged, "--jobs", "1")
     if "Traceback" in ended.text or ended.code not in (0, 1, 2):
         return [f"run ends with {ended.code}, {ended.last_line!r}"]
     if ended.code == 2:
         return [] if ended.refused and ended.names else [f"run says {ended.last_line!r}"]
     found = accepted(command, whole, forged, "")
-    if found and path.is_file() and path.read_bytes() != before and says(forged) == says(whole):
+    if found and records_of(forged).get(run_id, before) != before and says(forged) == says(whole):
         return []  # performed again
     return found
 
@@ -400,9 +386,9 @@ def outcomes(root: Path, folder: Path, chosen: str) -> Iterator[tuple[str, list[
     suite = folder / "small.toml"
     suite.write_text(SUITE)
     driver = Driver(root, folder)
-    sources = records_by_method(whole)
+    records, runs = records_of(whole), runs_by_method(whole)
     stolen = Forgery(
-        lambda record: solution_of_another(record, read(sources[OPTIMUM][0])), LEARNER, PERFORM
+        lambda record: solution_of_another(record, records[runs[OPTIMUM][0]]), LEARNER, PERFORM
     )
     for name, forgery in {**FORGERIES, "solution of another": stolen}.items():
         if not name.startswith(chosen):
@@ -411,13 +397,13 @@ def outcomes(root: Path, folder: Path, chosen: str) -> Iterator[tuple[str, list[
         shutil.rmtree(forged, ignore_errors=True)
         shutil.copytree(whole, forged)
         try:
-            path = forge_in(forged, forgery)
+            run_id = forge_in(forged, forgery)
         except (LookupError, TypeError, AttributeError) as error:
             yield name, f"not applicable here: {error!r}"
             continue
-        found = got_through(driver.run, whole, forged, suite, path)
+        found = got_through(driver.run, whole, forged, suite, run_id)
         if found and forgery.unseen_by_design:
-            again = driver.run("reproduce", path.stem, "--in", forged)
+            again = driver.run("reproduce", run_id, "--in", forged)
             sees = "sees it" if again.code == 1 else "does not see it"
             yield name, f"unseen by design ({forgery.unseen_by_design}); `reproduce` {sees}"
         else:

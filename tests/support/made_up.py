@@ -34,9 +34,7 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
 
 def planned(task, method, variant=""):
     """A cell of a plan."""
-    return PlannedCell(
-        task=task, method=method, variant=variant, parameters={}, complete={}, run_ids=()
-    )
+    return PlannedCell(task=task, method=method, variant=variant, parameters={}, complete={})
 
 
 def manifest_for(tasks, runs=None, *, trials=10_000):
@@ -54,7 +52,9 @@ def manifest_for(tasks, runs=None, *, trials=10_000):
         threads=None,
     )  # fmt: skip
     limits = PlanLimits(time_s=None, trials=None)
-    return Manifest(specification=plan, limits=limits, environment=environment, tables={})
+    return Manifest(
+        specification=plan, limits=limits, environment=environment, records="", tables={}
+    )
 
 
 def replanned(manifest, **update):
