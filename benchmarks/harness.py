@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Annotated
 
 from pydantic import Field, ValidationError
@@ -19,7 +20,7 @@ from coartic.method import Information
 from coartic.record import SEARCH, Environment, Record, Status, Timing
 from coartic.scores import MOST_MOVEMENTS, PlainMovement, Solved, solved
 from coartic.stored import Plain, Reward, Spent, Values
-from coartic.text import plain
+from coartic.text import counted, plain
 
 Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
 MOST_REWARDS = 1_000_000
@@ -78,22 +79,44 @@ def perform_missing(
                 progress.failed += record.status != "ok"
     watch(progress, None)
     idle = 0
+    alone: set[str] = set()  # runs that are performed beside no others
     while missing and idle < _ROUNDS:
         idle += 1
-        for answer in executor.perform([spec.job() for spec in missing.values()]):
-            spec = missing.pop(answer["run_id"])
-            record = record_of(answer, spec)
-            store.write([record])
-            progress.done += 1
-            progress.failed += record.status != "ok"
-            idle = 0
-            watch(progress, spec)
+        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), alone)}
+        jobs = [lot[0].setting.job(lot) for lot in lots.values()]
+        for answer in executor.perform(jobs):
+            lot, idle = lots.pop(answer["run_id"]), 0
+            records = records_of(answer, lot)
+            if len(lot) > 1:  # one that went wrong beside others may have had it from them
+                alone.update(record.run_id for record in records if record.status in RETRIED)
+                records = [record for record in records if record.run_id not in alone]
+            store.write(records)
+            for record in records:
+                progress.done += 1
+                progress.failed += record.status != "ok"
+                watch(progress, missing.pop(record.run_id))
     if missing:
         raise CoarticError(
             f"{len(missing)} runs were lost again and again (workers die before they answer); "
             "what is done is kept, and the same command goes on from there"
         )
     return progress
+
+
+def _lots(specs: Iterable[RunSpec], alone: Collection[str]) -> Iterator[Sequence[RunSpec]]:
+    """Runs that are performed side by side; results do not depend on which these are."""
+    for _, group in groupby(specs, key=lambda spec: id(spec.setting)):
+        together: list[RunSpec] = []
+        for spec in group:
+            if spec.run_id in alone:
+                yield [spec]
+                continue
+            together.append(spec)
+            if len(together) == spec.setting.most_together:
+                yield together
+                together = []
+        if together:
+            yield together
 
 
 def _to_redo(record: Record, spec: RunSpec, retry_failed: bool) -> bool:
@@ -127,36 +150,52 @@ class _Said(Plain):
 
     error: str | None
     foreign_code: bool = False
-    answer: Outcome | None
+    answer: tuple[Outcome, ...] | None
 
 
 def record_of(answer: Answer, spec: RunSpec) -> Record:
-    """The record of an answer, also of one that says how the run failed.
+    """The record of a run that was performed alone; see :func:`records_of`."""
+    (record,) = records_of(answer, [spec])
+    return record
+
+
+def records_of(answer: Answer, specs: Sequence[RunSpec]) -> list[Record]:
+    """The records of an answer, also of one that says how the runs failed.
 
     Solutions are executed and scored here, where the method has never been, by the
     specification's own task and model. Raises CoarticError where the answer comes from
     other code than was asked for.
     """
+
+    def failed(status: Status, reason: str, wall_s: float = 0.0) -> list[Record]:
+        return [_failure(spec, status, reason, wall_s / len(specs)) for spec in specs]
+
     if "outcome" not in answer:
-        return _failure(spec, answer["failure"], answer["reason"], answer["wall_s"])
+        return failed(answer["failure"], answer["reason"], answer["wall_s"])
     try:
         said = _Said.model_validate_json(answer["outcome"])
     except ValidationError as error:
-        return _failure(
-            spec, "solver-failed", f"what it handed over cannot be kept: {problems_inline(error)}"
-        )
-    if said.foreign_code and spec.entry.foreign is None:
+        reason = f"what it handed over cannot be kept: {problems_inline(error)}"
+        return failed("solver-failed", reason)
+    if said.foreign_code and specs[0].entry.foreign is None:
         raise CoarticError(plain(said.error or "other code"))
     if said.answer is None:
-        return _failure(spec, "crashed", said.error or "it gave no answer")
-    false = _false_claim(spec, said.answer)
+        return failed("crashed", said.error or "it gave no answer")
+    if len(said.answer) != len(specs):
+        reason = f"it answers for {counted(len(said.answer), 'run')} of {len(specs)}"
+        return failed("solver-failed", reason)
+    return [_scored(*pair) for pair in zip(specs, said.answer, strict=True)]
+
+
+def _scored(spec: RunSpec, outcome: Outcome) -> Record:
+    false = _false_claim(spec, outcome)
     if false is not None:
         return _failure(spec, *false)
     try:
-        record = _record(spec, said.answer, **_scores(spec, said.answer))
+        record = _record(spec, outcome, **_scores(spec, outcome))
     except _UnsolvedError as error:
         unsolved = {"status": error.status, "reason": str(error)}
-        record = _record(spec, said.answer.model_copy(update=unsolved))
+        record = _record(spec, outcome.model_copy(update=unsolved))
     problem = record.disagreement()
     if problem is not None:
         return _failure(spec, "solver-failed", f"what it states contradicts itself: {problem}")

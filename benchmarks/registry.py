@@ -84,6 +84,13 @@ class Entry:
         """All parameters, defaults included; CoarticError names the ones that are wrong."""
         return _complete(self.foreign, self.name, json.dumps(parameters, sort_keys=True))
 
+    def most_together(self, parameters: Mapping[str, Any]) -> int:
+        """Runs with parameters, at most, that one process performs side by side."""
+        if self.foreign is not None:
+            return 1
+        method = CLASSES[self.name]
+        return method(method.Parameters(**parameters)).most_together()
+
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
         """Why the method with parameters does not apply to a task; None where it does.
 

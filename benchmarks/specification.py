@@ -58,18 +58,34 @@ class Setting:
         )
 
     @cached_property
-    def job(self) -> dict[str, Any]:
-        """What the runs' jobs share."""
+    def most_together(self) -> int:
+        """Runs, at most, that one process performs side by side."""
+        return self.entry.most_together(self.all_parameters)
+
+    @cached_property
+    def _shared(self) -> dict[str, Any]:
         foreign, name, code = self.entry.foreign, self.entry.name, self.entry.code
         return {
             "specification": self.asked.model_dump(mode="json"),
             "code": code,
             "told": list(self.entry.declared.told),
-            "time_limit_s": self.limits.time_s,
             "foreign": None if foreign is None else foreign.model_dump(mode="json"),
             "owner": None if foreign is None else f"{name} {code}",
             "command": command(),
             "reach": True,
+        }
+
+    def job(self, specs: Sequence[RunSpec]) -> dict[str, Any]:
+        """What a worker needs to perform runs of this setting side by side, as plain data.
+
+        It is named after the first of them.
+        """
+        limit_s, seeds = self.limits.time_s, [spec.seed for spec in specs]
+        return {
+            **self._shared,
+            "run_id": specs[0].run_id,
+            "seeds": seeds,
+            "time_limit_s": None if limit_s is None else limit_s * len(seeds),
         }
 
     def specs(self, seeds: Sequence[int]) -> Iterator[RunSpec]:
@@ -125,7 +141,5 @@ class RunSpec:
         return self.setting.asked.with_seed(self.seed)
 
     def job(self) -> dict[str, Any]:
-        """What a worker needs to perform the run, as plain data."""
-        shared = self.setting.job
-        specification = {**shared["specification"], "seed": self.seed}
-        return {**shared, "run_id": self.run_id, "specification": specification}
+        """What a worker needs to perform the run alone, as plain data."""
+        return self.setting.job([self])

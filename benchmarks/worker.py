@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import cache
 from typing import Any
@@ -67,47 +68,58 @@ def answer(question: dict[str, Any]) -> Any:
     raise CoarticError(f"nobody knows what {what!r} asks for")
 
 
-def perform(job: dict[str, Any]) -> dict[str, Any]:
-    """What a method states of one run. Whatever it does is an outcome, not an error.
+def perform(job: dict[str, Any]) -> list[dict[str, Any]]:
+    """What a method states of each run of a job. Whatever it does is an outcome, not an error.
 
-    Raises ForeignCodeError where this process runs other code than the job's.
+    Runs that are performed side by side have equal shares of the time. Raises
+    ForeignCodeError where this process runs other code than the job's.
     """
     specification, foreign = job["specification"], job["foreign"]
     name = specification["method"]
     method_class = _method_as_asked(name, None if foreign is None else Foreign(**foreign), job)
     task = parse_task(specification["task"], "specification", reach=job["reach"])
-    session = Session(
-        task,
-        specification["seed"],
-        map(Information, job["told"]),  # as declared, whatever became of the class since
-        model=MotionModel(**specification["model"]),
-        trial_budget=specification["trial_budget"],
-        trusted=foreign is None,
-    )
+    sessions = [
+        Session(
+            task,
+            seed,
+            map(Information, job["told"]),  # as declared, whatever became of the class since
+            model=MotionModel(**specification["model"]),
+            trial_budget=specification["trial_budget"],
+            trusted=foreign is None,
+        )
+        for seed in job["seeds"]
+    ]
     method = method_class(method_class.Parameters(**specification["parameters"]))
     warm = name in _solved_before
     _solved_before.add(name)
     wall, cpu = time.perf_counter(), time.process_time()
-    stated = _outcome(method, specification["parameters"], task, session)
+    outcomes = _outcomes(method, specification["parameters"], task, sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    return {
-        **stated,
-        "used": sorted(session.used),
-        "meter": session.meter.as_dict(),
-        "rewards": session.rewards,
-        "timing": {
-            "wall_s": wall,
-            "cpu_s": cpu,
-            "warm": warm,
-            "process_peak_mb": process_peak_mb(),
-            "time_limit_s": job["time_limit_s"],
-        },
-        "environment": {
-            **_environment(),
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "command": job["command"],
-        },
+    runs, limit_s = len(sessions), job["time_limit_s"]
+    timing = {
+        "wall_s": wall / runs,
+        "cpu_s": cpu / runs,
+        "warm": warm,
+        "together": runs,
+        "process_peak_mb": process_peak_mb(),
+        "time_limit_s": None if limit_s is None else limit_s / runs,
     }
+    surroundings = {
+        **_environment(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": job["command"],
+    }
+    return [
+        {
+            **outcome,
+            "used": sorted(session.used),
+            "meter": session.meter.as_dict(),
+            "rewards": session.rewards,
+            "timing": timing,
+            "environment": surroundings,
+        }
+        for session, outcome in zip(sessions, outcomes, strict=True)
+    ]
 
 
 def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) -> type[Method]:
@@ -125,17 +137,33 @@ def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) ->
     return method
 
 
-def _outcome(
-    method: Method, parameters: dict[str, Any], task: Task, session: Session
-) -> dict[str, Any]:
-    """Status, reason, and the result as plain data where there is one."""
-    status, reason = "ok", ""
-    stated: dict[str, Any] = {}
-    try:
+def _outcomes(
+    method: Method, parameters: dict[str, Any], task: Task, sessions: Sequence[Session]
+) -> list[dict[str, Any]]:
+    """Status, reason, and the result as plain data where there is one, of each session."""
+
+    def results() -> Sequence[Result | MethodError]:
         reason_not = reason_against(type(method), task, parameters)
         if reason_not is not None:
             raise MethodError("infeasible", reason_not)
-        stated = _stated(method.solve(session), session)
+        if len(sessions) == 1:
+            return [method.solve(sessions[0])]
+        return method.solve_together(sessions)
+
+    try:
+        found = results()
+    except BaseException as error:
+        return [_outcome(error, session) for session in sessions]
+    return [_outcome(result, session) for result, session in zip(found, sessions, strict=True)]
+
+
+def _outcome(result: Any, session: Session) -> dict[str, Any]:
+    status, reason = "ok", ""
+    stated: dict[str, Any] = {}
+    try:
+        if isinstance(result, BaseException):
+            raise result
+        stated = _stated(result, session)
     except MethodError as error:
         status, reason, stated = error.outcome, str(error), {"details": error.details}
     except UndeclaredError as error:

@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 from coartic.compiled import entry, inner, joint_chain, joint_lever, lanewise
 from coartic.lanes import (
     GOING,
-    Ends,
     board,
     copy_lanes,
     ends_of,
@@ -198,7 +197,7 @@ def correct_lanes(
 
 
 @entry
-def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> Ends:
+def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> Any:
     """Correct ``q`` in place."""
     board(lanes, 0, 0, q, arm)
     correct_lanes(lanes, 1, goal, how, model, q.reshape((1, len(q))), ends)

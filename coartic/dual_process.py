@@ -77,7 +77,8 @@ class DualProcess(Method):
 
     def most_together(self) -> int:
         """As many as there are lanes, if their rewards fit into one answer."""
-        return max(1, min(LANES, _MOST_TRIALS // self.parameters.trials))
+        trials: int = self.parameters.trials
+        return max(1, min(LANES, _MOST_TRIALS // trials))
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's."""

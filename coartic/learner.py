@@ -7,10 +7,11 @@ through the same state and hand replaces what is stored there.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
 trial (:mod:`coartic.learning` makes it). Each draws from a NumPy generator of its own
-(``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against ε, where hands are explored; a second one that
-picks a hand, where the first fell below ε and the pick is random; one standard normal
-per explored joint, in the order of ``q``, where a target is stored; a bias draws
-nothing. Runs share nothing: the result of one depends neither on the others nor on their number.
+(``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
+ε, where hands are explored; a second one that picks a hand, where the first fell below ε
+and the pick is random; one standard normal per explored joint, in the order of ``q``,
+where a target is stored; a bias draws nothing. Runs share nothing: the result of one
+depends neither on the others nor on their number.
 """
 
 from __future__ import annotations

@@ -203,8 +203,9 @@ def learn_many(
 
     def perform(seeds: Sequence[int]) -> list[LearningRun]:
         runs = _Learning(task, condition, model, search, seeds, trials).perform()
-        for run in runs if on_done is not None else ():
-            on_done(run)
+        if on_done is not None:
+            for run in runs:
+                on_done(run)
         return runs
 
     if (links := task.robot.most_links) not in _compiled_for:

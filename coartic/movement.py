@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic.compiled import entry, inner, lanewise
-from coartic.lanes import GOING, Ends, board, copy_lanes, ends_of, fill, lanes_for, place, whole
+from coartic.lanes import GOING, board, copy_lanes, ends_of, fill, lanes_for, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
@@ -227,7 +227,7 @@ def _move_one(
     model: Any,
     lanes: Any,
     ends: Any,
-) -> Ends:
+) -> Any:
     """Move ``q`` in place."""
     depart(lanes, 0, 0, q, target, arm, model)
     shape = (1, len(q))

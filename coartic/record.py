@@ -124,6 +124,8 @@ class Timing(Plain):
     cpu_s: Amount | None = None
     warm: bool | None = None
     """Whether the process had run the method before."""
+    together: Annotated[int, Field(gt=0)] = 1
+    """Runs that were performed side by side; the times are this one's share."""
     process_peak_mb: Amount | None = None
     """Of the process so far, all its runs included."""
     time_limit_s: Annotated[float, Field(gt=0)] | None = None
