@@ -67,6 +67,21 @@ class Plain(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+class Itself:
+    """An object as a key that equals itself alone, and keeps it."""
+
+    __slots__ = ("object",)
+
+    def __init__(self, of: Any) -> None:
+        self.object = of
+
+    def __hash__(self) -> int:
+        return id(self.object)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Itself) and other.object is self.object
+
+
 def canonical(content: Any) -> bytes:
     """The one text of plain data: JSON, its keys sorted."""
     return json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
