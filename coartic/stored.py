@@ -42,14 +42,14 @@ def _json(most: int) -> AfterValidator:
 
 
 def _is_whole(meter: Any) -> Any:
-    missing = isinstance(meter, dict) and Meter().as_dict().keys() - meter.keys()
+    missing = isinstance(meter, dict) and vars(Meter()).keys() - meter.keys()
     if missing:
         raise ValueError(f"lacks {', '.join(sorted(missing))}")
     return meter
 
 
 def _counts(meter: Meter) -> Meter:
-    for name, value in meter.as_dict().items():
+    for name, value in vars(meter).items():
         if not 0 <= value <= LARGEST_COUNT:
             raise ValueError(f"{name} is {value}; it must be 0 to {LARGEST_COUNT}")
     return meter
