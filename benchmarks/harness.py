@@ -13,12 +13,12 @@ from benchmarks.executors import Answer, Executor
 from benchmarks.provenance import surroundings
 from benchmarks.specification import RunSpec
 from benchmarks.store import Damage, Store
-from coartic import CoarticError, Movement
+from coartic import CoarticError
 from coartic.errors import IncompleteError
 from coartic.inputs import problems_inline
 from coartic.method import Information
 from coartic.record import SEARCH, Environment, Record, Status, Timing
-from coartic.scores import MOST_MOVEMENTS, PlainMovement, Solved, solved
+from coartic.scores import MOST_MOVEMENTS, PlainMovement, Solved, scored
 from coartic.stored import Plain, Reward, Spent, Values
 from coartic.text import counted, plain
 
@@ -235,16 +235,16 @@ def _scores(spec: RunSpec, outcome: Outcome) -> dict[str, Solved]:
     if outcome.status != "ok":
         return {}
     return {
-        name: _solved(spec, [row.movement() for row in movements])
+        name: _solved(spec, movements)
         for name in ("solution", "initial", "replay")
         if (movements := getattr(outcome, name)) or name == "solution"
     }
 
 
-def _solved(spec: RunSpec, movements: Sequence[Movement]) -> Solved:
+def _solved(spec: RunSpec, movements: tuple[PlainMovement, ...]) -> Solved:
     """A solution's score. What is stored of it is executed again before any table is written."""
     try:
-        return solved(spec.task, movements, spec.model)
+        return scored(spec.task, movements, spec.model)
     except IncompleteError as error:
         raise _UnsolvedError("infeasible", str(error)) from None
     except (CoarticError, TypeError, ValueError, OverflowError) as error:

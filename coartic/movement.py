@@ -317,10 +317,9 @@ def configuration(robot: Robot, q: Any) -> Array:
     array = np.array(q, dtype=np.float64)
     if array.shape != (robot.dof,):
         raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
-    if not np.isfinite(array).all():
-        raise ValueError(f"configuration {array.tolist()} is not finite")
-    if np.abs(array).max() > LARGEST:
-        raise ValueError(f"configuration {array.tolist()} has a figure beyond {LARGEST:g}")
+    if not (np.abs(array) <= LARGEST).all():
+        what = f"has a figure beyond {LARGEST:g}" if np.isfinite(array).all() else "is not finite"
+        raise ValueError(f"configuration {array.tolist()} {what}")
     return array
 
 

@@ -9,7 +9,6 @@ what is stored.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import Annotated, Any, Literal
@@ -22,11 +21,12 @@ from coartic.errors import CoarticError
 from coartic.learning import METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
-from coartic.scores import PlainMovement, Solved, solved
+from coartic.scores import Solved, scored
 from coartic.solution import Movement
 from coartic.stored import (
     Amount,
     Count,
+    Itself,
     Plain,
     Reason,
     Reward,
@@ -180,11 +180,7 @@ class Record(Common, Own):
     @property
     def task(self) -> Task:
         """The task as it was run. Raises TaskError where it cannot be one."""
-        return _parsed(self._task_text)
-
-    @property
-    def _task_text(self) -> str:
-        return json.dumps(self.specification.task)
+        return _parsed(Itself(self.specification.task))
 
     @property
     def model(self) -> MotionModel:
@@ -226,7 +222,7 @@ class Record(Common, Own):
             if stored is None:
                 continue
             try:
-                again = _executed(self._task_text, stored.movements, self.model)
+                again = scored(self.task, stored.movements, self.model)
             except (CoarticError, ValueError, TypeError) as error:
                 raise RecordError(
                     f"run {self.run_id}: its {name} cannot be executed: {error}"
@@ -306,15 +302,10 @@ def _trials(record: Record) -> tuple[list[int], int]:
     return known, len(record.rewards) - len(known)
 
 
-@lru_cache(maxsize=512)
-def _parsed(text: str) -> Task:
-    return parse_task(json.loads(text), "a record")
-
-
-@lru_cache(maxsize=512)
-def _executed(task: str, movements: tuple[PlainMovement, ...], model: MotionModel) -> Solved:
-    """Once for runs that begin alike, and for a folder that is read again."""
-    return solved(_parsed(task), [row.movement() for row in movements], model)
+@lru_cache(maxsize=64)
+def _parsed(content: Itself) -> Task:
+    """Once for the records of a pack."""
+    return parse_task(content.object, "a record")
 
 
 def run_seeds(root: int, task: str, count: int) -> list[int]:

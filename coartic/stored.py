@@ -42,14 +42,14 @@ def _json(most: int) -> AfterValidator:
 
 
 def _is_whole(meter: Any) -> Any:
-    missing = isinstance(meter, dict) and Meter().as_dict().keys() - meter.keys()
+    missing = isinstance(meter, dict) and vars(Meter()).keys() - meter.keys()
     if missing:
         raise ValueError(f"lacks {', '.join(sorted(missing))}")
     return meter
 
 
 def _counts(meter: Meter) -> Meter:
-    for name, value in meter.as_dict().items():
+    for name, value in vars(meter).items():
         if not 0 <= value <= LARGEST_COUNT:
             raise ValueError(f"{name} is {value}; it must be 0 to {LARGEST_COUNT}")
     return meter
@@ -65,6 +65,21 @@ class Plain(BaseModel):
     """Base of what is stored: typed strictly, immutable, nothing else allowed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Itself:
+    """An object as a key that equals itself alone, and keeps it."""
+
+    __slots__ = ("object",)
+
+    def __init__(self, of: Any) -> None:
+        self.object = of
+
+    def __hash__(self) -> int:
+        return id(self.object)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Itself) and other.object is self.object
 
 
 def canonical(content: Any) -> bytes:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from functools import lru_cache, partial
 from typing import Annotated, Any, Literal
 
@@ -310,7 +309,7 @@ def _run_row(suite: str, cell: PlannedCell, record: Record) -> dict[str, Any]:
         "initial_reward": initial and initial.reward,
         "initial_hands": initial and initial.hands,
         "best_trial": _best_trial(record),
-        **(asdict(record.meter) if record.meter else dict.fromkeys(asdict(Meter()))),
+        **(vars(record.meter) if record.meter else dict.fromkeys(vars(Meter()))),
         "solution_corrections": solution and solution.corrections,
         "other_arm_travel": solution and solution.other_arm_travel,
         "proven_bound": record.bound,

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from analysis.comparisons.methods import STILL, solve_times
-from analysis.results.folder import CellRuns, Results
+from analysis.results.folder import CellRuns
 from analysis.results.optima import ARMS, locks_base
 from coartic.robot import Array
 
@@ -82,7 +81,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that
     makes fewer, or has no budget, ended by itself.
     """
-    trials_of = _rewards_by_run(study.results)
+    trials_of = dict(study.results.rewards())
     limit = study.results.manifest.limits.trials or math.inf
     found = {}
     for cell in study.cells.values():
@@ -147,14 +146,3 @@ def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) 
     spent = {name: total[name] * share for name in SPENDS}
     spent |= {"trials": number, "movement_ticks": np.cumsum(ticks)[steps]}
     return BestSoFar(best[steps], spent, total, True, stopped)
-
-
-def _rewards_by_run(results: Results) -> dict[str, Array]:
-    """Reward of every trial by run id; the rows come run by run, trial by trial."""
-    learning = results.learning()
-    codes, run_ids = pd.factorize(learning.run_id)
-    rewards = learning.reward.to_numpy(dtype=np.float64, na_value=np.nan)
-    if not len(codes):
-        return {}
-    by_run = np.split(rewards, np.flatnonzero(np.diff(codes)) + 1)
-    return dict(zip(map(str, run_ids), by_run, strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 import pandas as pd
@@ -30,15 +30,18 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
     By default the learner's conditions, hill climbing and CMA-ES. Raises CoarticError where
     there is nothing to draw.
     """
-    learning = study.results.learning()
-    by_run = {str(run): rows for run, rows in learning.groupby("run_id", sort=False)}
-    parts = [
-        _curves(study, name, label, by_run)
+    lengths = {run: len(rewards) for run, rewards in study.results.rewards()}
+    found = [
+        _Curves(name, label, runs, min(lengths[run] for run in runs))
         for name in study.tasks
         for label in (methods or _default(study, name))
-        if has(study, name, label)
+        if has(study, name, label) and (runs := _learning(study, name, label, lengths))
     ]
-    parts = [part for part in parts if len(part)]
+    of_run = {run: curves for curves in found for run in curves.runs}
+    for run, rewards in study.results.rewards():
+        if run in of_run:
+            of_run[run].add(rewards)
+    parts = [curves.table() for curves in found]
     if not parts:
         raise missing(study, f"no run of {', '.join(methods or _DEFAULT)} that learns by trial")
     data = pd.concat(parts, ignore_index=True)
@@ -68,39 +71,51 @@ def _default(study: Study, task: str) -> list[str]:
     return others if two else labels
 
 
-def _curves(study: Study, task: str, label: str, by_run: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Both curves of a method at chosen trials; empty where it does not learn by trial."""
-    ids = [str(run) for run in study.cells[task, label].good.run_id if str(run) in by_run]
-    if not ids:
-        return pd.DataFrame()
-    runs = [by_run[run].reward.to_numpy(dtype=np.float64, na_value=np.nan) for run in ids]
-    length = min(map(len, runs))
-    rewards = np.array([run[:length] for run in runs])
-    at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
-    # Until every run has a solution (NaN before) there is no mean of them.
-    best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
-    low, high = np.quantile(best, [0.25, 0.75], axis=0)
-    return pd.DataFrame(
-        {
-            "task": task,
-            "method": label,
-            "runs": len(ids),
-            "trial": at,
-            "best": best.mean(axis=0),
-            "best_low": low,
-            "best_high": high,
-            "trials": _running(rewards)[at - 1],
-        }
-    )
+def _learning(study: Study, task: str, label: str, lengths: Container[str]) -> list[str]:
+    """Ids of the runs of a method that learn by trial."""
+    return [str(run) for run in study.cells[task, label].good.run_id if str(run) in lengths]
 
 
-def _running(rewards: Array) -> Array:
-    """Mean of the last trials of all runs: (runs, n) to (n,), NaN where none."""
-    sums, counts = (
-        pd.Series(values.sum(axis=0)).rolling(WINDOW, min_periods=1).sum()
-        for values in (np.nan_to_num(rewards), ~np.isnan(rewards))
-    )
-    return (sums / counts).to_numpy()
+class _Curves:
+    """Both curves of a method at chosen trials, made run by run."""
+
+    def __init__(self, task: str, label: str, runs: Sequence[str], length: int) -> None:
+        self.task, self.label, self.runs = task, label, runs
+        self._at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
+        self._best: list[Array] = []
+        self._sums, self._counts = np.zeros(length), np.zeros(length)
+
+    def add(self, rewards: Array) -> None:
+        """One more run, by the reward of each of its trials."""
+        rewards = rewards[: len(self._sums)]
+        # Until every run has a solution (NaN before) there is no mean of them.
+        self._best.append(np.fmax.accumulate(rewards)[self._at - 1])
+        self._sums += np.nan_to_num(rewards)
+        self._counts += ~np.isnan(rewards)
+
+    def table(self) -> pd.DataFrame:
+        """A row for each of the trials."""
+        low, high = np.quantile(self._best, [0.25, 0.75], axis=0)
+        return pd.DataFrame(
+            {
+                "task": self.task,
+                "method": self.label,
+                "runs": len(self.runs),
+                "trial": self._at,
+                "best": np.mean(self._best, axis=0),
+                "best_low": low,
+                "best_high": high,
+                "trials": self._running()[self._at - 1],
+            }
+        )
+
+    def _running(self) -> Array:
+        """Mean of the last trials of all runs, (n,), NaN where none."""
+        sums, counts = (
+            pd.Series(values).rolling(WINDOW, min_periods=1).sum()
+            for values in (self._sums, self._counts)
+        )
+        return (sums / counts).to_numpy()
 
 
 def _panel(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 
 from analysis.results.laws import check_tables, read_manifest
 from coartic import CoarticError, Task, parse_task
@@ -85,8 +87,18 @@ class Results:
         return pd.read_parquet(self.folder / "paths.parquet")
 
     def learning(self) -> pd.DataFrame:
-        """Reward of every trial."""
+        """Reward of every trial, all at once; :meth:`rewards` needs memory for some runs only."""
         return read_table(self.folder, "learning")
+
+    def rewards(self) -> Iterator[tuple[str, Array]]:
+        """Runs that made trials, each with the reward of every trial, NaN where it failed."""
+        with pq.ParquetFile(self.folder / "learning.parquet") as file:
+            for group in range(file.num_row_groups):  # a run is in one of them
+                table = file.read_row_group(group)
+                codes, runs = pd.factorize(table["run_id"].to_pandas())
+                rewards = table["reward"].cast("float64").to_numpy()
+                ends = np.flatnonzero(np.diff(codes)) + 1
+                yield from zip(map(str, runs), np.split(rewards, ends), strict=False)  # maybe none
 
 
 def load_results(folder: Path) -> Results:
