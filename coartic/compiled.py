@@ -19,11 +19,16 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
+from llvmlite import binding
 from numba import njit, typeof, types
 from numba.extending import typeof_impl
 
 from coartic.robot import chain, lever
 from coartic.trigonometry import cosine, sine
+
+# Loops over the links of an arm are unrolled, or the loop over lanes around them could not be
+# made of vector instructions: LLVM's own bound ends that at four links.
+binding.set_option("coartic", "-unroll-threshold=3000")
 
 PACKAGE = Path(__file__).parent
 F = TypeVar("F", bound=Callable[..., Any])

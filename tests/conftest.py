@@ -65,6 +65,14 @@ def in_this_process(monkeypatch):
     monkeypatch.setattr(benchmarks.reproduce, "supervise", performed)
 
 
+@pytest.fixture
+def one_by_one(monkeypatch):
+    """Runs that are performed each by a job of its own, whatever their method would have."""
+    from benchmarks.registry import Entry
+
+    monkeypatch.setattr(Entry, "most_together", lambda entry, parameters: 1)
+
+
 @pytest.fixture(scope="session")
 def traced(session_folder):
     """A results folder that nobody writes into: the paper's cells beside other methods.

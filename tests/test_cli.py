@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
 from analysis.report import analyses
 from benchmarks import conformance, executors
@@ -166,6 +167,7 @@ def test_crashed_runs_make_the_exit_code(monkeypatch, capsys, tmp_path):
     assert "2 failed" in text
 
 
+@pytest.mark.usefixtures("one_by_one")
 def test_an_interrupt_that_gets_lost_is_raised_again(monkeypatch, capsys, tmp_path):
     """What a signal raises in a destructor, Python drops; the run that was done is kept."""
 

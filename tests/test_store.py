@@ -28,6 +28,7 @@ from tests.support.packs import (
 from tests.support.suites import InProcess, paper_cells, perform_plan
 
 ROOT = Path(__file__).parent.parent
+pytestmark = pytest.mark.usefixtures("one_by_one")
 
 
 def specs(runs=3, **options):

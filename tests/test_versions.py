@@ -168,6 +168,7 @@ def test_one_run_that_differs_has_no_interval(first):
     assert np.isnan(row.p)
 
 
+@pytest.mark.usefixtures("one_by_one")
 def test_failures_are_counted_and_nothing_compared(first, tmp_path):
     cells = CELLS[:1]
     failing = made(tmp_path / "b", cells, executor=Failing(1))
@@ -204,6 +205,7 @@ def test_tasks_of_one_name_and_other_content(first):
     assert found(first, planted(first, edit_manifest=rename)).verdict == "identical"
 
 
+@pytest.mark.usefixtures("one_by_one")
 def test_other_code_is_said_and_never_mixed(first, tmp_path):
     """Runs of another version: their records and ids say so, or the folder is refused."""
     learned = replace(CELLS[0], entry=replace(CELLS[0].entry, code="c0ffeec0ffee"))
