@@ -28,7 +28,7 @@ from coartic.trigonometry import cosine, sine
 
 # Loops over the links of an arm are unrolled, or the loop over lanes around them could not be
 # made of vector instructions: LLVM's own bound ends that at four links.
-binding.set_option("coartic", "-unroll-threshold=3000")
+binding.set_option("coartic", "-unroll-threshold=1000")
 
 PACKAGE = Path(__file__).parent
 F = TypeVar("F", bound=Callable[..., Any])

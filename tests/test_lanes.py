@@ -1,0 +1,185 @@
+"""Runs side by side: each comes out as it does alone."""
+
+import json
+
+import numpy as np
+import numpy.testing as npt
+import pytest
+from llvmlite import binding
+from numba import njit
+
+from benchmarks.harness import perform_missing
+from benchmarks.sandbox import failure
+from benchmarks.store import Store
+from benchmarks.suites import run_specs
+from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
+from coartic.corrective import Corrector, correct_lanes
+from coartic.lanes import LANES, board, ends_of, lanes_for, place
+from coartic.movement import Goal
+from coartic.trigonometry import LARGEST
+from tests.support.strategies import UNEVEN
+from tests.support.suites import InProcess, paper_cells
+
+SOON_FAILED = MotionModel(max_iterations=60)
+
+
+def shown(movements):
+    return [(m.goal, m.hand, m.kind, m.ticks, tuple(m.target)) for m in movements]
+
+
+def assert_same(a, b):
+    assert a.seed == b.seed
+    assert a.counters == b.counters
+    assert a.best_trial == b.best_trial
+    assert a.replay_completed == b.replay_completed
+    npt.assert_array_equal(a.rewards.data, b.rewards.data)
+    for name in ("completed", "values", "targets"):
+        npt.assert_array_equal(getattr(a, name), getattr(b, name))
+    for name in ("initial", "solution", "replay"):
+        assert shown(getattr(a, name)) == shown(getattr(b, name))
+
+
+@pytest.mark.parametrize(
+    ("task", "condition", "model"),
+    [
+        ("two-armed-1", "EC4", PAPER),
+        ("two-armed-1", "EC4", SOON_FAILED),
+        ("two-armed-2", "EC2", PAPER),
+        ("two-armed-1", "EC4-nullspace", PAPER),
+        ("two-armed-2", "EC4-biased", SOON_FAILED),
+        ("ascending", "EC1-uncorrected", PAPER),
+    ],
+)
+def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
+    task = load_task(task)
+    seeds = [*range(LANES), 17, *range(LANES, LANES + 3)]  # more than there are lanes, one twice
+    for trials in (1, 25):
+        options = {"trials": trials, "model": model}
+        together = learn_many(task, condition, seeds=seeds, jobs=1, **options)
+        assert [run.seed for run in together] == seeds
+        some = learn_many(task, condition, seeds=seeds[::-7], jobs=2, **options)
+        for run, same in zip(together[::-7], some, strict=True):
+            assert_same(run, same)
+        for run in together[5 :: LANES // 3]:
+            assert_same(run, learn(task, condition, seed=run.seed, **options))
+    if model is SOON_FAILED:
+        assert any(run.counters.failed_trials for run in together)
+
+
+@pytest.mark.parametrize("count", [1, 2, 9, LANES])
+@pytest.mark.parametrize("far", [False, True])
+def test_lanes_do_not_mix(count, far):
+    """Arms of either hand side by side, also where one of them has turned too far."""
+    robot, rng = UNEVEN, np.random.default_rng(count)
+    starts = rng.normal(0, 0.5, (count, robot.dof))
+    starts[-1, robot.joints("left")] += LARGEST if far else 0.0
+    arms = [robot.arm("left" if k % 2 or far else "right") for k in range(count)]
+
+    def placed(chosen):
+        lanes = lanes_for(robot)
+        for lane, number in enumerate(chosen):
+            board(lanes, lane, number, starts[number], arms[number])
+        place(lanes.at, len(chosen))
+        return lanes.at["x"][:, : len(chosen)].copy(), lanes.at["y"][:, : len(chosen)].copy()
+
+    xs, ys = placed(range(count))
+    for number, arm in enumerate(arms):
+        (x,), (y,) = (found.T for found in placed([number]))
+        npt.assert_array_equal(xs[:, number], x)
+        npt.assert_array_equal(ys[:, number], y)
+        hand = "left" if arm.first == robot.arm("left").first else "right"
+        expected = robot.forward_kinematics(starts[number], hand)
+        npt.assert_allclose((xs[-1, number], ys[-1, number]), expected, atol=1e-9)
+
+
+@njit
+def _correct_some(lanes, count, goal, how, model, found, ends):
+    correct_lanes(lanes, count, goal, how, model, found, ends)
+
+
+def vectors():
+    """The widest registers with doubles that this machine has, as the listing names them."""
+    has = binding.get_host_cpu_features()
+    for feature, register in (("avx512f", "zmm"), ("avx", "ymm"), ("sse2", "xmm")):
+        if has.get(feature):
+            return ("ymm", "zmm") if register == "zmm" else (register,)
+    return ()
+
+
+@pytest.mark.skipif(not vectors(), reason="no vector instructions that this test knows")
+def test_the_listing_holds_vector_instructions():
+    robot, task = Robot(left_links=(0.5,) * 8, right_links=(0.5,) * 8), load_task("ascending")
+    lanes, ends, found = lanes_for(robot), ends_of(2), np.zeros((2, robot.dof))
+    for lane in range(2):
+        board(lanes, lane, lane, found[lane] + 0.1, robot.arm("right"))
+    goal = Goal(*task.goal_array[0], task.radius)
+    _correct_some(lanes, 2, goal, Corrector(True, True, 0.0), PAPER, found, ends)
+    assert ends.converged.all()
+    assert on_vectors("mulpd") > 2 * 15 * 8  # two series a link
+    assert on_vectors("sqrtpd") >= 1  # of the error, with the rest of its loop
+
+
+def on_vectors(instruction):
+    listing = _correct_some.inspect_asm(_correct_some.signatures[-1])
+    found = [line.split() for line in listing.splitlines() if any(v in line for v in vectors())]
+    return sum(words[0].endswith(instruction) for words in found)
+
+
+class Nobody(InProcess):
+    """An executor whose processes end wherever runs are performed side by side."""
+
+    def __init__(self):
+        self.sizes = []
+
+    def perform(self, jobs):
+        for job in jobs:
+            self.sizes.append(len(job["seeds"]))
+            if len(job["seeds"]) > 1:
+                yield failure(job["run_id"], "crashed", "exit code 9", 1.0)
+            else:
+                yield from super().perform([job])
+
+
+def results(store):
+    packs = store.packs()
+    return {run_id: (packs[run_id].result(), packs[run_id].rewards) for run_id in packs}
+
+
+def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
+    cells = paper_cells(
+        tasks=["ascending"], methods=["dual-process/EC1", "corrective-alone/given"]
+    )
+    planned = [spec for _, spec in run_specs(cells, runs=LANES + 2, seed=0, trials=3)]
+    found = []
+    for number, executor in enumerate((InProcess(), Nobody())):
+        store = Store(tmp_path / str(number))
+        with store.locked():
+            progress = perform_missing(planned, store, executor)
+        assert (progress.done, progress.failed) == (len(planned), 0)
+        found.append(store)
+    assert results(found[0]) == results(found[1])
+    assert sorted(executor.sizes) == [1] * (LANES + 3) + [2, LANES]
+    beside = {record.timing.together for record in map(found[0].read, found[0].packs())}
+    assert beside == {1, 2, LANES}
+    assert {found[1].read(run_id).timing.together for run_id in found[1].packs()} == {1}
+
+
+def test_side_by_side_has_the_time_of_all(tmp_path):
+    (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
+    planned = [spec for _, spec in run_specs([cell], runs=4, seed=0, trials=3)]
+    job = planned[0].setting.job(planned)
+    assert job["run_id"] == planned[0].run_id
+    assert job["seeds"] == [spec.seed for spec in planned]
+    assert json.loads(json.dumps(job)) == job
+    alone = planned[0].job()["time_limit_s"]
+    assert job["time_limit_s"] == (None if alone is None else 4 * alone)
+
+
+def test_long_runs_are_fewer_side_by_side():
+    entry = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])[0].entry
+    assert [entry.most_together({"trials": n}) for n in (10, 10_000, 1_000_000, 10**7)] == [
+        LANES,
+        LANES,
+        4,
+        1,
+    ]
