@@ -84,6 +84,7 @@ class _Killer:
         self.pids: set[int] = set()
         self._time_of(base / "cold")  # compiles, which is not to count as the suite's length
         self.span = self._time_of(self.whole)
+        (self.whole / "manifest.json").unlink()
         self.tables_span = self._time_of(self.whole)
         self.files = len([path for path in self.whole.iterdir() if path.is_file()])
         self.total = len(pd.read_parquet(self.whole / "runs.parquet"))
@@ -98,6 +99,7 @@ class _Killer:
         while counts.kills < self.kills:
             folder = self.base / f"folder-{counts.folders}"
             self._until_completed(folder, 0.0, self.span)
+            (folder / "manifest.json").unlink()  # or there is nothing to do
             self._until_completed(folder, self.tables_span / 2, self.tables_span)
             counts.folders += 1
             counts.differing += not _same(self.whole, folder, self.total)

@@ -17,7 +17,15 @@ from benchmarks.harness import Progress, Watcher, perform_missing
 from benchmarks.registry import registry
 from benchmarks.specification import Limits, RunSpec
 from benchmarks.store import Store
-from benchmarks.suites import Cell, Suite, load_suite, manifest_of, run_specs, select_cells
+from benchmarks.suites import (
+    Cell,
+    CellPlan,
+    Suite,
+    cell_plans,
+    load_suite,
+    manifest_of,
+    select_cells,
+)
 from benchmarks.tables import OWNER, PAGES, check_results_folder, is_done, statuses, write_tables
 from coartic import CoarticError
 from coartic.files import folder_named, publish
@@ -66,13 +74,16 @@ class RunReport:
     progress: Progress
     wall_s: float
     """Seconds from the first run to the last."""
-    run_ids: Sequence[str]
-    """Of all runs of the plan, in its order."""
+    manifest: Manifest
+    """What was asked for."""
 
     @property
     def records(self) -> Mapping[str, Record]:
         """The records of the plan by run id, in its order, each read when it is asked for."""
-        return Packs(self.folder).only(self.run_ids)
+        cells = self.manifest.specification.cells
+        return Packs(self.folder).only(
+            id_ for cell in cells for id_ in self.manifest.run_ids(cell)
+        )
 
     @property
     def crashed(self) -> int:
@@ -92,10 +103,15 @@ class SuitePlan:
     """Every run of a suite, ready to be performed into a folder (:func:`plan_suite`)."""
 
     suite: Suite
-    planned: Sequence[tuple[Cell, RunSpec]] = field(repr=False)
+    cells: Sequence[CellPlan] = field(repr=False)
     runs: int
     seed: int
     limits: Limits
+
+    @property
+    def planned(self) -> list[tuple[Cell, RunSpec]]:
+        """Every run, in order."""
+        return [(plan.cell, spec) for plan in self.cells for spec in plan.specs()]
 
     def perform(
         self,
@@ -123,17 +139,18 @@ class SuitePlan:
         folder = folder_named(folder)
         manifest, clock = self._manifest(), time.perf_counter()
         check_results_folder(folder)
-        store, run_ids = Store(folder), [spec.run_id for _, spec in self.planned]
+        store = Store(folder)
         with store.locked():
             watch = watch or (lambda progress, spec: None)
             names = () if pages is None else PAGES
             if not (retry_failed or redo) and is_done(store, manifest, names):
-                progress = Progress(len(self.planned), present=len(self.planned))
-                progress.failed = len(self.planned) - statuses(folder)["ok"]
+                total = sum(cell.runs for cell in self.cells)
+                failed = total - statuses(folder)["ok"]
+                progress = Progress(total, present=total, failed=failed)
                 watch(progress, None)
-                return RunReport(folder, progress, time.perf_counter() - clock, run_ids)
+                return RunReport(folder, progress, time.perf_counter() - clock, manifest)
             progress = perform_missing(
-                [spec for _, spec in self.planned],
+                [spec for cell in self.cells for spec in cell.specs()],
                 store,
                 executor or Local(),
                 retry_failed=retry_failed,
@@ -145,10 +162,10 @@ class SuitePlan:
             write_tables(store, manifest)
             if pages is not None:
                 publish(folder, pages(folder), owner=OWNER, alone=False)
-        return RunReport(folder, progress, wall_s, run_ids)
+        return RunReport(folder, progress, wall_s, manifest)
 
     def _manifest(self) -> Manifest:
-        return manifest_of(self.suite, self.runs, self.seed, self.planned, self.limits)
+        return manifest_of(self.suite, self.runs, self.seed, self.cells, self.limits)
 
 
 def run_suite(
@@ -225,5 +242,5 @@ def plan_cells(
         raise CoarticError(
             f"limits.time_s is {limits.time_s:g}; it must be above 0, at most {MOST_SECONDS:_}"
         )
-    planned = run_specs(cells, runs=runs, seed=seed, trials=trials, limits=limits)
-    return SuitePlan(suite, planned, runs, seed, limits)
+    plans = cell_plans(cells, runs=runs, seed=seed, trials=trials, limits=limits)
+    return SuitePlan(suite, plans, runs, seed, limits)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -353,6 +353,21 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
     return list(found.values())
 
 
+@dataclass(frozen=True)
+class CellPlan:
+    """A cell and the runs that are asked for of it, which are made when they are needed."""
+
+    cell: Cell
+    setting: Setting
+    runs: int
+    seed: int
+    """The suite's."""
+
+    def specs(self) -> Iterator[RunSpec]:
+        """The runs in order."""
+        return self.setting.specs(run_seeds(self.seed, self.cell.task.name, self.runs))
+
+
 def run_specs(
     cells: Sequence[Cell],
     *,
@@ -361,7 +376,20 @@ def run_specs(
     trials: int | None = None,
     limits: Limits = UNLIMITED,
 ) -> list[tuple[Cell, RunSpec]]:
-    """Every run of every cell, in order. ``trials`` goes to methods that have it.
+    """Every run of every cell, in order (:func:`cell_plans`)."""
+    plans = cell_plans(cells, runs=runs, seed=seed, trials=trials, limits=limits)
+    return [(plan.cell, spec) for plan in plans for spec in plan.specs()]
+
+
+def cell_plans(
+    cells: Sequence[Cell],
+    *,
+    runs: int,
+    seed: int,
+    trials: int | None = None,
+    limits: Limits = UNLIMITED,
+) -> list[CellPlan]:
+    """What is asked for of every cell. ``trials`` goes to methods that have it.
 
     Raises CoarticError for wrong parameters, for more than :data:`MOST_PLANNED` runs or
     :data:`MOST_TRIALS` trials, and where two cells ask for the same runs.
@@ -372,7 +400,7 @@ def run_specs(
             f"{count:_} runs are planned ({len(cells)} cells, {runs:_} runs of each that is "
             f"stochastic); at most {MOST_PLANNED:_} can be run at once"
         )
-    planned = []
+    plans = []
     names: dict[str, Cell] = {}
     for cell in cells:
         parameters = dict(cell.parameters)
@@ -386,15 +414,15 @@ def run_specs(
                 f"at most {MOST_TRIALS:_} are kept"
             )
         setting = Setting(cell.task, cell.entry, tuple(parameters.items()), limits)
-        count = runs if cell.stochastic else 1
-        for spec in setting.specs(run_seeds(seed, cell.task.name, count)):
-            if spec.run == 0 and (first := names.setdefault(spec.run_id, cell)) is not cell:
-                raise CoarticError(
-                    f"{first.label!r} and {cell.label!r} on task {cell.task.name!r} are the "
-                    "same runs; leave one of them out"
-                )
-            planned.append((cell, spec))
-    return planned
+        plan = CellPlan(cell, setting, runs if cell.stochastic else 1, seed)
+        first = names.setdefault(next(plan.specs()).run_id, cell)
+        if first is not cell:
+            raise CoarticError(
+                f"{first.label!r} and {cell.label!r} on task {cell.task.name!r} are the "
+                "same runs; leave one of them out"
+            )
+        plans.append(plan)
+    return plans
 
 
 def _block_cells(
@@ -468,15 +496,11 @@ def _exact(value: float) -> str:
 
 
 def manifest_of(
-    suite: Suite,
-    runs: int,
-    seed: int,
-    planned: Sequence[tuple[Cell, RunSpec]],
-    limits: Limits = UNLIMITED,
+    suite: Suite, runs: int, seed: int, plans: Sequence[CellPlan], limits: Limits = UNLIMITED
 ) -> Manifest:
     """What is asked for, and with what it is made."""
     return Manifest(
-        specification=_plan(suite, runs, seed, planned),
+        specification=_plan(suite, runs, seed, plans),
         limits=PlanLimits(time_s=limits.time_s, trials=limits.trials),
         environment=surroundings(),
         records="",  # until they are written
@@ -484,9 +508,8 @@ def manifest_of(
     )
 
 
-def _plan(suite: Suite, runs: int, seed: int, planned: Sequence[tuple[Cell, RunSpec]]) -> Plan:
-    settings = {(cell.task.name, cell.label): (cell, spec.setting) for cell, spec in planned}
-    complete = [(cell, setting.all_parameters) for cell, setting in settings.values()]
+def _plan(suite: Suite, runs: int, seed: int, plans: Sequence[CellPlan]) -> Plan:
+    complete = [(plan.cell, plan.setting.all_parameters) for plan in plans]
     return Plan(
         suite=suite.name,
         runs=runs,

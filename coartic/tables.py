@@ -11,8 +11,8 @@ compare, so a table never says anything that its records do not.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache, partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -108,8 +108,8 @@ LEARNING = pa.schema(
         ("reward", pa.int32()),
     ]
 )
-GROUP_RUNS, GROUP_TRIALS = 5_000, 1_000_000
-"""Most runs, and trials of more than one run, in a row group of the tables."""
+GROUP_RUNS, GROUP_TRIALS, GROUP_WAYPOINTS = 5_000, 1_000_000, 50_000
+"""At so many runs, trials or waypoints a row group of the tables ends; a run is in one of them."""
 
 TABLES = ("runs", "solutions", "paths", "learning", "sequences")
 """Names of the tables."""
@@ -244,36 +244,52 @@ def schemas(plan: Plan) -> dict[str, pa.Schema]:
 def row_groups(plan: Plan, runs: Iterable[Planned]) -> Iterator[tuple[str, pa.Table]]:
     """The tables' row groups, none of them empty, by name, each table's in order.
 
-    ``runs`` are those of the plan in its order, and are held :data:`GROUP_RUNS` and
-    :data:`GROUP_TRIALS` at a time.
+    ``runs`` are those of the plan in its order; each is let go before the next is taken.
     """
     columns = schemas(plan)
-    makers: dict[str, Callable[[Sequence[Planned]], pa.Table]] = {
-        "runs": partial(_runs_table, plan.suite),
-        "solutions": partial(_table, _solution_rows, columns["solutions"]),
-        "paths": partial(_table, _path_rows, columns["paths"]),
-        "learning": _learning_table,
-    }
-    for group in _groups(runs):
-        for name, make in makers.items():
-            if len(table := make(group)):
-                yield name, table
+    group = _Group(plan.suite, columns)
+    for cell, record in runs:
+        if group.is_full_with(record):
+            yield from group.tables()
+            group = _Group(plan.suite, columns)
+        group.add(cell, record)
+    yield from group.tables()
     sequences = [row for task in plan.tasks.values() for row in _sequence_rows(json.dumps(task))]
     if sequences:
         yield "sequences", pa.Table.from_pylist(sequences, schema=SEQUENCES)
 
 
-def _groups(runs: Iterable[Planned]) -> Iterator[list[Planned]]:
-    group: list[Planned] = []
-    trials = 0
-    for cell, record in runs:
-        trials += len(record.rewards)
-        if group and (len(group) == GROUP_RUNS or trials > GROUP_TRIALS):
-            yield group
-            group, trials = [], len(record.rewards)
-        group.append((cell, record))
-    if group:
-        yield group
+class _Group:
+    """Rows of some runs, on their way into tables."""
+
+    def __init__(self, suite: str, columns: Mapping[str, pa.Schema]) -> None:
+        self._suite, self._columns = suite, columns
+        self._rows: dict[str, list[dict[str, Any]]] = {"runs": [], "solutions": [], "paths": []}
+        self._rewards: dict[str, pa.Array] = {}
+        self._trials = 0
+
+    def is_full_with(self, record: Record) -> bool:
+        """Whether one more run is too much; any run is good as the first."""
+        rows, trials = self._rows, self._trials + len(record.rewards)
+        full = len(rows["runs"]) == GROUP_RUNS or len(rows["paths"]) >= GROUP_WAYPOINTS
+        return full or (bool(self._trials) and trials > GROUP_TRIALS)
+
+    def add(self, cell: PlannedCell, record: Record) -> None:
+        """One more run."""
+        self._rows["runs"].append(_run_row(self._suite, cell, record))
+        self._rows["solutions"] += _solution_rows(record)
+        self._rows["paths"] += _path_rows(record)
+        if record.rewards:
+            self._rewards[record.run_id] = pa.array(record.rewards, pa.int32())
+            self._trials += len(record.rewards)
+
+    def tables(self) -> Iterator[tuple[str, pa.Table]]:
+        """Those that have rows."""
+        for name, rows in self._rows.items():
+            if rows:
+                yield name, pa.Table.from_pylist(rows, schema=self._columns[name])
+        if self._rewards:
+            yield "learning", _learning_table(self._rewards)
 
 
 def parquet_options(name: str) -> dict[str, Any]:
@@ -332,18 +348,6 @@ def _best_trial(record: Record) -> int | None:
     return record.rewards.index(record.solution.reward)
 
 
-def _runs_table(suite: str, runs: Sequence[Planned]) -> pa.Table:
-    return pa.Table.from_pylist([_run_row(suite, *run) for run in runs], schema=RUNS)
-
-
-def _table(
-    rows: Callable[[Record], Iterable[dict[str, Any]]],
-    schema: pa.Schema,
-    runs: Sequence[Planned],
-) -> pa.Table:
-    return pa.Table.from_pylist([row for _, record in runs for row in rows(record)], schema=schema)
-
-
 def _solution_rows(record: Record) -> Iterator[dict[str, Any]]:
     joints = record.task.robot.joint_names
     for order, row in enumerate(_movements(record)):
@@ -380,16 +384,14 @@ def _ordered(joints: Iterable[str]) -> list[str]:
     return sorted(joints, key=key)
 
 
-def _learning_table(runs: Sequence[Planned]) -> pa.Table:
-    learning = [record for _, record in runs if record.rewards]
-    lengths = [len(record.rewards) for record in learning]
+def _learning_table(rewards: Mapping[str, pa.Array]) -> pa.Table:
+    lengths = [len(own) for own in rewards.values()]
     ids = pa.DictionaryArray.from_arrays(
-        pa.array(np.repeat(np.arange(len(learning), dtype=np.int32), lengths)),
-        pa.array([record.run_id for record in learning], pa.string()),
+        pa.array(np.repeat(np.arange(len(rewards), dtype=np.int32), lengths)),
+        pa.array(rewards.keys(), pa.string()),
     )
-    trials = np.concatenate([np.zeros(0, np.int32), *(np.arange(n) for n in lengths)])
-    rewards = pa.chunked_array([pa.array(r.rewards, pa.int32()) for r in learning], pa.int32())
-    return pa.table([ids, pa.array(trials, pa.int32()), rewards], schema=LEARNING)
+    trials = pa.array(np.concatenate([np.arange(n, dtype=np.int32) for n in lengths]))
+    return pa.table([ids, trials, pa.chunked_array(rewards.values())], schema=LEARNING)
 
 
 @lru_cache(maxsize=64)
