@@ -250,7 +250,7 @@ class _Relaxation:
         self._order = np.lexsort((rows, columns))
         self._rows = rows[self._order]
         self._ends = np.searchsorted(columns[self._order], np.arange(self._size + 1))
-        self._shape = len(fixed) + _NORMALS * links, self._size
+        self._matrix = sparse.csc_matrix((len(fixed) + _NORMALS * links, self._size))
 
     def _with_half_spaces(self, box: Array) -> tuple[sparse.csc_matrix, Array]:
         """All rows, and the right sides of the half-spaces ``A x <= b``.
@@ -268,8 +268,9 @@ class _Relaxation:
         below = np.concatenate([c, s, turn[:, self._turned]], axis=1).ravel()
         values = np.concatenate([self._fixed, below])[self._order]
         kept = values != 0.0
-        ends = np.concatenate([[0], np.cumsum(kept)])[self._ends]
-        matrix = sparse.csc_matrix((values[kept], self._rows[kept], ends), shape=self._shape)
+        matrix = self._matrix  # of the right shape, and consistent as it is laid out
+        matrix.data, matrix.indices = values[kept], self._rows[kept]
+        matrix.indptr = np.concatenate([[0], np.cumsum(kept)])[self._ends]
         return matrix, (offsets + turn * middle).ravel()
 
 
@@ -326,16 +327,17 @@ def _normals(half: Array) -> Array:
     """
     zero, one = np.zeros_like(half), np.ones_like(half)
     found = [(zero, zero, one), (zero, zero, -one), (-one, zero, zero), (one, zero, zero)]
-    for share in (0.25, 0.5, 0.75, 1.0):
-        cosine, sine = directions(np.minimum(share * half, math.pi / 2)).T
+    touched = np.minimum(np.multiply.outer([0.25, 0.5, 0.75, 1.0], half), math.pi / 2)
+    *tangents, end = directions(np.vstack([touched, np.minimum(half, math.pi)]))
+    for direction in tangents:
+        cosine, sine = direction.T
         found += [
             (zero, one, -cosine),
             (zero, -one, cosine),
             (one, zero, sine),
             (one, zero, -sine),
         ]
-    sine = directions(np.minimum(half, math.pi))[..., 1]
-    slope = sine / np.maximum(half, 1e-12)
+    slope = end[:, 1] / np.maximum(half, 1e-12)
     found += [(zero, one, -slope), (zero, -one, slope)]
     return np.array(found).swapaxes(0, 1)
 
