@@ -12,11 +12,12 @@ answer is :func:`damped_projection`, which the tests check.
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Callable
 from functools import cache
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from coartic.errors import CoarticError
 from coartic.robot import Array
@@ -50,36 +51,68 @@ class CascadeError(CoarticError):
     """A solver did not solve a level; the message says which and why."""
 
 
+class Program(NamedTuple):
+    """A quadratic program: min ½ x'Px subject to lower <= Ax <= upper.
+
+    The variables are what is to be least (the error of the hand, or of the rates) and then
+    the rates. So a problem changes only A and the bounds of its first rows, the equalities,
+    as when a modelling language states it.
+    """
+
+    hessian: Array
+    """P, diagonal, shape ``(n, n)``."""
+    rows: Array
+    """A, shape ``(m, n)``."""
+    lower: Array
+    upper: Array
+    equalities: int
+    """Rows of equalities; the others keep the rates within ``LIMIT``."""
+
+    @classmethod
+    def of(cls, errors: Array, weight: float, joints: int) -> Program:
+        """A program of ``errors`` (rows, errors), and rates with a ``weight``."""
+        equalities, size = errors.shape
+        limits = np.vstack([np.eye(joints), -np.eye(joints)])
+        rows = np.zeros((equalities + 2 * joints, size + joints))
+        rows[:equalities, :size] = errors
+        rows[equalities:, size:] = limits
+        return cls(
+            hessian=np.diag([2.0] * size + [2.0 * weight] * joints),
+            rows=rows,
+            lower=np.repeat([0.0, -np.inf], [equalities, 2 * joints]),
+            upper=np.repeat([0.0, LIMIT], [equalities, 2 * joints]),
+            equalities=equalities,
+        )
+
+    def demand(self, first: int, rates: Array, value: Array) -> None:
+        """Fill in equalities from row ``first``: what the rates add up to, less the errors."""
+        rows = slice(first, first + len(value))
+        self.rows[rows, -rates.shape[1] :] = rates
+        self.lower[rows] = self.upper[rows] = value
+
+
+class Solved(NamedTuple):
+    """What a solver says."""
+
+    optimal: bool
+    status: str
+    variables: Array
+    iterations: int
+
+
 class Cascade:
     """Both levels for robots with ``joints`` joints that may move, built once.
 
-    The programs are parametrised under cvxpy's DPP rules: each solve only fills in
-    numbers. ``iterations`` and ``solves`` count up; nothing else is kept between solves.
+    Each solve only fills in numbers. ``iterations`` and ``solves`` count up; nothing else is
+    kept between solves.
     """
 
     def __init__(self, joints: int, solver: SolverName) -> None:
-        import cvxpy as cp  # slow to import, and no other method needs it
-
         self.solver = solver
         self.iterations = self.solves = 0
-        self.solver_s = 0.0
-        """Time that the solvers themselves report, s; ProxQP reports none."""
-        self._jacobian = cp.Parameter((2, joints))
-        self._rate = cp.Parameter(2)
-        self._preferred = cp.Parameter(joints)
-        self._x = x = cp.Variable(joints)
-        limits = [x <= LIMIT, x >= -LIMIT]
-        follow = cp.sum_squares(self._jacobian @ x - self._rate)
-        self._levels = (
-            cp.Problem(cp.Minimize(follow + DAMPING**2 * cp.sum_squares(x)), limits),
-            cp.Problem(
-                cp.Minimize(cp.sum_squares(x - self._preferred)),
-                [self._jacobian @ x == self._rate, *limits],
-            ),
-        )
-        # cvxpy compiles at the first solve.
-        self.solve(np.eye(2, joints), np.zeros(2), np.zeros(joints))
-        self.iterations, self.solves, self.solver_s = 0, 0, 0.0
+        self._unit = np.eye(joints)
+        self._follow = Program.of(-np.eye(2), DAMPING**2, joints)
+        self._prefer = Program.of(-np.eye(joints + 2, joints), 0.0, joints)
 
     def solve(self, jacobian: Array, rate: Array, preferred: Array | None = None) -> Array:
         """Joint rates, shape ``(joints,)``.
@@ -88,36 +121,112 @@ class Cascade:
         ``preferred`` (joints,) rates of level 2; None leaves it out, and level 1 alone
         gives the least rates. Raises CascadeError where a solver fails.
         """
-        self._jacobian.value = jacobian
-        self._rate.value = rate
-        rates = self._solve(1)
+        self._follow.demand(0, jacobian, rate)
+        rates = self._solve(1, self._follow)
         if preferred is not None:
-            self._rate.value = jacobian @ rates  # level 1's optimum, now an equality
-            self._preferred.value = preferred
-            rates = self._solve(2)
+            self._prefer.demand(0, self._unit, preferred)
+            self._prefer.demand(len(preferred), jacobian, jacobian @ rates)  # as level 1 has it
+            rates = self._solve(2, self._prefer)
         return rates
 
-    def _solve(self, level: Literal[1, 2]) -> Array:
-        import cvxpy as cp
-
-        problem = self._levels[level - 1]
+    def _solve(self, level: Literal[1, 2], program: Program) -> Array:
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # of what the status says
-                problem.solve(
-                    solver=self.solver.upper(),
-                    warm_start=False,  # or earlier problems would leave their mark
-                    **SETTINGS[self.solver],
-                )
-        except cp.SolverError as error:
+            found = _SOLVERS[self.solver](program, SETTINGS[self.solver])
+        except ValueError as error:  # of what is no number
             raise CascadeError(f"level {level}: {self.solver} failed: {error}") from None
         self.solves += 1
-        statistics = problem.solver_stats
-        self.iterations += statistics.num_iters or 0
-        self.solver_s += statistics.solve_time or 0.0
-        if problem.status != cp.OPTIMAL:
-            raise CascadeError(f"level {level}: {self.solver} ended {problem.status}")
-        return np.array(self._x.value, dtype=np.float64)
+        self.iterations += found.iterations
+        if not found.optimal:
+            raise CascadeError(f"level {level}: {self.solver} ended {found.status}")
+        return np.array(found.variables[-len(self._unit) :], dtype=np.float64)
+
+
+def _daqp(program: Program, settings: dict[str, Any]) -> Solved:
+    import daqp
+
+    hessian, rows, lower, upper, equalities = program
+    free = np.full(len(hessian), np.inf)
+    sense = np.zeros(len(free) + len(rows), dtype=np.intc)
+    sense[len(free) : len(free) + equalities] = 5  # an equality
+    proximal = 0.0 if hessian.diagonal().all() else 1e-5  # steps, where P is singular
+    x, _, flag, info = daqp.solve(
+        hessian,
+        np.zeros(len(free)),
+        rows,
+        np.concatenate([free, upper]),
+        np.concatenate([-free, lower]),
+        sense,
+        **{"eps_prox": proximal, **settings},
+    )
+    return Solved(flag == 1, f"with exit flag {flag}", x, info["iterations"])
+
+
+def _clarabel(program: Program, settings: dict[str, Any]) -> Solved:
+    import clarabel
+
+    hessian, rows, _, upper, equalities = program
+    chosen = clarabel.DefaultSettings()
+    for name, value in {"verbose": False, **settings}.items():
+        setattr(chosen, name, value)
+    limits = len(rows) - equalities
+    solution = clarabel.DefaultSolver(
+        sparse.csc_matrix(hessian),
+        np.zeros(len(hessian)),
+        sparse.csc_matrix(rows),
+        upper,
+        [clarabel.ZeroConeT(equalities), clarabel.NonnegativeConeT(limits)],
+        chosen,
+    ).solve()
+    status = str(solution.status)
+    return Solved(status == "Solved", status, np.array(solution.x), solution.iterations)
+
+
+def _osqp(program: Program, settings: dict[str, Any]) -> Solved:
+    import osqp
+
+    hessian, rows, lower, upper, _ = program
+    solver = osqp.OSQP()
+    solver.setup(
+        sparse.csc_matrix(hessian),
+        np.zeros(len(hessian)),
+        sparse.csc_matrix(rows),
+        lower,
+        upper,
+        **{"verbose": False, "polishing": True, **settings},
+    )
+    found = solver.solve(raise_error=False)
+    optimal = found.info.status_val == osqp.SolverStatus.OSQP_SOLVED
+    return Solved(optimal, found.info.status, found.x, found.info.iter)
+
+
+def _proxqp(program: Program, settings: dict[str, Any]) -> Solved:
+    from proxsuite import proxqp
+
+    hessian, rows, lower, upper, equalities = program
+    solver = proxqp.dense.QP(len(hessian), equalities, len(rows) - equalities)
+    for name, value in settings.items():
+        setattr(solver.settings, name, value)
+    solver.init(
+        hessian,
+        np.zeros(len(hessian)),
+        rows[:equalities],
+        upper[:equalities],
+        rows[equalities:],
+        lower[equalities:],
+        upper[equalities:],
+    )
+    solver.solve()
+    found = solver.results
+    optimal = found.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED
+    return Solved(optimal, found.info.status.name, found.x, int(found.info.iter))
+
+
+_SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
+    "clarabel": _clarabel,
+    "daqp": _daqp,
+    "osqp": _osqp,
+    "proxqp": _proxqp,
+}
 
 
 @cache

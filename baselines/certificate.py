@@ -181,9 +181,10 @@ class _Relaxation:
                 cones.add({column: 1.0}, 0.0)
                 cones.add({column + 1: 1.0}, 0.0)
                 cones.close(clarabel.SecondOrderConeT)
-        self._cones = cones.closed
-        self._fixed = sparse.csr_matrix(np.array(cones.rows))
         self._right = np.array(cones.right)
+        self._cones = [*cones.closed, clarabel.NonnegativeConeT(_NORMALS * len(links))]
+        self._quadratic = sparse.csc_matrix((self._size, self._size))
+        self._lay_out(np.array(cones.rows))
         self._settings = clarabel.DefaultSettings()
         self._settings.verbose = False
         self._settings.max_threads = 1
@@ -202,13 +203,13 @@ class _Relaxation:
 
         Infinite where the box holds no path, minus infinite where the solver does not say.
         """
-        half_spaces, offsets = self._half_spaces(box)
+        matrix, offsets = self._with_half_spaces(box)
         solution = clarabel.DefaultSolver(
-            sparse.csc_matrix((self._size, self._size)),
+            self._quadratic,
             self._objective,
-            sparse.csc_matrix(sparse.vstack([self._fixed, half_spaces])),
+            matrix,
             np.concatenate([self._right, offsets]),
-            [*self._cones, clarabel.NonnegativeConeT(len(offsets))],
+            self._cones,
             self._settings,
         ).solve()
         point, status = np.array(solution.x), str(solution.status)
@@ -234,8 +235,28 @@ class _Relaxation:
         below[link, 1] = above[link, 0] = at
         return below, above
 
-    def _half_spaces(self, box: Array) -> tuple[sparse.csr_matrix, Array]:
-        """Half-spaces ``A x <= b`` that hold (c, s, φ) of every link in its interval."""
+    def _lay_out(self, fixed: Array) -> None:
+        """Where the entries of the half-spaces stand, below the rows that are fixed."""
+        links = len(self._directions)
+        turned, angle_columns = np.nonzero(self._angles)  # of each link, its angle's joints
+        self._turned = turned
+        link = np.concatenate([np.arange(links), np.arange(links), turned])
+        column = np.concatenate([self._directions, self._directions + 1, angle_columns])
+        below = np.arange(_NORMALS)[:, None] * links + len(fixed)
+        at = np.nonzero(fixed)
+        self._fixed = fixed[at]
+        rows = np.concatenate([at[0], (below + link).ravel()])
+        columns = np.concatenate([at[1], np.tile(column, _NORMALS)])
+        self._order = np.lexsort((rows, columns))
+        self._rows = rows[self._order]
+        self._ends = np.searchsorted(columns[self._order], np.arange(self._size + 1))
+        self._matrix = sparse.csc_matrix((len(fixed) + _NORMALS * links, self._size))
+
+    def _with_half_spaces(self, box: Array) -> tuple[sparse.csc_matrix, Array]:
+        """All rows, and the right sides of the half-spaces ``A x <= b``.
+
+        They hold (c, s, φ) of every link in its interval.
+        """
         middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
         normals = _normals(half)
         offsets = _support(normals, half)
@@ -244,24 +265,13 @@ class _Relaxation:
         cosine, sine = directions(middle).T
         c = along * cosine - across * sine
         s = along * sine + across * cosine
-        count, links = c.shape
-        index = np.arange(count * links)
-        entries = sparse.csr_matrix(
-            (
-                np.concatenate([c.ravel(), s.ravel()]),
-                (
-                    np.concatenate([index, index]),
-                    np.concatenate(
-                        [np.tile(self._directions, count), np.tile(self._directions + 1, count)]
-                    ),
-                ),
-            ),
-            shape=(count * links, self._size),
-        )
-        angles = sparse.diags_array(turn.ravel()) @ sparse.csr_matrix(
-            np.tile(self._angles, (count, 1))
-        )
-        return sparse.csr_matrix(entries + angles), (offsets + turn * middle).ravel()
+        below = np.concatenate([c, s, turn[:, self._turned]], axis=1).ravel()
+        values = np.concatenate([self._fixed, below])[self._order]
+        kept = values != 0.0
+        matrix = self._matrix  # of the right shape, and consistent as it is laid out
+        matrix.data, matrix.indices = values[kept], self._rows[kept]
+        matrix.indptr = np.concatenate([[0], np.cumsum(kept)])[self._ends]
+        return matrix, (offsets + turn * middle).ravel()
 
 
 class _Cones:
@@ -306,24 +316,28 @@ def _stiff_joints(task: Task, hand: Hand, still: bool) -> list[int]:
     return sorted(stiff)
 
 
+_NORMALS = 22  # half-spaces of each link
+
+
 def _normals(half: Array) -> Array:
-    """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, n, links)``.
+    """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, _NORMALS, links)``.
 
     The interval's ends; the chord; tangents to cosine and sine; the chord of the sine.
     Any normal is valid: the offsets make it so.
     """
     zero, one = np.zeros_like(half), np.ones_like(half)
     found = [(zero, zero, one), (zero, zero, -one), (-one, zero, zero), (one, zero, zero)]
-    for share in (0.25, 0.5, 0.75, 1.0):
-        cosine, sine = directions(np.minimum(share * half, math.pi / 2)).T
+    touched = np.minimum(np.multiply.outer([0.25, 0.5, 0.75, 1.0], half), math.pi / 2)
+    *tangents, end = directions(np.vstack([touched, np.minimum(half, math.pi)]))
+    for direction in tangents:
+        cosine, sine = direction.T
         found += [
             (zero, one, -cosine),
             (zero, -one, cosine),
             (one, zero, sine),
             (one, zero, -sine),
         ]
-    sine = directions(np.minimum(half, math.pi))[..., 1]
-    slope = sine / np.maximum(half, 1e-12)
+    slope = end[:, 1] / np.maximum(half, 1e-12)
     found += [(zero, one, -slope), (zero, -one, slope)]
     return np.array(found).swapaxes(0, 1)
 
@@ -340,10 +354,11 @@ def _support(normals: Array, half: Array) -> Array:
     exists = np.abs(k) <= r
     angle = np.arcsin(np.clip(k / np.maximum(r, 1e-300), -1.0, 1.0))
     turns = int(np.ceil(half.max(initial=0.0) / _TURN)) + 1
-    for root in (angle, math.pi - angle):
-        for turn in range(-turns, turns + 1):
-            delta = theta + root + turn * _TURN
-            value = r * directions(delta - theta)[..., 0] + k * delta
-            inside: NDArray[np.bool_] = exists & (np.abs(delta) <= half)
-            best = np.where(inside, np.maximum(best, value), best)
-    return best
+    starts = np.stack([theta + angle, theta + (math.pi - angle)])
+    delta = starts[:, None] + (np.arange(-turns, turns + 1) * _TURN)[:, None, None]
+    inside: NDArray[np.bool_] = exists & (np.abs(delta) <= half)
+    *_, normal, link = at = np.nonzero(inside)
+    value = np.full(delta.shape, -np.inf)
+    reached = directions(delta[at] - theta[normal, link])[..., 0]
+    value[at] = r[normal, link] * reached + k[normal, link] * delta[at]
+    return np.asarray(np.maximum(best, value.max(axis=(0, 1))))

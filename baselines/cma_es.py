@@ -25,7 +25,8 @@ from __future__ import annotations
 import itertools
 import math
 from abc import abstractmethod
-from typing import Annotated
+from functools import cache
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -79,7 +80,7 @@ class Strategy:
         if len(values) == self._evolution.popsize:
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
-            self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
+            self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst).tolist())
 
     def _restart(self) -> None:
         import cma
@@ -87,12 +88,24 @@ class Strategy:
         self._restarts += 1
         size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
         options = {
-            "popsize": size * 2**self._restarts,
+            **_options(len(self._mean), size * 2**self._restarts),
             "randn": lambda *shape: self._rng.standard_normal(shape),
-            "seed": np.nan,  # leave NumPy's global generator alone
-            "verbose": -9,
         }
         self._evolution = cma.CMAEvolutionStrategy(self._mean, self.sigma, options)
+
+
+@cache
+def _options(joints: int, population: int) -> dict[str, Any]:
+    """The options of CMA-ES as values. As the texts that they are otherwise, evaluating them
+    takes as long as ten generations."""
+    import cma
+
+    chosen = {
+        "popsize": population,
+        "seed": np.nan,  # leave NumPy's global generator alone
+        "verbose": -9,
+    }
+    return dict(cma.CMAOptions(chosen).complement().evalall({"N": joints}))
 
 
 class _OverSequences(Method):

@@ -15,8 +15,7 @@ projection in closed form, scaled to a full step: level 2 never turns the hand f
 line, but it slows the hand on it (to 0.85 to 0.97 of its speed in the mean). A limit that
 left level 1 its speed would leave level 2 nothing; scoring counts length, not time.
 
-With the default of trying every sequence a two-armed task takes some seconds to half a
-minute, nearly all of it inside cvxpy.
+With the default of trying every sequence a two-armed task takes half a second to two.
 
 Gains tried, one for all tasks; reward on ascending, descending, two-armed-1 (LRLR) and
 two-armed-2 (RLRR), with * the default:

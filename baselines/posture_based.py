@@ -33,9 +33,11 @@ Where this differs from the theory, and why:
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -50,6 +52,7 @@ from coartic.task import hands_of
 
 Mask = NDArray[np.bool_]
 Hands = tuple[Hand, ...]
+Layers = dict[tuple[int, Hand], Array]
 
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
 _DAMPING = 1e-3  # length unit squared: the Jacobian of a straight arm is singular
@@ -130,20 +133,11 @@ class PostureBased(Method):
                 every = itertools.product(sorted(session.hands), repeat=session.goals_count)
                 options = [[(hand,) for hand in hands] for hands in every]
         with session.building():
-            planner = _Planner(session, self.parameters)
-        plans = []
-        failure: MethodError | None = None
+            planner = _Planner(session, self.parameters, self.horizon)
         with session.solving():
-            for hands in options:
-                try:
-                    plans.append(planner.plan(hands, self.horizon))
-                except MethodError as error:
-                    failure = error
-        if not plans:
-            assert failure is not None
-            raise failure
-        movements, ticks = min(plans, key=lambda plan: sum(plan[1]))
-        return Result(movements, {"expected_ticks": list(ticks)})
+            plans = planner.plans(options)
+        best = min(plans, key=lambda plan: sum(plan.ticks))
+        return Result(tuple(best.movements), {"expected_ticks": best.ticks})
 
 
 class OneGoal(PostureBased):
@@ -164,6 +158,32 @@ class TwoGoals(PostureBased):
     horizon = 2
 
 
+@dataclass
+class _Plan:
+    """A plan in the making, with hands to choose from for each goal."""
+
+    options: list[Hands]
+    rng: np.random.Generator
+    store: Array
+    """Shape ``(stored, dof)``."""
+    q: Array
+    """Where the movements so far will have ended."""
+    movements: list[Movement] = field(default_factory=list)
+    ticks: list[int] = field(default_factory=list)
+    """What each is expected to take."""
+
+
+class _Search(NamedTuple):
+    """What postures for successive goals are generated from."""
+
+    q: Array
+    hands: Hands
+    promising: Array
+    """Shape ``(goals, dof)``."""
+    noise: Array
+    """Shape ``(rounds, batch, goals, dof)``."""
+
+
 class _Chain(NamedTuple):
     """Postures for successive goals."""
 
@@ -175,11 +195,14 @@ class _Chain(NamedTuple):
 
 
 class _Planner:
-    """A store of postures, and planning with it."""
+    """Plans side by side, from one store of postures."""
 
-    def __init__(self, session: Session, parameters: PostureBasedParameters) -> None:
+    def __init__(
+        self, session: Session, parameters: PostureBasedParameters, horizon: Literal[1, 2]
+    ) -> None:
         self.session = session
         self.parameters = parameters
+        self.horizon = horizon
         self.goals = session.goals
         # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.
         self.tolerance = session.radius - session.model.arrival_tolerance
@@ -190,61 +213,105 @@ class _Planner:
         # SDs from zero up: dense near the start, sparse far from it.
         sds = parameters.spread * session.rng.uniform(size=(parameters.stored, 1))
         noise = session.rng.standard_normal((parameters.stored, session.dof))
-        self.initial_store = np.vstack([session.q0, session.q0 + sds * noise * self.movable])
-        self.store = self.initial_store
+        self.store = np.vstack([session.q0, session.q0 + sds * noise * self.movable])
         better = math.ceil(parameters.batch / 4)
         # Of the better postures, best first: logarithmic in the rank.
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
-    def plan(
-        self, options: list[Hands], horizon: int
-    ) -> tuple[tuple[Movement, ...], tuple[int, ...]]:
-        """Movements, and the ticks each is expected to take; ``options``: hands per goal.
+    def plans(self, options: list[list[Hands]]) -> list[_Plan]:
+        """The plans that hit every goal; ``options``: hands per goal, of each plan.
 
-        Raises MethodError for a goal that no posture hits.
+        Raises MethodError where there is none, for a goal that no posture hits.
         """
-        self.store = self.initial_store
-        movements: list[Movement] = []
-        ticks: list[int] = []
-        q = self.session.q0
-        for goal in range(len(options)):
-            ahead = range(goal, min(goal + horizon, len(options)))
-            chain = self._cheapest(q, ahead, options)
-            self.store = np.vstack([self.store, chain.postures])
-            hand, target = chain.hands[0], chain.postures[0]
-            movements.append(Movement(goal + 1, hand, "planned", target))
-            q, spent = self._simulate(q, target, hand, goal)
-            ticks.append(spent)
-        return tuple(movements), tuple(ticks)
+        plans = [
+            _Plan(hands, rng, self.store, self.session.q0)
+            for hands, rng in zip(options, self._generators(len(options)), strict=True)
+        ]
+        for goal in range(len(self.goals)):
+            ahead = self._ahead(goal)
+            retrieved = self._retrieve(plans, ahead)
+            searches = [
+                self._searches(*entry, ahead) for entry in zip(plans, retrieved, strict=True)
+            ]
+            possible = [bool(own) for own in searches]
+            if not any(possible):
+                raise self._out_of_reach(plans[-1], retrieved[-1])
+            plans = list(itertools.compress(plans, possible))
+            chains = iter(self._generate([search for own in searches for search in own], ahead))
+            for plan, own in zip(plans, filter(None, searches), strict=True):
+                chain = min(itertools.islice(chains, len(own)), key=lambda chain: chain.cost)
+                self._adopt(plan, chain)
+        return plans
 
-    def _cheapest(self, q: Array, goals: range, options: list[Hands]) -> _Chain:
-        """Hands and postures of least cost for ``goals``, from ``q``."""
-        retrieved = {
-            (goal, hand): self._retrieve(q, goal, hand) for goal in goals for hand in options[goal]
-        }
-        for goal in goals:
-            if not any(len(retrieved[goal, hand]) for hand in options[goal]):
-                raise MethodError(
-                    "infeasible",
-                    f"goal {goal + 1}: no correction of any of {len(self.store)} stored postures "
-                    f"puts the {' or '.join(options[goal])} hand within {self.tolerance:g} of it",
-                )
-        chains = []
-        for hands in itertools.product(*(options[goal] for goal in goals)):
+    def _ahead(self, goal: int) -> range:
+        return range(goal, min(goal + self.horizon, len(self.goals)))
+
+    def _generators(self, count: int) -> Iterator[np.random.Generator]:
+        """One for each plan, each where the one before it ends."""
+        goals = sum(len(self._ahead(goal)) for goal in range(len(self.goals)))
+        for left in reversed(range(count)):
+            yield copy.deepcopy(self.session.rng)
+            if left:
+                self._noise(self.session.rng, goals)
+
+    def _noise(self, rng: np.random.Generator, goals: int) -> Array:
+        """Standard noise for ``goals``, ``(rounds, batch, goals, dof)``."""
+        parameters = self.parameters
+        return rng.standard_normal((parameters.rounds, parameters.batch, goals, self.session.dof))
+
+    def _retrieve(self, plans: list[_Plan], goals: range) -> list[Layers]:
+        """First aspect: stored postures of the arm with the hand at the goal, ``(k, dof)``.
+
+        Of each plan, by goal and hand.
+        """
+        retrieved: list[Layers] = [{} for _ in plans]
+        for goal, hand in itertools.product(goals, self.session.hands):
+            asking = [i for i, plan in enumerate(plans) if hand in plan.options[goal]]
+            if not asking:
+                continue
+            stores = np.stack([plans[i].store for i in asking])
+            postures = np.empty_like(stores)
+            postures[:] = np.stack([plans[i].q for i in asking])[:, None]
+            arm = self.session.joints(hand)
+            postures[..., arm] = stores[..., arm]
+            miss = self.goals[goal] - self.session.forward_kinematics(postures, hand)
+            postures[..., :BASE_DOF] += miss * self.movable[:BASE_DOF]
+            there = self._correct(postures, goal, hand, _RETRIEVED)
+            for i, found, at in zip(asking, postures, there, strict=True):
+                retrieved[i][goal, hand] = found[at]
+        return retrieved
+
+    def _searches(self, plan: _Plan, retrieved: Layers, goals: range) -> list[_Search]:
+        """A search for each choice of hands that all have a posture."""
+        searches = []
+        for hands in itertools.product(*(plan.options[goal] for goal in goals)):
             layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
             if all(len(layer) for layer in layers):
-                promising = self._most_promising(q, hands, layers)
-                chains.append(self._generate(q, goals, hands, promising))
-        return min(chains, key=lambda chain: chain.cost)
+                promising = self._most_promising(plan.q, hands, layers)
+                noise = self._noise(plan.rng, len(goals))
+                searches.append(_Search(plan.q, hands, promising, noise))
+        return searches
 
-    def _retrieve(self, q: Array, goal: int, hand: Hand) -> Array:
-        """First aspect: stored postures of the arm with the hand at the goal, ``(k, dof)``."""
-        postures = np.tile(q, (len(self.store), 1))
-        arm = self.session.joints(hand)
-        postures[:, arm] = self.store[:, arm]
-        miss = self.goals[goal] - self.session.forward_kinematics(postures, hand)
-        postures[:, :BASE_DOF] += miss * self.movable[:BASE_DOF]
-        return postures[self._correct(postures, goal, hand, _RETRIEVED)]
+    def _out_of_reach(self, plan: _Plan, retrieved: Layers) -> MethodError:
+        """Why a plan cannot go on."""
+        for goal in sorted({goal for goal, _ in retrieved}):
+            hands = plan.options[goal]
+            if not any(len(retrieved[goal, hand]) for hand in hands):
+                break
+        return MethodError(
+            "infeasible",
+            f"goal {goal + 1}: no correction of any of {len(plan.store)} stored postures "
+            f"puts the {' or '.join(hands)} hand within {self.tolerance:g} of it",
+        )
+
+    def _adopt(self, plan: _Plan, chain: _Chain) -> None:
+        """Make the first movement of a chain, and store its postures."""
+        goal = len(plan.movements)
+        hand, target = chain.hands[0], chain.postures[0]
+        plan.store = np.vstack([plan.store, chain.postures])
+        plan.movements.append(Movement(goal + 1, hand, "planned", target))
+        plan.q, spent = self._simulate(plan.q, target, hand, goal)
+        plan.ticks.append(spent)
 
     def _most_promising(self, q: Array, hands: Hands, layers: list[Array]) -> Array:
         """Second aspect: of the retrieved postures those that are cheapest, one a goal."""
@@ -254,54 +321,84 @@ class _Planner:
             return first[[np.argmin(cost)]]
         second = layers[1]
         used = self._base_and_arm(hands[1])
-        onward = np.linalg.norm(first[:, None, used] - second[None][:, :, used], axis=2)
-        i, j = np.unravel_index(np.argmin(cost[:, None] + onward), onward.shape)
+        # No posture that alone costs more than some pair can be the first of the best pair.
+        onward = np.linalg.norm(first[np.argmin(cost)][used] - second[:, used], axis=1)
+        near = np.flatnonzero(cost <= cost.min() + onward.min())
+        onward = np.linalg.norm(first[near][:, None, used] - second[None][:, :, used], axis=2)
+        i, j = np.unravel_index(np.argmin(cost[near][:, None] + onward), onward.shape)
+        i = near[i]
         return np.stack([first[i], np.where(used, second[j], first[i])])
 
-    def _generate(self, q: Array, goals: range, hands: Hands, promising: Array) -> _Chain:
+    def _generate(self, searches: list[_Search], goals: range) -> list[_Chain]:
         """The cheapest postures found around the most promising ones by the deadline."""
-        parameters, rng = self.parameters, self.session.rng
-        centre = best = promising
-        cost = float(_travel(q, best))
-        for sd in parameters.diffusion * np.geomspace(1.0, _FINEST, parameters.rounds):
-            noise = sd * rng.standard_normal((parameters.batch, *centre.shape))
-            noise[0] = 0.0  # the weighted sum itself is evaluated, too
-            postures = centre + noise
-            accurate = np.ones(parameters.batch, bool)
-            before: Array = np.tile(q, (parameters.batch, 1))
-            for k, (goal, hand) in enumerate(zip(goals, hands, strict=True)):
-                posture = np.where(self._free(hand), postures[:, k], before)
-                accurate &= self._correct(posture, goal, hand, _GENERATED)
-                postures[:, k] = before = posture
-            costs = np.where(accurate, _travel(q, postures), np.inf)
-            better = np.argsort(costs, kind="stable")[: min(len(self.weights), accurate.sum())]
-            if not len(better):
-                continue
-            weights = self.weights[: len(better)]
-            centre = np.tensordot(weights / weights.sum(), postures[better], axes=1)
-            if costs[better[0]] < cost:
-                best, cost = postures[better[0]], float(costs[better[0]])
-        return _Chain(hands, best, cost)
+        parameters = self.parameters
+        start = np.stack([search.q for search in searches])[:, None]
+        centre = best = np.stack([search.promising for search in searches])
+        costs = _travel(start[:, 0], best)
+        sds = parameters.diffusion * np.geomspace(1.0, _FINEST, parameters.rounds)
+        for number, sd in enumerate(sds):
+            noise = sd * np.stack([search.noise[number] for search in searches])
+            noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
+            postures = centre[:, None] + noise
+            accurate = self._accurate(
+                start, postures, [search.hands for search in searches], goals
+            )
+            travel = np.where(accurate, _travel(start, postures), np.inf)
+            order = np.argsort(travel, axis=1, kind="stable")
+            centre, best = centre.copy(), best.copy()
+            for k, count in enumerate(accurate.sum(axis=1)):
+                better = order[k, : min(len(self.weights), count)]
+                if not len(better):
+                    continue
+                weights = self.weights[: len(better)]
+                centre[k] = np.tensordot(weights / weights.sum(), postures[k, better], axes=1)
+                if travel[k, better[0]] < costs[k]:
+                    best[k], costs[k] = postures[k, better[0]], travel[k, better[0]]
+        return [
+            _Chain(search.hands, *found)
+            for search, *found in zip(searches, best, costs.tolist(), strict=True)
+        ]
+
+    def _accurate(self, start: Array, postures: Array, hands: list[Hands], goals: range) -> Mask:
+        """Correct generated postures in place; which have all hands there.
+
+        ``start`` (n, 1, dof), ``postures`` (n, batch, goals, dof), ``hands`` of each of n.
+        """
+        accurate = np.ones(postures.shape[:2], bool)
+        before = np.broadcast_to(start, (*postures.shape[:2], postures.shape[-1])).copy()
+        for k, goal in enumerate(goals):
+            for hand in self.session.hands:
+                own = [i for i, chosen in enumerate(hands) if chosen[k] == hand]
+                if own:
+                    posture = np.where(self._free(hand), postures[own, :, k], before[own])
+                    accurate[own] &= self._correct(posture, goal, hand, _GENERATED)
+                    postures[own, :, k] = before[own] = posture
+        return accurate
 
     def _correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Feedforward correction of each posture, in place; which have the hand there."""
-        far = np.arange(len(postures))
+        """Feedforward correction of ``(..., dof)`` in place; which have the hand there."""
+        shape, postures = postures.shape[:-1], postures.reshape(-1, postures.shape[-1])
+        far, moved = np.arange(len(postures)), postures
         for step in range(steps + 1):
-            miss = self.goals[goal] - self.session.forward_kinematics(postures[far], hand)
+            miss = self.goals[goal] - self.session.forward_kinematics(moved, hand)
             distance = np.hypot(miss[:, 0], miss[:, 1])
-            outside = distance > self.tolerance
-            far, miss, distance = far[outside], miss[outside], distance[outside]
+            outside = np.flatnonzero(distance > self.tolerance)
+            far = far[outside]
             if step == steps or not len(far):
                 break
+            moved, miss, distance = moved[outside], miss[outside], distance[outside]
             wanted = np.minimum(distance - _INSIDE * self.tolerance, _LONGEST) / distance
-            jacobian = self.session.jacobian(postures[far], hand) * self.movable
+            jacobian = self.session.jacobian(moved, hand)
+            jacobian *= self.movable
             transpose = jacobian.transpose(0, 2, 1)
-            gram = jacobian @ transpose + _DAMPING * np.eye(2)
+            gram = jacobian @ transpose
+            gram += _DAMPING * np.eye(2)
             push = np.linalg.solve(gram, (miss * wanted[:, None])[..., None])
-            postures[far] += (transpose @ push)[..., 0]
+            moved += (transpose @ push)[..., 0]
+            postures[far] = moved
         there = np.ones(len(postures), bool)
         there[far] = False
-        return there
+        return there.reshape(shape)
 
     def _simulate(self, q: Array, target: Array, hand: Hand, goal: int) -> tuple[Array, int]:
         """Where a movement hits its goal, and the ticks that takes."""
@@ -327,8 +424,8 @@ class _Planner:
 
 
 def _travel(q: Array, postures: Array) -> Array:
-    """Joint-space distance from ``q`` through postures ``(..., k, dof)``, shape ``(...)``."""
-    start = np.broadcast_to(q, (*postures.shape[:-2], 1, len(q)))
+    """Joint-space distance from ``q`` (..., dof) through postures ``(..., k, dof)``."""
+    start = np.broadcast_to(q[..., None, :], (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)
     length: Array = np.linalg.norm(legs, axis=-1).sum(axis=-1)
     return length

@@ -26,6 +26,8 @@ from coartic.initial import search_initial_hands
 from coartic.method import Information, Method, Result, Session
 from coartic.robot import Array
 
+_AHEAD = 128  # trials that are drawn before they are made, at most
+
 
 class ClimbingParameters(UninformedParameters):
     """Parameters of the hill climber."""
@@ -42,7 +44,7 @@ class _Centre(NamedTuple):
 
     mask: NDArray[np.bool_]  # explored joints, (G, dof)
     values: Array  # their values, (number of explored joints,)
-    reward: float
+    reward: float  # what a trial has to exceed to move it
 
 
 class Pure(Method):
@@ -90,44 +92,101 @@ def _search(
     first = search_initial_hands(task, model=session.model)
     spend_search(session, first)
     practice = Practice(session, parameters)
-    letters = [hand[0].upper() for hand in session.hands]
-    centres: dict[str, _Centre] = {}
-    hopeless: set[str] = set()  # A alone does not complete them, however often it is asked
-    hands = first.hands
+    search = _Search(session, practice, parameters.sigma, epsilon, memory)
     with session.solving():
-        while practice.left > 0:
-            if hands not in centres:
-                mask = practice.explored(hands)
-                attempt = practice.by_correction(hands)
-                if attempt.rewards[0] > -np.inf:
-                    values = attempt.reached[0, mask]
-                    centres[hands] = _Centre(mask, values, attempt.rewards[0])
-                else:
-                    hopeless.add(hands)
-            else:
-                mask, values, reward = centres[hands]
-                values = values + parameters.sigma * session.rng.standard_normal(len(values))
-                attempt = practice.by_targets(hands, mask, values[None])
-                if memory is not None and attempt.rewards[0] > reward:
-                    if memory == "reached":
-                        values = attempt.reached[0, mask]
-                    centres[hands] = _Centre(mask, values, attempt.rewards[0])
-            if len(hopeless) == len(letters) ** session.goals_count:
-                break
-            hands = _draw(session.rng, letters, practice.hands, epsilon, session.goals_count)
-            while hands in hopeless:
-                hands = _draw(session.rng, letters, practice.hands, epsilon, session.goals_count)
-    return practice.result(sequences=len(centres))
+        search.run(first.hands)
+    return practice.result(sequences=len(search.centres))
 
 
-def _draw(
-    rng: np.random.Generator, letters: list[str], best: str, epsilon: float, goals: int
-) -> str:
-    """A hand sequence; uniformly random where none has succeeded yet."""
-    return "".join(
-        letters[rng.integers(len(letters))] if not best or rng.random() < epsilon else best[goal]
-        for goal in range(goals)
-    )
+class _Search:
+    """The centres, and the next trials around them."""
+
+    def __init__(
+        self,
+        session: Session,
+        practice: Practice,
+        sigma: float,
+        epsilon: float,
+        memory: Literal["reached", "target"] | None,
+    ) -> None:
+        self._rng, self._practice = session.rng, practice
+        self._letters = [hand[0].upper() for hand in session.hands]
+        self._goals = session.goals_count
+        self._sigma, self._epsilon, self._memory = sigma, epsilon, memory
+        self.centres: dict[str, _Centre] = {}
+        self._hopeless: set[str] = set()  # A alone does not complete them, ever
+
+    def run(self, hands: str) -> None:
+        """Make trials, the first with ``hands``, until none is left or none can succeed."""
+        most, ahead = len(self._letters) ** self._goals, 1
+        following: str | None = hands
+        while self._practice.left > 0 and len(self._hopeless) < most:
+            best = self._practice.hands
+            hands = self._draw(best) if following is None else following
+            following = None
+            if hands not in self.centres:
+                self._begin(hands)
+                continue
+            # What comes next is known until a centre moves, which is rare.
+            state = self._rng.bit_generator.state
+            drawn, following = self._ahead(hands, best, min(ahead, self._practice.left))
+            made, moved = self._around(drawn)
+            ahead = min(2 * ahead, _AHEAD)
+            if moved:  # then what was drawn beyond that was not to come
+                self._rng.bit_generator.state = state
+                self._ahead(hands, best, made)
+                following, ahead = None, made
+
+    def _begin(self, hands: str) -> None:
+        """The first trial of a hand sequence."""
+        mask = self._practice.explored(hands)
+        attempt = self._practice.by_correction(hands)
+        if attempt.rewards[0] > -np.inf:
+            reward = np.inf if self._memory is None else attempt.rewards[0]
+            self.centres[hands] = _Centre(mask, attempt.reached[0, mask], reward)
+        else:
+            self._hopeless.add(hands)
+
+    def _ahead(
+        self, hands: str, best: str, count: int
+    ) -> tuple[list[tuple[str, Array]], str | None]:
+        """Hands and noise of at most ``count`` trials; the hands after them, where drawn."""
+        drawn: list[tuple[str, Array]] = []
+        while hands in self.centres:
+            size = len(self.centres[hands].values)
+            drawn.append((hands, self._sigma * self._rng.standard_normal(size)))
+            if len(drawn) == count:
+                return drawn, None
+            hands = self._draw(best)
+        return drawn, hands
+
+    def _around(self, drawn: list[tuple[str, Array]]) -> tuple[int, bool]:
+        """Make trials up to the first that moves its centre; how many, and whether one did."""
+        centres = [self.centres[hands] for hands, _ in drawn]
+        values = [centre.values + noise for centre, (_, noise) in zip(centres, drawn, strict=True)]
+        than = np.array([centre.reward for centre in centres])
+        masks = [centre.mask for centre in centres]
+        attempt = self._practice.until_better([hands for hands, _ in drawn], masks, values, than)
+        last = len(attempt.rewards) - 1
+        moves = bool(attempt.rewards[last] > than[last])
+        if moves:
+            reached = attempt.reached[last, masks[last]]
+            moved = reached if self._memory == "reached" else values[last]
+            self.centres[drawn[last][0]] = _Centre(masks[last], moved, attempt.rewards[last])
+        return last + 1, moves
+
+    def _draw(self, best: str) -> str:
+        """A hand sequence around the best; uniformly random where none has succeeded."""
+        rng, letters = self._rng, self._letters
+        while True:
+            hands = "".join(
+                letters[rng.integers(len(letters))]
+                if not best or rng.random() < self._epsilon
+                else best[goal]
+                for goal in range(self._goals)
+            )
+            if hands not in self._hopeless:
+                return hands
 
 
 METHODS: tuple[type[Method], ...] = (Pure, Climbing)

@@ -19,7 +19,7 @@ from coartic.learning import TRIALS
 from coartic.method import Information, MethodError, Parameters, Result, Session
 from coartic.robot import HANDS, Array
 from coartic.task import hands_of
-from coartic.trials import make_trials
+from coartic.trials import Trials, make_trials
 
 TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 
@@ -80,7 +80,7 @@ class Practice:
     def by_correction(self, hands: str) -> Attempt:
         """One trial by **A** alone."""
         shape = (1, self._session.goals_count, self._session.dof)
-        return self._make(hands, np.full(shape, np.nan))
+        return self._make([hands], np.full(shape, np.nan))
 
     def by_targets(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Attempt:
         """Trials with targets for the joints in ``mask`` (G, dof); the others keep still.
@@ -89,7 +89,20 @@ class Practice:
         """
         targets = np.full((len(values), *mask.shape), np.nan)
         targets[:, mask] = values
-        return self._make(hands, targets)
+        return self._make([hands] * len(values), targets)
+
+    def until_better(
+        self, hands: list[str], masks: list[NDArray[np.bool_]], values: list[Array], than: Array
+    ) -> Attempt:
+        """As :meth:`by_targets`, one trial after the other, each with hands of its own.
+
+        The last one is the first whose reward exceeds its entry in ``than`` (N,). Those after
+        it are not made: nothing of them is counted or known.
+        """
+        targets = np.full((len(hands), *masks[0].shape), np.nan)
+        for target, mask, value in zip(targets, masks, values, strict=True):
+            target[mask] = value
+        return self._make(hands, targets, than)
 
     def result(self, **details: Any) -> Result:
         """The best trial's movements; MethodError where no trial hit every goal."""
@@ -114,25 +127,50 @@ class Practice:
         log = execute(self._task, movements, model=self._session.model)
         return Result(log.movements, {"best_trial": self._best_trial, **details})
 
-    def _make(self, hands: str, targets: Array) -> Attempt:
-        trials = make_trials(self._task, hands, targets, model=self._session.model)
-        rewards = np.where(trials.completed, -trials.ticks, -math.inf)
+    def _make(self, hands: list[str], targets: Array, than: Array | None = None) -> Attempt:
+        made = self._simulated(hands, targets)
+        rewards = np.where(made.completed, -made.ticks, -math.inf)
+        if than is not None and (better := rewards > than).any():
+            end = int(better.argmax()) + 1
+            if end < len(rewards):  # what the trials up to there alone took
+                made, rewards = self._simulated(hands[:end], targets[:end]), rewards[:end]
         self._session.spend(
             trials=len(rewards),
-            movement_ticks=int(trials.ticks.sum()),
-            forward_kinematics=trials.evaluations,
-            jacobians=trials.iterations,
-            corrective_iterations=trials.iterations,
-            corrections=trials.corrections,
-            failed_trials=int((~trials.completed).sum()),
+            movement_ticks=int(made.ticks.sum()),
+            forward_kinematics=made.evaluations,
+            jacobians=made.iterations,
+            corrective_iterations=made.iterations,
+            corrections=made.corrections,
+            failed_trials=int((~made.completed).sum()),
         )
         self._session.record_rewards(
-            int(reward) if math.isfinite(reward) else None for reward in rewards
+            int(reward) if math.isfinite(reward) else None for reward in rewards.tolist()
         )
         best = int(rewards.argmax())
         if rewards[best] > self.reward:
-            self.reward, self.hands = float(rewards[best]), hands
-            self._best_trial, self._targets = self.made + best, trials.targets[best]
+            self.reward, self.hands = float(rewards[best]), hands[best]
+            self._best_trial, self._targets = self.made + best, made.targets[best]
         self.made += len(rewards)
         self.left -= len(rewards)
-        return Attempt(rewards, trials.reached)
+        return Attempt(rewards, made.reached)
+
+    def _simulated(self, hands: list[str], targets: Array) -> Trials:
+        """Trials with hands of their own, in their order: one call for each hand sequence."""
+        rows = {
+            kind: np.flatnonzero([chosen == kind for chosen in hands])
+            for kind in dict.fromkeys(hands)
+        }
+        parts = [
+            make_trials(self._task, kind, targets[own], model=self._session.model)
+            for kind, own in rows.items()
+        ]
+        order = np.argsort(np.concatenate(list(rows.values())))
+        return Trials(
+            ticks=np.concatenate([part.ticks for part in parts])[order],
+            completed=np.concatenate([part.completed for part in parts])[order],
+            targets=np.concatenate([part.targets for part in parts])[order],
+            reached=np.concatenate([part.reached for part in parts])[order],
+            corrections=sum(part.corrections for part in parts),
+            iterations=sum(part.iterations for part in parts),
+            evaluations=sum(part.evaluations for part in parts),
+        )

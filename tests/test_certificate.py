@@ -74,7 +74,8 @@ def test_a_relaxation_never_exceeds_a_true_path(name):
         angles = root._angles[:, : q.size] @ q.ravel()
         assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
         for _ in range(8):
-            spaces, offsets = root._half_spaces(box)
+            rows, offsets = root._with_half_spaces(box)
+            spaces = rows[-len(offsets) :]
             point = np.zeros(root._size)
             point[: q.size] = q.ravel()
             point[root._directions], point[root._directions + 1] = directions(angles).T

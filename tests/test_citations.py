@@ -74,7 +74,7 @@ def test_solvers_are_cited_where_the_code_uses_them(method):
     if "from baselines.trajectory_problem import" in text:
         due = {"wachter2006", "andersson2019"}
     if "from baselines.cascade import" in text:
-        due = {"diamond2016", "arnstrom2022"}
+        due = {"arnstrom2022"}
         assert method.Parameters().solver == "daqp"
     assert set(METHODS[method.name].solvers) == due
 

@@ -72,8 +72,15 @@ def test_without_active_limits_the_cascade_is_the_closed_form(solver):
         np.testing.assert_allclose(cascade.solve(*problem[:2]), least, atol=1e-7)
 
 
-def test_numbers_are_filled_in_without_building_anew():
-    assert all(level.is_dcp(dpp=True) for level in cascade_for(ROBOT.dof, "daqp")._levels)
+@pytest.mark.parametrize("solver", SETTINGS)
+def test_a_modelling_language_gives_the_same(solver):
+    """cvxpy is told the two levels as they are defined; limits are active in half of them."""
+    modelled = qp_solvers.Modelled(ROBOT.dof, solver)
+    assert all(level.is_dcp(dpp=True) for level in modelled.levels)
+    cascade = cascade_for(ROBOT.dof, solver)
+    for problem in (*problems(5, 3), *problems(5, 4, rate=4.0, preferred=1.0)):
+        found = cascade.solve(*problem)
+        np.testing.assert_allclose(found, modelled.solve(*problem), rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
@@ -296,14 +303,15 @@ def test_table_of_solvers(monkeypatch):
     monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-304")
     found = qp_solvers.recorded(6)
     figures = qp_solvers.measure(found)
-    figures["osqp"].failures.append("level 1: osqp ended user_limit")
-    figures["osqp"].solutions[0] = None
+    figures["osqp"].modelled.failures.append("cvxpy: osqp ended user_limit")
+    figures["osqp"].modelled.solutions[0] = None
     text = qp_solvers.table(found, figures)
-    rows = [line.split(" | ") for line in text.splitlines()[2:6]]
-    assert [row[0].strip("| ") for row in rows] == list(qp_solvers.SOLVERS)
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines()[2:6]]
+    assert [row[0] for row in rows] == list(qp_solvers.SOLVERS)
     for row in rows:
-        assert 0 < float(row[2]) < 1000  # ms
-        assert max(float(figure) for figure in row[5:8]) < 1e-6
-        assert row[8] == ("1" if "osqp" in row[0] else "0")
-    assert text.endswith("osqp: level 1: osqp ended user_limit")
+        assert all(0 < float(figure) < 1000 for figure in row[1:6])  # ms
+        assert 0 < int(row[6].rstrip("%")) < 100
+        assert max(float(figure) for figure in row[7:10]) < 1e-6
+        assert row[10] == ("0, 1" if row[0] == "osqp" else "0, 0")
+    assert text.endswith("osqp: cvxpy: osqp ended user_limit")
     assert all(f"{name} " in qp_solvers.conditions() for name in ("cvxpy", "daqp", "osqp"))

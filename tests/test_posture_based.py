@@ -164,6 +164,21 @@ def test_a_free_arm_is_preshaped():
     assert sum(still.details["expected_ticks"]) > sum(result.details["expected_ticks"]) + 40
 
 
+@pytest.mark.parametrize("method", [OneGoal, TwoGoals], ids=["one goal", "two goals"])
+def test_a_plan_beside_others_is_the_plan_alone(method):
+    """The first of all sequences is the best here, and draws what it draws alone."""
+    goals = [[-3.5, 0.5], [-4.5, 1.5], [-4.0, 2.5]]
+    task = bent(goals=goals, locked_base=["y"], initial_hands="LLL")
+    alone, single = solve(task, method, hands="given", **QUICK)
+    beside, every = solve(task, method, hands="every", **QUICK)
+    assert beside.details == alone.details
+    for movement, other in zip(beside.solution, alone.solution, strict=True):
+        assert movement.hand == other.hand == "left"
+        np.testing.assert_array_equal(movement.target, other.target)
+    ratio = every.meter.forward_kinematics / single.meter.forward_kinematics
+    assert ratio == pytest.approx(8, rel=0.3)
+
+
 def test_without_diffusion_the_base_takes_the_hand_there():
     task = bent(goals=[[5.0, 1.0]], initial_hands="R")
     result, session = solve(task, OneGoal, stored=0, rounds=0, hands="given")

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from baselines import cma_es, random_search
 from baselines.uninformed import TOLD, Attempt, Practice, UninformedParameters
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
-from coartic.method import MethodError, Session
+from coartic.method import Meter, MethodError, Session
 from tests.support.strategies import tiny_task
 
 METHODS = (*random_search.METHODS, *cma_es.METHODS)
@@ -165,14 +165,69 @@ def test_hill_climbing_explores_hands_as_often_as_told():
     assert free.details["sequences"] == 16
 
 
+SECOND_FOR_THE_RIGHT = tiny_task(
+    goals=[[2.0, 2.0], [4.3, 0.8]],
+    locked_base=["x", "y"],
+    start={"base": [0.0, 0.0], "left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
+)
+"""The base is locked and the second goal out of the left hand's reach."""
+
+
+def one_by_one(method, task, seed, parameters):
+    """Random search as it is defined: draw, make one trial, draw again."""
+    session = Session(task, seed, TOLD, trusted=True)
+    practice, rng = Practice(session, parameters), session.rng
+    climbs = method is random_search.Climbing
+    epsilon = parameters.epsilon if climbs else 1.0
+    letters = [hand[0].upper() for hand in session.hands]
+    centres, failed, hands = {}, set(), task.initial_hands
+
+    def drawn():
+        chosen = ""
+        for letter in practice.hands or " " * session.goals_count:
+            random = letter == " " or rng.random() < epsilon
+            chosen += letters[rng.integers(len(letters))] if random else letter
+        return drawn() if chosen in failed else chosen
+
+    while practice.left > 0:
+        mask = practice.explored(hands)
+        if hands in centres:
+            centre, reward = centres[hands]
+            values = centre + parameters.sigma * rng.standard_normal(len(centre))
+            attempt = practice.by_targets(hands, mask, values[None])
+        else:
+            attempt, reward = practice.by_correction(hands), -np.inf
+        if attempt.rewards[0] == reward == -np.inf:
+            failed.add(hands)
+        elif hands not in centres or (climbs and attempt.rewards[0] > reward):
+            target = hands in centres and parameters.memory == "target"
+            centres[hands] = values if target else attempt.reached[0, mask], attempt.rewards[0]
+        hands = drawn()
+    return session
+
+
+@pytest.mark.parametrize("task", [load_task("two-armed-2"), SECOND_FOR_THE_RIGHT])
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [
+        (random_search.Pure, {}),
+        (random_search.Climbing, {}),
+        (random_search.Climbing, {"memory": "target", "epsilon": 0.5}),
+    ],
+    ids=["pure", "climbing", "keeping targets"],
+)
+def test_trials_made_together_are_those_made_one_by_one(method, parameters, task):
+    for seed in range(4):
+        session, _ = solve(method, task, seed, trials=500, **parameters)
+        alone = one_by_one(method, task, seed, method.Parameters(trials=500, **parameters))
+        assert session.rewards == alone.rewards
+        made, single = session.meter.as_dict(), alone.meter.as_dict()
+        assert all(made[name] == single[name] for name in Meter.COUNTS)
+
+
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_sequences_that_cannot_be_completed_are_left(method):
-    """The base is locked and the second goal out of the left hand's reach."""
-    task = tiny_task(
-        goals=[[2.0, 2.0], [4.3, 0.8]],
-        locked_base=["x", "y"],
-        start={"base": [0.0, 0.0], "left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
-    )
+    task = SECOND_FOR_THE_RIGHT
     session, result = solve(method, task, trials=150)
     assert session.meter.trials == 150
     assert session.rewards.count(None) == session.meter.failed_trials == 2
