@@ -123,7 +123,8 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
 
 def locks_base(runs: pd.DataFrame) -> bool:
     """Whether a parameter of these runs locks the base: another problem, another optimum."""
-    return bool((_restrictions(runs).base != BASE).any())
+    asked = (json.loads(own).get("base", BASE) for own in set(runs.parameters))
+    return any(base != BASE for base in asked)
 
 
 def essence(task: Task) -> str:
