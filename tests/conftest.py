@@ -104,4 +104,10 @@ def pytest_collection_modifyitems(items):
     """The modules that take longest, then the others."""
     rank = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))
-    gc.freeze()  # what is imported stays: looking through it again and again takes long
+
+
+def pytest_collection_finish():
+    """What is imported and collected stays: looking through it again and again takes long."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(100_000, 50, 1_000)

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from analysis.results.optima import entries
+from benchmarks import registry as registry_module
+from benchmarks import reproduce
 from benchmarks.conformance import check_method, check_task_file
 from benchmarks.harness import record_of
 from benchmarks.registry import registry
@@ -13,7 +15,7 @@ from benchmarks.specification import RunSpec
 from coartic import load_task
 from coartic.task import TASK_FOLDER
 from tests.support.strategies import tiny_task
-from tests.support.suites import InProcess, spec_of
+from tests.support.suites import InProcess, ask_here, performed, spec_of
 
 from .attacks.inputs import GOOD
 
@@ -48,15 +50,19 @@ ONE_GOAL = [
 
 @pytest.fixture(scope="module")
 def known():
-    return registry([BROKEN])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry_module, "_ask", ask_here)
+        return registry([BROKEN])
 
 
 @pytest.fixture(autouse=True)
-def shared_processes(monkeypatch):
-    """The broken methods share two processes, as this project's do: a start takes longer than
-    all their runs. That each has one of its own is for tests/test_sandbox.py."""
+def one_sandbox(monkeypatch):
+    """The broken methods share a process, as this project's do, and the other process that a
+    result is compared with is this one: a start takes longer than all their runs. That each has
+    one of its own is for tests/test_sandbox.py."""
     own_job = RunSpec.job
     monkeypatch.setattr(RunSpec, "job", lambda spec: {**own_job(spec), "owner": None})
+    monkeypatch.setattr(reproduce, "supervise", performed)
 
 
 @pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])

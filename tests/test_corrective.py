@@ -126,7 +126,7 @@ def test_secondary_objective_equals_the_matrix_form(gain, locked):
     model = MotionModel(max_iterations=300)
     converged = 0
     for robot, hand in [(ROBOT, "left"), (ROBOT, "right"), (UNEVEN, "right")]:
-        for _ in range(8):
+        for _ in range(4):
             arguments = robot, rng.uniform(-2, 2, robot.dof), hand, tuple(rng.uniform(-2, 2, 2))
             options = {"locked_base": locked, "nullspace_gain": gain, "model": model}
             fast, slow = correct(*arguments, **options), reference.correct(*arguments, **options)
@@ -134,7 +134,7 @@ def test_secondary_objective_equals_the_matrix_form(gain, locked):
             converged += fast.converged
             if fast.converged:
                 np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
-    assert converged > 12
+    assert converged > 6
 
 
 @pytest.mark.parametrize("locked", [(), ("y",)])

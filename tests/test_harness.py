@@ -139,8 +139,8 @@ def test_sequences_table(results):
 
 
 def test_tables_do_not_depend_on_executor_or_workers(results, tmp_path):
-    """In this process and in three others: the same but for the timings."""
-    same_tables(run_and_write(tmp_path, executor=Local(3)), results)
+    """In this process and in two others: the same but for the timings."""
+    same_tables(run_and_write(tmp_path, executor=Local(2)), results)
 
 
 def test_a_cell_does_not_depend_on_its_company(results, tmp_path):

@@ -106,7 +106,7 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
     """Random movements of all kinds."""
     rng = np.random.default_rng(6)
     hits = 0
-    for index in range(400):
+    for index in range(120):
         hand = HANDS[index % 2]
         q, target, goal = random_movement(rng, robot, hand)
         arguments = (robot, q, target, hand, goal, 0.1)
@@ -114,12 +114,12 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
         slow = reference.move(*arguments, stop_on_arrival=stop_on_arrival)
         assert_same(fast, slow)
         hits += fast.hit
-    assert 80 < hits < 360  # both outcomes are well represented
+    assert 24 < hits < 108  # both outcomes are well represented
 
 
-@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 40_000), (UNEVEN, 10_000)])
+@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 10_000), (UNEVEN, 2_500)])
 @pytest.mark.parametrize("hand", HANDS)
-def test_equals_every_step_a_hundred_thousand_times(robot, count, hand):
+def test_equals_every_step_many_thousand_times(robot, count, hand):
     rng = np.random.default_rng(15)
     drawn = random_movements(rng, robot, hand, count)
     models = [MotionModel(step=step) for step in (0.01, 0.003, 0.1)]
@@ -168,7 +168,7 @@ def test_equals_the_loop_for_any_movement(
 def test_equals_the_loop_under_other_constants(step, tolerance):
     model = MotionModel(step=step, arrival_tolerance=tolerance)
     rng = np.random.default_rng(7)
-    for _ in range(20):
+    for _ in range(8):
         q, target, goal = random_movement(rng, ROBOT, "left")
         arguments = (ROBOT, q, target, "left", goal, 0.1)
         assert_same(move(*arguments, model=model), reference.move(*arguments, model=model))

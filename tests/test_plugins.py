@@ -10,13 +10,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from benchmarks import executors
+from benchmarks import executors, reproduce
 from benchmarks import registry as registry_module
 from benchmarks.registry import registry
 from benchmarks.suites import Cell, run_specs
 from coartic import CoarticError, load_task
 from tests.support.commands import call
-from tests.support.suites import InProcess, ask_here
+from tests.support.suites import InProcess, ask_here, performed
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "tests" / "example_plugin"
@@ -30,11 +30,17 @@ def coartic(monkeypatch, capsys):
     return partial(call, monkeypatch, capsys)
 
 
-@pytest.fixture
-def in_process(monkeypatch):
-    """Methods are asked and perform their runs here, for tests of what they say and leave."""
+def go_on_here(monkeypatch):
+    """From now on methods are asked and perform their runs in this process."""
     monkeypatch.setattr(registry_module, "_ask", ask_here)
     monkeypatch.setattr(executors, "Local", lambda jobs: InProcess())
+    monkeypatch.setattr(reproduce, "supervise", performed)
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    """For tests of what methods say and leave."""
+    go_on_here(monkeypatch)
 
 
 @pytest.fixture
@@ -55,13 +61,14 @@ def installed(monkeypatch, tmp_path):
 
 
 @pytest.mark.usefixtures("installed")
-def test_a_package_brings_a_method(coartic, tmp_path):
-    listed = coartic("list")[1]
-    assert "nearest-hand" in listed
-    assert "(plug-in" in listed
+def test_a_package_brings_a_method(coartic, monkeypatch, tmp_path):
     code, checked, _ = coartic("check", "nearest-hand")
     assert code == 0, checked
     assert "nearest-hand: 8 of 8 laws hold." in checked
+    go_on_here(monkeypatch)
+    listed = coartic("list")[1]
+    assert "nearest-hand" in listed
+    assert "(plug-in" in listed
     out = tmp_path / "out"
     code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", "--tasks", "shelf",
@@ -75,7 +82,7 @@ def test_a_package_brings_a_method(coartic, tmp_path):
     assert run["forward_kinematics"] > run["jacobians"] > 0
 
 
-def test_a_file_brings_a_method(coartic, tmp_path):
+def test_a_file_brings_a_method(coartic, monkeypatch, tmp_path):
     out = tmp_path / "out"
     code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", "--method-file", METHOD,
@@ -85,6 +92,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     runs = pd.read_parquet(out / "runs.parquet")
     assert list(runs.status) == ["ok", "ok"]
     assert (runs.solution_corrections == 0).all()
+    go_on_here(monkeypatch)
     run_id = runs.run_id[0]
     shown = coartic("show", run_id[:9], "--in", tmp_path)[1]
     assert '"nearest-hand"' in shown

@@ -66,12 +66,13 @@ def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path):
         assert record.environment.threads["OMP_NUM_THREADS"] == "1"
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def no_sandbox_before():
     """Sandboxes of earlier tests are not taken for those of this one."""
     close_all()
 
 
+@pytest.mark.usefixtures("no_sandbox_before")
 def test_a_killed_worker_is_a_crash_with_its_signal(known):
     sandbox = Sandbox()
     (worker,) = workers_of(os.getpid())
@@ -83,6 +84,7 @@ def test_a_killed_worker_is_a_crash_with_its_signal(known):
     assert not sandbox.alive
 
 
+@pytest.mark.usefixtures("no_sandbox_before")
 def test_a_worker_does_not_outlive_its_guard():
     own = Sandbox()
     (worker,) = map(psutil.Process, workers_of(os.getpid()))
@@ -95,6 +97,7 @@ def test_a_worker_does_not_outlive_its_guard():
     assert not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE
 
 
+@pytest.mark.usefixtures("no_sandbox_before")
 def test_a_question_that_nobody_reads_is_not_waited_for():
     """It is larger than what a pipe holds, and its worker stands still."""
     own = Sandbox()
@@ -108,6 +111,7 @@ def test_a_question_that_nobody_reads_is_not_waited_for():
     assert not own.alive
 
 
+@pytest.mark.usefixtures("no_sandbox_before")
 def test_a_worker_killed_from_outside_loses_nothing(known, tmp_path):
     """The run that it was at is performed again in a fresh process, and nobody can tell."""
     store = Store(tmp_path)
@@ -144,25 +148,63 @@ def workers_of(pid):
     return [p for p, (_, line) in parents.items() if b"benchmarks.worker" in line and below(p)]
 
 
-def test_a_method_that_kills_its_own_process_is_data(known, monkeypatch):
+@pytest.fixture(scope="module")
+def shared(known):
+    """Performs runs of any method in one process, and in another one where that has ended: a
+    start takes longer than they do."""
+    keeper = Keeper()
+    yield lambda spec: record_of(keeper.perform({**spec.job(), "owner": None}), spec)
+    keeper.close()
+
+
+def test_one_sandbox_performs_many_jobs_and_says_warm(known, shared):
+    records = [shared(spec) for spec in spec_of(known, "dual-process/EC1", runs=3)]
+    assert [record.timing.warm for record in records] == [False, True, True]
+    assert all(record.status == "ok" for record in records)
+
+
+def test_the_clock_stops_where_the_run_is_stopped(known, shared):
+    (spec,) = spec_of(known, "test/naps", Limits(1.0))
+    own = os.getpid()
+    stop = threading.Timer(0.3, lambda: [os.kill(p, signal.SIGSTOP) for p in workers_of(own)])
+    go_on = threading.Timer(2.0, lambda: [os.kill(p, signal.SIGCONT) for p in workers_of(own)])
+    (warm,) = spec_of(known, "test/good")
+    shared(warm)
+    stop.start()
+    go_on.start()
+    record = shared(spec)
+    assert record.status == "ok"
+    assert record.timing.wall_s > 1.5
+
+
+def test_a_score_is_what_the_solution_gives_elsewhere(known, shared):
+    """Whatever the method does to its own process."""
+    (honest,) = spec_of(known, "test/good")
+    (cheat,) = spec_of(known, "test/stepper")
+    assert shared(cheat).solution == performed_here(honest).solution
+    (prover,) = spec_of(known, "test/prover")
+    assert "states a bound, which is for methods optimum/*" in performed_here(prover).reason
+
+
+def test_a_method_that_kills_its_own_process_is_data(known, shared, monkeypatch):
     monkeypatch.setattr(sandbox, "_RETRIES", 0)
     (spec,) = spec_of(known, "test/segfaults")
-    record = perform_once(spec)
+    record = shared(spec)
     assert record.status == "crashed"
     assert "killed by SIGSEGV" in record.reason
 
 
-def test_one_sandbox_performs_many_jobs_and_says_warm(known):
-    keeper = Keeper()
-    try:
-        records = [
-            record_of(keeper.perform(spec.job()), spec)
-            for spec in spec_of(known, "dual-process/EC1", runs=3)
-        ]
-    finally:
-        keeper.close()
-    assert [record.timing.warm for record in records] == [False, True, True]
-    assert all(record.status == "ok" for record in records)
+def test_what_is_kept_of_a_run_is_bounded(known, shared, monkeypatch):
+    (spec,) = spec_of(known, "test/chatterbox")
+    record = shared(spec)
+    assert record.status == "crashed"
+    assert "exit code 3" in record.reason
+    assert len(record.reason) < 1100
+    assert "\x1b" not in record.reason
+    (spec,) = spec_of(known, "test/hoarder")
+    assert "at most 65536 are kept" in performed_here(spec).reason
+    monkeypatch.setattr(sandbox, "LARGEST_ANSWER", 1 << 20)
+    assert "it answered with more than 1 MiB" in shared(spec).reason
 
 
 @pytest.mark.parametrize("moment", ["at work", 0.7])
@@ -283,46 +325,7 @@ def test_a_run_that_was_disturbed_is_tried_again_in_fresh_processes(
     assert [one.jobs for one in counted.made] == [["x"]] * tries
 
 
-def test_the_clock_stops_where_the_run_is_stopped(known):
-    (spec,) = spec_of(known, "test/naps", Limits(1.0))
-    keeper = Keeper()
-    stop = threading.Timer(0.3, lambda: [os.kill(p, signal.SIGSTOP) for p in workers_of(own)])
-    go_on = threading.Timer(2.0, lambda: [os.kill(p, signal.SIGCONT) for p in workers_of(own)])
-    own = os.getpid()
-    try:
-        (warm,) = spec_of(known, "test/good")
-        keeper.perform({**warm.job(), "owner": None})  # as if it were this project's
-        stop.start()
-        go_on.start()
-        record = record_of(keeper.perform({**spec.job(), "owner": None}), spec)
-    finally:
-        keeper.close()
-    assert record.status == "ok"
-    assert record.timing.wall_s > 1.5
-
-
-def test_what_is_kept_of_a_run_is_bounded(known, monkeypatch):
-    (spec,) = spec_of(known, "test/chatterbox")
-    record = perform_once(spec)
-    assert record.status == "crashed"
-    assert "exit code 3" in record.reason
-    assert len(record.reason) < 1100
-    assert "\x1b" not in record.reason
-    (spec,) = spec_of(known, "test/hoarder")
-    assert "at most 65536 are kept" in performed_here(spec).reason
-    monkeypatch.setattr(sandbox, "LARGEST_ANSWER", 1 << 20)
-    assert "it answered with more than 1 MiB" in perform_once(spec).reason
-
-
-def test_a_score_is_what_the_solution_gives_elsewhere(known):
-    """Whatever the method does to its own process."""
-    (honest,) = spec_of(known, "test/good")
-    (cheat,) = spec_of(known, "test/stepper")
-    assert perform_once(cheat).solution == performed_here(honest).solution
-    (prover,) = spec_of(known, "test/prover")
-    assert "states a bound, which is for methods optimum/*" in performed_here(prover).reason
-
-
+@pytest.mark.usefixtures("no_sandbox_before")
 def test_a_line_from_elsewhere_is_no_answer():
     """Whoever may write into a worker's stream does not know what it was asked."""
     own = Sandbox()

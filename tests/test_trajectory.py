@@ -115,18 +115,15 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
 
     rng = np.random.default_rng(1)
     start = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)[free]
-    best = math.inf
-    for _ in range(3):
-        found = minimize(
-            objective,
-            start + 0.1 * rng.standard_normal(start.shape),
-            method="SLSQP",
-            constraints={"type": "ineq", "fun": inside},
-            options={"maxiter": 500, "ftol": 1e-12},
-        )
-        if min(inside(found.x)) > -1e-8:
-            best = min(best, found.fun)
-    assert plan.cost <= best + 1e-5
+    found = minimize(
+        objective,
+        start + 0.1 * rng.standard_normal(start.shape),
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": inside},
+        options={"maxiter": 500, "ftol": 1e-12},
+    )
+    assert min(inside(found.x)) > -1e-8
+    assert plan.cost <= found.fun + 1e-5
     assert plan.cost == pytest.approx(
         objective(np.diff(np.vstack([task.q0, plan.configurations]), axis=0)[free]), abs=1e-5
     )
@@ -230,7 +227,7 @@ def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, nam
     task = load_task(name)
     session = Session(task, 0, method.told, trusted=True)
     hands = {"ascending": "given", "two-armed-2": "RLRR"}[name]
-    parameters = method.Parameters(other_arm=other_arm, nodes=60, hands=hands)
+    parameters = method.Parameters(other_arm=other_arm, nodes=40, graphs=1, hands=hands)
     result = method(parameters).solve(session)
     execution = execute(task, result.solution)
     assert execution.hands == {"given": "RRR"}.get(hands, hands)

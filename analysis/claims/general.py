@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy import optimize
@@ -25,7 +26,7 @@ from analysis.statistics.estimates import SEED
 from analysis.words import short
 from coartic import Hand, Task
 from coartic.record import SEARCH
-from coartic.robot import Array
+from coartic.robot import Array, Robot
 from coartic.task import hands_of
 
 CLOSE = 0.10
@@ -97,29 +98,45 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array, se
     so at least as long as the global one. Infinite where none is found. Length unit and rad
     mixed.
     """
-    joints = movable(task, hand)
-    centre = np.array(task.goals[goal - 1])
+    joints = tuple(movable(task, hand).tolist())
+    disc = (*task.goals[goal - 1], task.radius)
+    return _shortest(task.robot, hand, joints, disc, tuple(q), tuple(guess), seed)
+
+
+@lru_cache(maxsize=1000)  # all folders of a task share its initial solution
+def _shortest(
+    robot: Robot,
+    hand: Hand,
+    joints: tuple[int, ...],
+    disc: tuple[float, float, float],
+    q: tuple[float, ...],
+    guess: tuple[float, ...],
+    seed: int,
+) -> float:
+    """:func:`shortest_reach` of a disc: x, y, radius."""
+    own, before = list(joints), np.array(q)
+    centre, radius = np.array(disc[:2]), disc[2]
 
     def moved(change: Array) -> Array:
-        result = q.copy()
-        result[joints] += change
+        result = before.copy()
+        result[own] += change
         return result
 
     def miss(change: Array) -> Array:
-        return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
+        return np.asarray(robot.forward_kinematics(moved(change), hand) - centre)
 
     def inside(change: Array) -> float:
         off = miss(change)
-        return float(task.radius**2 - off @ off)
+        return float(radius**2 - off @ off)
 
     def inside_gradient(change: Array) -> Array:
-        jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
+        jacobian = robot.jacobian(moved(change), hand)[:, own]
         return np.asarray(-2 * miss(change) @ jacobian)
 
-    first = (guess - q)[joints]
+    first = (np.array(guess) - before)[own]
     rng = np.random.default_rng(seed)
     best = math.inf
-    for start in (first, *(first + rng.normal(0, SPREAD, (STARTS, len(joints))))):
+    for start in (first, *(first + rng.normal(0, SPREAD, (STARTS, len(own))))):
         found = optimize.minimize(
             lambda change: (change @ change, 2 * change),
             start,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -77,13 +78,20 @@ def _target(
     target = math.ceil(optimum - share * abs(optimum) - 1e-9)
     times, horizon = _times(runs, spend, target)
     count = int(np.isfinite(times).sum())
-    chance = binomtest(count, len(runs)).proportion_ci(CONFIDENCE, method="exact")
+    low, high = _chance(count, len(runs))
     seen = np.isfinite(times) & (times <= horizon)
     median = kaplan_meier_median(np.minimum(times, horizon), seen)
     return Target(
         *(cell.task, cell.label, other_arm, spend, share, target, len(runs), count),
-        *(chance.low, chance.high, median.value, median.low, median.high, horizon),
+        *(low, high, median.value, median.low, median.high, horizon),
     )
+
+
+@cache  # many targets are reached by as many runs
+def _chance(count: int, runs: int) -> tuple[float, float]:
+    """Interval of a share (Clopper and Pearson)."""
+    found = binomtest(count, runs).proportion_ci(CONFIDENCE, method="exact")
+    return found.low, found.high
 
 
 def _times(runs: Sequence[BestSoFar], spend: str, target: float) -> tuple[Array, float]:

@@ -104,8 +104,10 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
     what the folder's own searches found; these are named as its source wherever they give it.
     """
     found: dict[tuple[str, str], Optimum] = {}
+    runs = study.runs
+    solved = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
     for name, task in study.tasks.items():
-        own = study.runs[study.runs.task == name]
+        own = solved[solved.task == name]
         for arm in ARMS:
             searches = dict(_searches(own, arm))
             candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
@@ -121,7 +123,8 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
 
 def locks_base(runs: pd.DataFrame) -> bool:
     """Whether a parameter of these runs locks the base: another problem, another optimum."""
-    return bool((_restrictions(runs).base != BASE).any())
+    asked = (json.loads(own).get("base", BASE) for own in set(runs.parameters))
+    return any(base != BASE for base in asked)
 
 
 def essence(task: Task) -> str:
@@ -186,11 +189,12 @@ def renew(new: Iterable[Entry]) -> int:
     return len(kept.keys() - renewed.keys())
 
 
-def _searches(runs: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], pd.DataFrame]]:
-    """Solved searches of one task with this other arm and the task's own base, by cell."""
-    good = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
-    asked = _restrictions(good)
-    kept = good[(asked.base == BASE) & (asked.other_arm == arm)]
+def _searches(solved: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], pd.DataFrame]]:
+    """Of solved searches those with this other arm and the task's own base, by cell."""
+    if not len(solved):
+        return
+    asked = _restrictions(solved)
+    kept = solved[(asked.base == BASE) & (asked.other_arm == arm)]
     for (task, method, variant), own in kept.groupby(["task", "method", "variant"], sort=False):
         yield (str(task), label_of(str(method), str(variant))), own
 

@@ -33,9 +33,12 @@ trials = 40
 
 [[cells]]
 tasks = ["ascending"]
-methods = [
-    "dual-process/EC1", "nullspace-qp/none", "corrective-alone/given", "optimum/branch-and-bound",
-]
+methods = ["dual-process/EC1", "nullspace-qp/none", "corrective-alone/given"]
+
+[[cells]]
+tasks = ["ascending"]
+methods = ["optimum/branch-and-bound"]
+parameters = { nodes = 40, graphs = 1, most_nodes = 100 }
 
 [[cells]]
 tasks = ["two-armed-2"]

@@ -810,7 +810,7 @@ def _make_cases() -> list[Case]:
          files={"analysis.py": "x = 1\n"})  # fmt: skip
     full = "No space left on device"
     case("surroundings", "output is full", ("cite",), full, shell="> /dev/full", code=1)
-    case("surroundings", "output is closed", ("cite",), "", shell=">&-", code=0)
+    case("surroundings", "output is closed", ("--version",), "", shell=">&-", code=0)
     case("surroundings", "errors are closed", ("--version",), "coartic ", shell="2>&-", code=0)
     return found
 

@@ -162,7 +162,7 @@ def _run_forked(
         for variable, name in (("HOME", "home"), ("TMPDIR", "tmp")):
             (folder / name).mkdir(exist_ok=True)
             os.environ[variable] = str(folder / name)
-        sandbox._RETRIES = 1
+        sandbox._RETRIES = 0
         own_job = RunSpec.job
 
         def job(spec: RunSpec) -> dict[str, Any]:
