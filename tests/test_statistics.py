@@ -144,6 +144,38 @@ def test_intervals_of_many_normal_values_are_the_usual_ones():
     assert (alone.low, alone.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
 
 
+def test_intervals_of_very_many_values_are_the_usual_ones():
+    """Where fewer are drawn than there are."""
+    rng = np.random.default_rng(5)
+    many, more, few = (rng.normal(size=n) for n in (40_000, 90_000, 2_000))
+    for found, error in (
+        (statistics.mean(many, seed=0), many.std() / 200),
+        (statistics.difference_of_means(many, few, seed=0), None),
+        (statistics.difference_of_means(more, many, seed=0), None),
+    ):
+        usual = math.hypot(
+            *(s.std() / math.sqrt(len(s)) for s in samples_in(found, many, more, few))
+        )
+        error = usual if error is None else error
+        half = (found.high - found.low) / 2
+        assert half >= 0.97 * 1.96 * error
+        assert half <= (1.03 if len(found.n) == 1 else 1.5) * 1.96 * error
+        assert found.low < found.estimate < found.high
+
+
+def samples_in(found, *samples):
+    """The samples of an estimate, by their sizes."""
+    return [sample for n in found.n for sample in samples if len(sample) == n]
+
+
+def test_what_is_drawn_does_not_depend_on_what_is_in_memory(monkeypatch):
+    rng = np.random.default_rng(5)
+    first, second = rng.normal(size=50), rng.normal(size=41)
+    whole = hypotheses.bootstrap_test(first, second, seed=1, resamples=999)
+    monkeypatch.setattr(hypotheses, "_IN_MEMORY", 500)
+    assert hypotheses.bootstrap_test(first, second, seed=1, resamples=999) == whole
+
+
 def test_pairs_and_known_numbers_are_one_sample():
     rng = np.random.default_rng(10)
     a, b = rng.normal(0, 1, (2, 12))

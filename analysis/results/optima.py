@@ -201,8 +201,11 @@ def _searches(solved: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str],
 
 def _restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     """Lock of the base and other arm of each run, by its parameters."""
-    asked = [{"base": BASE, "other_arm": "free"} | json.loads(own) for own in runs.parameters]
-    return pd.DataFrame(asked, runs.index, ["base", "other_arm"])
+    known = {"base": BASE, "other_arm": "free"}
+    asked = {text: known | json.loads(text) for text in runs.parameters.unique()}
+    return pd.DataFrame(
+        {name: [asked[text][name] for text in runs.parameters] for name in known}, runs.index
+    )
 
 
 def _from_runs(runs: pd.DataFrame) -> Optimum:

@@ -35,6 +35,7 @@ _TAILS = {
     "less": "one-tailed (less)",
     "two-sided": "two-tailed",
 }
+_IN_MEMORY = 1 << 22  # values that are drawn at once
 
 
 def bootstrap_test(
@@ -185,9 +186,12 @@ def studentised_null(
     difference, variance = np.zeros(resamples), np.zeros(resamples)
     for values, sign in zip(samples, (1, -1), strict=False):
         shifted = values - spread.mean(values) + (centre if len(samples) > 1 else 0.0)
-        drawn = shifted[rng.integers(len(values), size=(resamples, len(values)))]
-        difference += sign * spread.mean(drawn, 1)
-        variance += spread.variance(drawn, 1) / len(values)
+        rows = max(1, _IN_MEMORY // len(values))
+        for start in range(0, resamples, rows):
+            part = slice(start, min(start + rows, resamples))
+            drawn = shifted[rng.integers(len(values), size=(part.stop - start, len(values)))]
+            difference[part] += sign * spread.mean(drawn, 1)
+            variance[part] += spread.variance(drawn, 1) / len(values)
     return _ratio(difference, variance)
 
 
