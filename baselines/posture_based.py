@@ -45,9 +45,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement, Task
+from coartic.compiled import entry, inner
 from coartic.initial import too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.robot import BASE_DOF, Array, Hand
+from coartic.robot import BASE_DOF, Array, Hand, chain, lever
 from coartic.task import hands_of
 
 Mask = NDArray[np.bool_]
@@ -158,6 +159,48 @@ class TwoGoals(PostureBased):
     horizon = 2
 
 
+_chain = inner(chain)
+_lever = inner(lever)
+
+
+@entry
+def _reach(
+    postures: Any,
+    far: Any,
+    arm: Any,
+    x: float,
+    y: float,
+    tolerance: float,
+    wanted: Any,
+    jacobian: Any,
+    xs: Any,
+    ys: Any,
+) -> int:
+    """Keep in ``far`` the postures with the hand away from (x, y); how many those are.
+
+    For each of them, in their order, ``wanted`` has the step that the hand is to make, and
+    ``jacobian`` the columns of the arm's joints.
+    """
+    tip = len(arm.links)
+    left = 0
+    for row in far:
+        _chain(postures[row], arm, xs, ys, math.cos, math.sin)
+        miss_x = x - xs[tip]
+        miss_y = y - ys[tip]
+        distance = math.hypot(miss_x, miss_y)
+        if distance > tolerance:
+            share = min(distance - _INSIDE * tolerance, _LONGEST) / distance
+            wanted[left, 0, 0] = miss_x * share
+            wanted[left, 1, 0] = miss_y * share
+            for k in range(tip):
+                dx, dy = _lever(xs, ys, k, tip)
+                jacobian[left, 0, arm.first + k] = dx
+                jacobian[left, 1, arm.first + k] = dy
+            far[left] = row
+            left += 1
+    return left
+
+
 @dataclass
 class _Plan:
     """A plan in the making, with hands to choose from for each goal."""
@@ -203,6 +246,8 @@ class _Planner:
         self.session = session
         self.parameters = parameters
         self.horizon = horizon
+        task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
+        self.robot = task.robot
         self.goals = session.goals
         # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.
         self.tolerance = session.radius - session.model.arrival_tolerance
@@ -378,24 +423,24 @@ class _Planner:
     def _correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Feedforward correction of ``(..., dof)`` in place; which have the hand there."""
         shape, postures = postures.shape[:-1], postures.reshape(-1, postures.shape[-1])
-        far, moved = np.arange(len(postures)), postures
+        arm = self.robot.arm(hand)
+        far = np.arange(len(postures))
+        wanted = np.empty((len(far), 2, 1))
+        jacobian = np.zeros((len(far), 2, postures.shape[-1]))
+        jacobian[:, [0, 1], [0, 1]] = self.movable[:BASE_DOF]
+        joints = np.empty((2, len(arm.links) + 1))
+        x, y = self.goals[goal]
         for step in range(steps + 1):
-            miss = self.goals[goal] - self.session.forward_kinematics(moved, hand)
-            distance = np.hypot(miss[:, 0], miss[:, 1])
-            outside = np.flatnonzero(distance > self.tolerance)
-            far = far[outside]
-            if step == steps or not len(far):
+            left = _reach(postures, far, arm, x, y, self.tolerance, wanted, jacobian, *joints)
+            self.session.spend(forward_kinematics=len(far))
+            far = far[:left]
+            if step == steps or not left:
                 break
-            moved, miss, distance = moved[outside], miss[outside], distance[outside]
-            wanted = np.minimum(distance - _INSIDE * self.tolerance, _LONGEST) / distance
-            jacobian = self.session.jacobian(moved, hand)
-            jacobian *= self.movable
-            transpose = jacobian.transpose(0, 2, 1)
-            gram = jacobian @ transpose
-            gram += _DAMPING * np.eye(2)
-            push = np.linalg.solve(gram, (miss * wanted[:, None])[..., None])
-            moved += (transpose @ push)[..., 0]
-            postures[far] = moved
+            self.session.spend(jacobians=left)
+            across = jacobian[:left]
+            transpose = across.transpose(0, 2, 1)
+            gram = across @ transpose + _DAMPING * np.eye(2)
+            postures[far] += (transpose @ np.linalg.solve(gram, wanted[:left]))[..., 0]
         there = np.ones(len(postures), bool)
         there[far] = False
         return there.reshape(shape)
