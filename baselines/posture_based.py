@@ -33,10 +33,9 @@ Where this differs from the theory, and why:
 
 from __future__ import annotations
 
-import copy
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -62,6 +61,7 @@ _RETRIEVED = 40  # steps for a stored posture, which may be far off
 _GENERATED = 3  # steps for a generated one, which is close by
 _INSIDE = 0.999  # part of the tolerated error that is aimed at
 _FINEST = 0.01  # last SD of the diffusion, as a part of the first
+_TOGETHER = 16  # plans that are made side by side: more take memory, and no less time
 
 
 class PostureBasedParameters(Parameters):
@@ -206,7 +206,8 @@ class _Plan:
     """A plan in the making, with hands to choose from for each goal."""
 
     options: list[Hands]
-    rng: np.random.Generator
+    noise: list[Array]
+    """Of the goals to come, where it was drawn beforehand."""
     store: Array
     """Shape ``(stored, dof)``."""
     q: Array
@@ -268,11 +269,30 @@ class _Planner:
 
         Raises MethodError where there is none, for a goal that no posture hits.
         """
+        plans = []
+        failure: MethodError | None = None
+        for first in range(0, len(options), _TOGETHER):
+            try:
+                plans += self._together(options[first : first + _TOGETHER], len(options) > 1)
+            except MethodError as error:
+                failure = error
+        if failure is not None and not plans:
+            raise failure
+        return plans
+
+    def _together(self, options: list[list[Hands]], beforehand: bool) -> list[_Plan]:
+        """Plans side by side; noise is drawn ``beforehand``, plan after plan, or as needed."""
+        goals = range(len(self.goals))
         plans = [
-            _Plan(hands, rng, self.store, self.session.q0)
-            for hands, rng in zip(options, self._generators(len(options)), strict=True)
+            _Plan(
+                hands,
+                [self._noise(self._ahead(goal)) for goal in goals if beforehand],
+                self.store,
+                self.session.q0,
+            )
+            for hands in options
         ]
-        for goal in range(len(self.goals)):
+        for goal in goals:
             ahead = self._ahead(goal)
             retrieved = self._retrieve(plans, ahead)
             searches = [
@@ -291,18 +311,11 @@ class _Planner:
     def _ahead(self, goal: int) -> range:
         return range(goal, min(goal + self.horizon, len(self.goals)))
 
-    def _generators(self, count: int) -> Iterator[np.random.Generator]:
-        """One for each plan, each where the one before it ends."""
-        goals = sum(len(self._ahead(goal)) for goal in range(len(self.goals)))
-        for left in reversed(range(count)):
-            yield copy.deepcopy(self.session.rng)
-            if left:
-                self._noise(self.session.rng, goals)
-
-    def _noise(self, rng: np.random.Generator, goals: int) -> Array:
+    def _noise(self, goals: range) -> Array:
         """Standard noise for ``goals``, ``(rounds, batch, goals, dof)``."""
-        parameters = self.parameters
-        return rng.standard_normal((parameters.rounds, parameters.batch, goals, self.session.dof))
+        parameters, session = self.parameters, self.session
+        shape = parameters.rounds, parameters.batch, len(goals), session.dof
+        return session.rng.standard_normal(shape)
 
     def _retrieve(self, plans: list[_Plan], goals: range) -> list[Layers]:
         """First aspect: stored postures of the arm with the hand at the goal, ``(k, dof)``.
@@ -333,7 +346,7 @@ class _Planner:
             layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
             if all(len(layer) for layer in layers):
                 promising = self._most_promising(plan.q, hands, layers)
-                noise = self._noise(plan.rng, len(goals))
+                noise = plan.noise.pop(0) if plan.noise else self._noise(goals)
                 searches.append(_Search(plan.q, hands, promising, noise))
         return searches
 
