@@ -183,7 +183,7 @@ def _reach(
     """
     tip = len(arm.links)
     left = 0
-    for row in far:
+    for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics
         _chain(postures[row], arm, xs, ys, math.cos, math.sin)
         miss_x = x - xs[tip]
         miss_y = y - ys[tip]
