@@ -56,7 +56,7 @@ class BoundParameters(GraphParameters):
     """As above, for the proof."""
 
     most_nodes: Annotated[int, Field(ge=1)] = 20_000
-    """Cone programmes that may be solved for it, some 200 a second. The shipped tasks need
+    """Cone programmes that may be solved for it, some 300 a second. The shipped tasks need
     600 to 15 000 with the other arm free, up to 67 000 with it still."""
 
 

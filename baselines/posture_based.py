@@ -33,10 +33,9 @@ Where this differs from the theory, and why:
 
 from __future__ import annotations
 
-import copy
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -45,9 +44,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement, Task
+from coartic.compiled import entry, inner
 from coartic.initial import too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.robot import BASE_DOF, Array, Hand
+from coartic.robot import BASE_DOF, Array, Hand, chain, lever
 from coartic.task import hands_of
 
 Mask = NDArray[np.bool_]
@@ -61,6 +61,7 @@ _RETRIEVED = 40  # steps for a stored posture, which may be far off
 _GENERATED = 3  # steps for a generated one, which is close by
 _INSIDE = 0.999  # part of the tolerated error that is aimed at
 _FINEST = 0.01  # last SD of the diffusion, as a part of the first
+_TOGETHER = 16  # plans that are made side by side: more take memory, and no less time
 
 
 class PostureBasedParameters(Parameters):
@@ -158,12 +159,55 @@ class TwoGoals(PostureBased):
     horizon = 2
 
 
+_chain = inner(chain)
+_lever = inner(lever)
+
+
+@entry
+def _reach(
+    postures: Any,
+    far: Any,
+    arm: Any,
+    x: float,
+    y: float,
+    tolerance: float,
+    wanted: Any,
+    jacobian: Any,
+    xs: Any,
+    ys: Any,
+) -> int:
+    """Keep in ``far`` the postures with the hand away from (x, y); how many those are.
+
+    For each of them, in their order, ``wanted`` has the step that the hand is to make, and
+    ``jacobian`` the columns of the arm's joints.
+    """
+    tip = len(arm.links)
+    left = 0
+    for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics
+        _chain(postures[row], arm, xs, ys, math.cos, math.sin)
+        miss_x = x - xs[tip]
+        miss_y = y - ys[tip]
+        distance = math.hypot(miss_x, miss_y)
+        if distance > tolerance:
+            share = min(distance - _INSIDE * tolerance, _LONGEST) / distance
+            wanted[left, 0, 0] = miss_x * share
+            wanted[left, 1, 0] = miss_y * share
+            for k in range(tip):
+                dx, dy = _lever(xs, ys, k, tip)
+                jacobian[left, 0, arm.first + k] = dx
+                jacobian[left, 1, arm.first + k] = dy
+            far[left] = row
+            left += 1
+    return left
+
+
 @dataclass
 class _Plan:
     """A plan in the making, with hands to choose from for each goal."""
 
     options: list[Hands]
-    rng: np.random.Generator
+    noise: list[Array]
+    """Of the goals to come, where it was drawn beforehand."""
     store: Array
     """Shape ``(stored, dof)``."""
     q: Array
@@ -203,6 +247,8 @@ class _Planner:
         self.session = session
         self.parameters = parameters
         self.horizon = horizon
+        task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
+        self.robot = task.robot
         self.goals = session.goals
         # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.
         self.tolerance = session.radius - session.model.arrival_tolerance
@@ -223,11 +269,30 @@ class _Planner:
 
         Raises MethodError where there is none, for a goal that no posture hits.
         """
+        plans = []
+        failure: MethodError | None = None
+        for first in range(0, len(options), _TOGETHER):
+            try:
+                plans += self._together(options[first : first + _TOGETHER], len(options) > 1)
+            except MethodError as error:
+                failure = error
+        if failure is not None and not plans:
+            raise failure
+        return plans
+
+    def _together(self, options: list[list[Hands]], beforehand: bool) -> list[_Plan]:
+        """Plans side by side; noise is drawn ``beforehand``, plan after plan, or as needed."""
+        goals = range(len(self.goals))
         plans = [
-            _Plan(hands, rng, self.store, self.session.q0)
-            for hands, rng in zip(options, self._generators(len(options)), strict=True)
+            _Plan(
+                hands,
+                [self._noise(self._ahead(goal)) for goal in goals if beforehand],
+                self.store,
+                self.session.q0,
+            )
+            for hands in options
         ]
-        for goal in range(len(self.goals)):
+        for goal in goals:
             ahead = self._ahead(goal)
             retrieved = self._retrieve(plans, ahead)
             searches = [
@@ -246,18 +311,11 @@ class _Planner:
     def _ahead(self, goal: int) -> range:
         return range(goal, min(goal + self.horizon, len(self.goals)))
 
-    def _generators(self, count: int) -> Iterator[np.random.Generator]:
-        """One for each plan, each where the one before it ends."""
-        goals = sum(len(self._ahead(goal)) for goal in range(len(self.goals)))
-        for left in reversed(range(count)):
-            yield copy.deepcopy(self.session.rng)
-            if left:
-                self._noise(self.session.rng, goals)
-
-    def _noise(self, rng: np.random.Generator, goals: int) -> Array:
+    def _noise(self, goals: range) -> Array:
         """Standard noise for ``goals``, ``(rounds, batch, goals, dof)``."""
-        parameters = self.parameters
-        return rng.standard_normal((parameters.rounds, parameters.batch, goals, self.session.dof))
+        parameters, session = self.parameters, self.session
+        shape = parameters.rounds, parameters.batch, len(goals), session.dof
+        return session.rng.standard_normal(shape)
 
     def _retrieve(self, plans: list[_Plan], goals: range) -> list[Layers]:
         """First aspect: stored postures of the arm with the hand at the goal, ``(k, dof)``.
@@ -288,7 +346,7 @@ class _Planner:
             layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
             if all(len(layer) for layer in layers):
                 promising = self._most_promising(plan.q, hands, layers)
-                noise = self._noise(plan.rng, len(goals))
+                noise = plan.noise.pop(0) if plan.noise else self._noise(goals)
                 searches.append(_Search(plan.q, hands, promising, noise))
         return searches
 
@@ -378,24 +436,24 @@ class _Planner:
     def _correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Feedforward correction of ``(..., dof)`` in place; which have the hand there."""
         shape, postures = postures.shape[:-1], postures.reshape(-1, postures.shape[-1])
-        far, moved = np.arange(len(postures)), postures
+        arm = self.robot.arm(hand)
+        far = np.arange(len(postures))
+        wanted = np.empty((len(far), 2, 1))
+        jacobian = np.zeros((len(far), 2, postures.shape[-1]))
+        jacobian[:, [0, 1], [0, 1]] = self.movable[:BASE_DOF]
+        joints = np.empty((2, len(arm.links) + 1))
+        x, y = self.goals[goal]
         for step in range(steps + 1):
-            miss = self.goals[goal] - self.session.forward_kinematics(moved, hand)
-            distance = np.hypot(miss[:, 0], miss[:, 1])
-            outside = np.flatnonzero(distance > self.tolerance)
-            far = far[outside]
-            if step == steps or not len(far):
+            left = _reach(postures, far, arm, x, y, self.tolerance, wanted, jacobian, *joints)
+            self.session.spend(forward_kinematics=len(far))
+            far = far[:left]
+            if step == steps or not left:
                 break
-            moved, miss, distance = moved[outside], miss[outside], distance[outside]
-            wanted = np.minimum(distance - _INSIDE * self.tolerance, _LONGEST) / distance
-            jacobian = self.session.jacobian(moved, hand)
-            jacobian *= self.movable
-            transpose = jacobian.transpose(0, 2, 1)
-            gram = jacobian @ transpose
-            gram += _DAMPING * np.eye(2)
-            push = np.linalg.solve(gram, (miss * wanted[:, None])[..., None])
-            moved += (transpose @ push)[..., 0]
-            postures[far] = moved
+            self.session.spend(jacobians=left)
+            across = jacobian[:left]
+            transpose = across.transpose(0, 2, 1)
+            gram = across @ transpose + _DAMPING * np.eye(2)
+            postures[far] += (transpose @ np.linalg.solve(gram, wanted[:left]))[..., 0]
         there = np.ones(len(postures), bool)
         there[far] = False
         return there.reshape(shape)
