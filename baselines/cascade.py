@@ -23,6 +23,7 @@ from coartic.errors import CoarticError
 from coartic.robot import Array
 
 SolverName = Literal["clarabel", "daqp", "osqp", "proxqp"]
+Modelling = Literal["cvxpy", "none"]
 
 DAMPING = 0.01
 """λ, length unit per unit rate: 1e-4 of the hand's rate is given up where the smallest
@@ -230,9 +231,13 @@ _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
 
 
 @cache
-def cascade_for(joints: int, solver: SolverName) -> Cascade:
-    """The one cascade of this process for so many joints and this solver."""
-    return Cascade(joints, solver)
+def cascade_for(joints: int, solver: SolverName, modelling: Modelling = "none") -> Cascade:
+    """The one cascade of this process for so many joints, this solver and statement."""
+    if modelling == "none":
+        return Cascade(joints, solver)
+    from baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
+
+    return ModelledCascade(joints, solver)
 
 
 def damped_projection(

@@ -48,7 +48,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from baselines.cascade import Cascade, CascadeError, SolverName, cascade_for
+from baselines.cascade import Cascade, CascadeError, Modelling, SolverName, cascade_for
 from baselines.nullspace_control import Aim, Controller, Leg, StuckError, UnfinishedError
 from coartic import Task
 from coartic.initial import changes_of_hand, too_many_sequences
@@ -77,6 +77,9 @@ class NullspaceParameters(Parameters):
     objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
     solver: SolverName = "daqp"
     """Of both levels; ``python -m benchmarks.qp_solvers`` compares them."""
+    modelling: Modelling = "none"
+    """``cvxpy`` states the programs in its language, ``none`` fills in their numbers; the same
+    programs, and with DAQP the same rates to the last bit."""
     period: Annotated[int, Field(ge=1, le=20)] = 1
     """Ticks from one control step to the next."""
     max_steps: Annotated[int, Field(ge=1)] = 5000
@@ -126,7 +129,7 @@ class NullspaceQP(Method):
 
     def cascade(self, joints: int) -> Cascade:
         """The solver of every control step."""
-        return cascade_for(joints, self.parameters.solver)
+        return cascade_for(joints, self.parameters.solver, self.parameters.modelling)
 
     def solve(self, session: Session) -> Result:
         """Simulate the candidate hand sequences and hand over the best one's paths."""

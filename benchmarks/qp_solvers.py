@@ -1,10 +1,11 @@
 """Time and accuracy of the QP solvers, and what stating the problems to cvxpy costs.
 
 ``python -m benchmarks.qp_solvers`` records the two-level problems that
-``nullspace-qp/next-goal`` meets on a two-armed task and gives them to every solver, once as
-the method does (:mod:`baselines.cascade`) and once through cvxpy, all in turn on each
-problem, so that whatever else the machine does meets them alike. A problem that a solver
-does not solve is counted and its reason shown.
+``nullspace-qp/next-goal`` meets on a two-armed task and gives them to every solver, once
+as numbers (:mod:`baselines.cascade`) and once through cvxpy
+(:mod:`baselines.modelled_cascade`), all in turn on each problem, so that whatever else the
+machine does meets them alike. A problem that a solver does not solve is counted and its
+reason shown.
 """
 
 from __future__ import annotations
@@ -12,22 +13,13 @@ from __future__ import annotations
 import os
 import sys
 import time
-import warnings
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, get_args
 
-import cvxpy as cp
 import numpy as np
 
-from baselines.cascade import (
-    DAMPING,
-    LIMIT,
-    SETTINGS,
-    Cascade,
-    CascadeError,
-    SolverName,
-    damped_projection,
-)
+from baselines.cascade import LIMIT, Cascade, CascadeError, SolverName, damped_projection
+from baselines.modelled_cascade import ModelledCascade
 from baselines.nullspace_qp import NextGoal
 from benchmarks.provenance import environment
 from benchmarks.sandbox import THREADS
@@ -55,54 +47,6 @@ class Solver(Protocol):
 
     def solve(self, jacobian: Array, rate: Array, preferred: Array | None = None) -> Array:
         """Joint rates."""
-
-
-class Modelled:
-    """The cascade as cvxpy has it, parametrised under its DPP rules and compiled once."""
-
-    def __init__(self, joints: int, solver: SolverName) -> None:
-        self.solver = solver
-        self._jacobian = cp.Parameter((2, joints))
-        self._rate = cp.Parameter(2)
-        self._preferred = cp.Parameter(joints)
-        self._x = x = cp.Variable(joints)
-        limits = [x <= LIMIT, x >= -LIMIT]
-        follow = cp.sum_squares(self._jacobian @ x - self._rate)
-        self.levels = (
-            cp.Problem(cp.Minimize(follow + DAMPING**2 * cp.sum_squares(x)), limits),
-            cp.Problem(
-                cp.Minimize(cp.sum_squares(x - self._preferred)),
-                [self._jacobian @ x == self._rate, *limits],
-            ),
-        )
-        # cvxpy compiles at the first solve.
-        self.solve(np.eye(2, joints), np.zeros(2), np.zeros(joints))
-
-    def solve(self, jacobian: Array, rate: Array, preferred: Array | None = None) -> Array:
-        """As :meth:`baselines.cascade.Cascade.solve`."""
-        self._jacobian.value = jacobian
-        self._rate.value = rate
-        rates = self._solve(self.levels[0])
-        if preferred is not None:
-            self._rate.value = jacobian @ rates
-            self._preferred.value = preferred
-            rates = self._solve(self.levels[1])
-        return rates
-
-    def _solve(self, problem: cp.Problem) -> Array:
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # of what the status says
-                problem.solve(
-                    solver=self.solver.upper(),
-                    warm_start=False,  # or earlier problems would leave their mark
-                    **SETTINGS[self.solver],
-                )
-        except cp.SolverError as error:
-            raise CascadeError(f"cvxpy: {self.solver} failed: {error}") from None
-        if problem.status != cp.OPTIMAL:
-            raise CascadeError(f"cvxpy: {self.solver} ended {problem.status}")
-        return np.array(self._x.value, dtype=np.float64)
 
 
 @dataclass
@@ -155,7 +99,7 @@ def measure(problems: list[Problem]) -> dict[SolverName, Ways]:
     figures = {name: Ways(Figures(0.0), Figures(0.0)) for name in SOLVERS}
     called: list[tuple[Solver, Figures]] = []
     for name, ways in figures.items():
-        for kind, of in ((Cascade, ways.direct), (Modelled, ways.modelled)):
+        for kind, of in ((Cascade, ways.direct), (ModelledCascade, ways.modelled)):
             clock = time.perf_counter()
             called.append((kind(joints, name), of))
             of.build_s = time.perf_counter() - clock

@@ -1,130 +1,241 @@
-"""How fast the compiled learner is, against the step-by-step loop in plain NumPy.
+"""How fast the compiled learner is, how fast it could be, and how that grows.
 
-``python -m benchmarks.speed`` measures both sides in one run, on the cells of suite
-``paper`` at full size. The slow side is measured on a few trials of every cell and
-extrapolated; its cost per trial hardly changes with learning (a learned trial of
-the paper has 1 to 30 % fewer ticks than the first).
+``python -m benchmarks.speed`` measures in one run, on the cells of suite ``paper`` at full size,
+microseconds a trial and core of: the step-by-step loop in plain NumPy (on a few trials of every
+cell, whose rewards have to be equal; its cost per trial hardly changes with learning); the
+compiled kernel with one run at a time; the same with the runs of the cell side by side; and the
+floor, which is what cannot be left out: the forward kinematics that the rules of a movement and
+of the corrective process ask for, at the price of one evaluation among full lanes, and the random
+numbers. ``--repeats`` gives the spread.
 """
 
 from __future__ import annotations
 
-import math
+import argparse
 import tempfile
 import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from benchmarks.registry import registry
 from benchmarks.run import plan_suite
 from benchmarks.suites import Suite, load_suite, select_cells
-from coartic import CONDITIONS, Robot, learn, reference
-from coartic.compiled import entry, inner, joint_chain
-from coartic.learning import METHOD_PREFIX, TRIALS, warm_up
-from coartic.robot import chain
+from coartic import CONDITIONS, Robot, Task, learn_many, load_task, parse_task, reference
+from coartic.compiled import Generators, entry
+from coartic.exploration import ExplorationCondition
+from coartic.lanes import LANES, board, lanes_for, place
+from coartic.learner import rules_of
+from coartic.learning import METHOD_PREFIX, TRIALS, LearningRun, warm_up
 
 SLOW_TRIALS = 60
+GROWTH_TRIALS = 2_000
+_LINKS = (3, 4, 6)  # of an arm
+_BEST_OF = 5
+
+
+@dataclass(frozen=True)
+class Prices:
+    """Nanoseconds."""
+
+    kinematics: float
+    """Forward kinematics of one arm, among full lanes."""
+    normal: float
+    uniform: float
+
+    def floor_us(self, task: Task, condition: ExplorationCondition, run: LearningRun) -> float:
+        """Microseconds a trial of a run's kinematics and random numbers at these prices."""
+        rules, trials = rules_of(task, condition), len(run.rewards)
+        chosen = [0, 1] if len(rules.hands) > 1 else list(rules.hands)
+        normals = len(task.goals) * rules.explored[chosen].sum(axis=1).mean()
+        uniforms = len(task.goals) if rules.exploration else 0
+        kinematics = run.counters.forward_kinematics / trials * self.kinematics
+        return float(kinematics + normals * self.normal + uniforms * self.uniform) / 1e3
+
+
+@dataclass(frozen=True)
+class Times:
+    """Microseconds a trial and core of one cell."""
+
+    name: str
+    numpy: float
+    alone: float
+    together: float
+    floor: float
+
+    def row(self) -> str:
+        """A line of the table."""
+        ratios = (self.numpy / self.together, self.alone / self.together)
+        return (
+            f"{self.name:18}{self.numpy:10.0f}{self.alone:10.2f}{self.together:10.2f}"
+            f"{self.floor:10.2f}{ratios[0]:12.0f}{ratios[1]:9.2f}{self.together / self.floor:9.2f}"
+        )
 
 
 def main() -> None:
     """Measure and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
+    parser.add_argument("--repeats", type=int, default=1, help="measure so many times")
+    repeats = parser.parse_args().repeats
     suite = load_suite("paper")
     trials = suite.trials or TRIALS
     cells = [
         (cell.task, CONDITIONS[cell.method.removeprefix(METHOD_PREFIX)])
         for cell in select_cells(suite, registry())
     ]
+    print("compiling, unless it was done before ...", flush=True)
     warm_up()
+    for number in range(repeats):
+        print(f"\nMeasurement {number + 1} of {repeats}, microseconds a trial and core:\n")
+        _print_cells(suite, cells, trials)
+    _print_growth()
 
-    print(f"{'cell':32}{'NumPy, ms/trial':>17}{'compiled, ms/trial':>20}{'ratio, one core':>17}")
-    slow_total = fast_total = 0.0
+
+def _print_cells(
+    suite: Suite, cells: Sequence[tuple[Task, ExplorationCondition]], trials: int
+) -> None:
+    print(
+        f"{'cell':18}{'NumPy':>10}{'one run':>10}{f'{suite.runs} runs':>10}{'floor':>10}"
+        f"{'NumPy/runs':>12}{'one/runs':>9}{'runs/floor':>11}"
+    )
+    prices = _prices(Robot())
+    times = []
     for task, condition in cells:
-        name = f"{task.name} {condition.id}"
-        clock = time.perf_counter()
-        slow = reference.learn(task, condition, seed=0, trials=SLOW_TRIALS)
-        slow_trial = (time.perf_counter() - clock) / SLOW_TRIALS
-        run = learn(task, condition, seed=0, trials=trials)
-        if not np.array_equal(run.rewards[:SLOW_TRIALS], slow.rewards):
-            raise SystemExit(f"{name}: the two sides disagree")
-        fast_trial = run.wall_s / trials
-        slow_total += slow_trial * trials * suite.runs
-        fast_total += run.wall_s * suite.runs
-        ratio = slow_trial / fast_trial
-        print(f"{name:32}{slow_trial * 1e3:17.2f}{fast_trial * 1e3:20.4f}{ratio:17.0f}")
-
-    bare, harness = _suite(suite, trials)
+        times.append(_times(task, condition, trials, suite.runs, prices))
+        print(times[-1].row(), flush=True)
+    names = ("numpy", "alone", "together", "floor")
+    total = Times("all", *(sum(getattr(row, name) for row in times) for name in names))
+    print(total.row())
     print(
-        f"\nSuite paper, {len(cells) * suite.runs} runs of {trials} trials, all cores: "
-        f"{bare:.1f} s; step by step about {slow_total / 3600:.1f} h\n"
-        f"(extrapolated from {SLOW_TRIALS} trials a cell, rewards equal). "
-        f"Ratio {slow_total / bare:.0f} on all cores, {slow_total / fast_total:.0f} on one.\n"
-        f"Through the harness (processes, records on disk, tables): {harness:.1f} s, "
-        f"{harness / bare:.2f} times the bare kernels."
+        f"One evaluation among {LANES} lanes: {prices.kinematics:.1f} ns; a normal "
+        f"{prices.normal:.1f} ns, a uniform number {prices.uniform:.1f} ns."
     )
-    library, own = _kinematics()
+    one, two, harness = _suite(suite, trials)
+    slow = total.numpy * trials * suite.runs / 1e6
     print(
-        f"Forward kinematics in the kernels: {own:.0f} ns; with the C library's cosine and "
-        f"sine {library:.0f} ns (ratio {library / own:.1f})."
+        f"Suite {suite.name}, {len(cells) * suite.runs} runs of {trials} trials: {one:.1f} s on\n"
+        f"one thread, {two:.1f} s on two (ratio {one / two:.2f}), {harness:.1f} s through the "
+        f"harness with processes,\nrecords and tables ({harness / two:.2f} times two threads); "
+        f"in plain NumPy about {slow / 3600:.1f} h on\none (ratio {slow / one:.0f}, extrapolated "
+        f"from {SLOW_TRIALS} trials a cell)."
     )
 
 
-def _suite(suite: Suite, trials: int) -> tuple[float, float]:
-    """Seconds for the whole suite: kernels on threads, and everything the harness does."""
-    plan = plan_suite(suite, trials=trials)
-    work = [
-        (spec.task, CONDITIONS[spec.method.removeprefix(METHOD_PREFIX)], spec.seed)
-        for _, spec in plan.planned
-    ]
+def _times(
+    task: Task, condition: ExplorationCondition, trials: int, runs: int, prices: Prices
+) -> Times:
     clock = time.perf_counter()
-    runs = Parallel(n_jobs=-1, prefer="threads")(
-        delayed(learn)(task, condition, seed=seed, trials=trials) for task, condition, seed in work
+    slow = reference.learn(task, condition, seed=0, trials=SLOW_TRIALS)
+    slow_us = (time.perf_counter() - clock) / SLOW_TRIALS * 1e6
+    (alone,) = learn_many(task, condition, seeds=[0], trials=trials, jobs=1)
+    together = learn_many(task, condition, seeds=range(runs), trials=trials, jobs=1)
+    name = f"{task.name} {condition.id}"
+    if not np.array_equal(alone.rewards[:SLOW_TRIALS], slow.rewards) or not np.array_equal(
+        alone.rewards, together[0].rewards
+    ):
+        raise SystemExit(f"{name}: two sides disagree")
+    floors = [prices.floor_us(task, condition, run) for run in together]
+    return Times(
+        name,
+        slow_us,
+        alone.wall_s / trials * 1e6,
+        sum(run.wall_s for run in together) / runs / trials * 1e6,
+        sum(floors) / runs,
     )
-    bare = time.perf_counter() - clock
+
+
+def _suite(suite: Suite, trials: int) -> tuple[float, float, float]:
+    """Seconds for the whole suite: kernels on one thread and on two, and what the harness does."""
+    plan = plan_suite(suite, trials=trials)
+    cells: dict[Any, list[int]] = {}
+    for _, spec in plan.planned:
+        cells.setdefault((spec.method, spec.task.name), []).append(spec.seed)
+    seconds: list[float] = []
+    rewards: list[int | None] = []
+    for jobs in (1, 2):
+        clock, rewards = time.perf_counter(), []
+        for (method, task), seeds in cells.items():
+            condition = CONDITIONS[method.removeprefix(METHOD_PREFIX)]
+            runs = learn_many(load_task(task), condition, seeds=seeds, trials=trials, jobs=jobs)
+            rewards += [run.reward for run in runs]
+        seconds.append(time.perf_counter() - clock)
     with tempfile.TemporaryDirectory() as folder:
         clock = time.perf_counter()
         report = plan.perform(folder)
-        harness = time.perf_counter() - clock
-    for run, record in zip(runs, report.records.values(), strict=True):
-        if record.solution is None or record.solution.reward != run.reward:
-            raise SystemExit(f"{record.run_id}: the two sides disagree")
-    return bare, harness
+        seconds.append(time.perf_counter() - clock)
+        stored = report.records.values()
+        if [record.solution and record.solution.reward for record in stored] != rewards:
+            raise SystemExit("kernels and records disagree")
+    one, two, harness = seconds
+    return one, two, harness
 
 
-_chain = inner(chain)
+def _print_growth() -> None:
+    """How the time of a trial grows, with as many runs side by side as there are lanes."""
+    print(f"\nGrowth, {LANES} runs side by side, microseconds a trial and core:\n")
+    print(f"{'':32}{'a trial':>10}{'evaluations':>13}{'ns each':>10}")
+    for name, task, condition, trials in _grown():
+        runs = learn_many(task, condition, seeds=range(LANES), trials=trials, jobs=1)
+        us = sum(run.wall_s for run in runs) / LANES / trials * 1e6
+        asked = sum(run.counters.forward_kinematics for run in runs) / LANES / trials
+        print(f"{name:32}{us:10.2f}{asked:13.1f}{us / asked * 1e3:10.1f}", flush=True)
+
+
+def _grown() -> Iterator[tuple[str, Task, str, int]]:
+    task = load_task("two-armed-1")
+    content = task.model_dump(mode="json")
+    for goals in range(1, len(task.goals) + 1):
+        fewer = {"goals": content["goals"][:goals], "initial_hands": "best-single-hand"}
+        yield f"goals: {goals}", parse_task({**content, **fewer}, "goals"), "EC4", GROWTH_TRIALS
+    length = sum(task.robot.left_links)
+    for links in _LINKS:
+        arm, bent = [length / links] * links, [1.5, *[0.02] * (links - 1)]  # rad
+        robot = {**content["robot"], "left_links": arm, "right_links": arm}
+        start = {**content["start"], "left": bent, "right": bent}
+        other = parse_task({**content, "robot": robot, "start": start}, "joints")
+        yield f"joints: {other.robot.dof}", other, "EC4", GROWTH_TRIALS
+    for trials in (100, 1_000, 10_000):
+        yield f"trials: {trials}", task, "EC4", trials
 
 
 @entry
-def _many_own(postures: Any, arm: Any, xs: Any, ys: Any) -> float:
-    total = 0.0
-    for q in postures:
-        joint_chain(q, arm, xs, ys)
-        total += xs[len(arm.links)]
-    return total
+def _place_often(at: Any, times: int) -> None:
+    for _ in range(times):
+        place(at, LANES)
 
 
 @entry
-def _many_library(postures: Any, arm: Any, xs: Any, ys: Any) -> float:
+def _draw(generators: Any, normals: int, uniforms: int) -> float:
     total = 0.0
-    for q in postures:
-        _chain(q, arm, xs, ys, math.cos, math.sin)
-        total += xs[len(arm.links)]
+    for _ in range(normals):
+        total += generators[0].standard_normal()
+    for _ in range(uniforms):
+        total += generators[0].random()
     return total
 
 
-def _kinematics(count: int = 200_000) -> tuple[float, float]:
-    """Nanoseconds per evaluation, with the library's and with our own functions."""
-    arm = Robot().arm("right")
-    postures = np.random.default_rng(0).uniform(-2, 2, (count, Robot().dof))
-    times = []
-    for function in (_many_library, _many_own):
-        best = math.inf
-        for _ in range(6):  # the first one compiles
-            clock = time.perf_counter()
-            function(postures, arm, np.empty(5), np.empty(5))
-            best = min(best, time.perf_counter() - clock)
-        times.append(best / count * 1e9)
-    return times[0], times[1]
+def _prices(robot: Robot, count: int = 20_000) -> Prices:
+    lanes, rng = lanes_for(robot), np.random.default_rng(0)
+    for lane, q in enumerate(rng.uniform(-2, 2, (LANES, robot.dof))):
+        board(lanes, lane, lane, q, robot.arm("right"))
+    generators, many = Generators([rng]), 10 * count
+    return Prices(
+        _best_ns(lambda: _place_often(lanes.at, count)) / count / LANES,
+        _best_ns(lambda: _draw(generators, many, 0)) / many,
+        _best_ns(lambda: _draw(generators, 0, many)) / many,
+    )
+
+
+def _best_ns(act: Callable[[], object]) -> float:
+    act()  # compiles
+    seconds = []
+    for _ in range(_BEST_OF):
+        clock = time.perf_counter()
+        act()
+        seconds.append(time.perf_counter() - clock)
+    return min(seconds) * 1e9
 
 
 if __name__ == "__main__":

@@ -136,7 +136,11 @@ class Robot:
 
     def forward_kinematics(self, q: ArrayLike, hand: Hand) -> Array:
         """Hand position F_a(q), shape ``(..., 2)``, for ``q`` of shape ``(..., dof)``."""
-        return self.joint_positions(q, hand)[..., -1, :]
+        array = self._configuration(q)
+        xs, ys = self._numpy_chain(array, hand)
+        position = np.empty((*array.shape[:-1], 2))
+        position[..., 0], position[..., 1] = xs[-1], ys[-1]
+        return position
 
     def joint_positions(self, q: ArrayLike, hand: Hand) -> Array:
         """Positions of shoulder, joints and hand, shape ``(..., n + 1, 2)``."""
@@ -215,7 +219,8 @@ class Robot:
         arm = self.arm(hand)
         xs: list[Any] = [None] * (len(arm.links) + 1)
         ys: list[Any] = [None] * (len(arm.links) + 1)
-        chain(np.moveaxis(q, -1, 0), arm, xs, ys, np.cos, np.sin)
+        by_joint = q if q.ndim == 1 else np.moveaxis(q, -1, 0)
+        chain(by_joint, arm, xs, ys, np.cos, np.sin)
         return xs, ys
 
     def _symbolic_chain(self, q: Any, hand: Hand) -> tuple[list[Any], list[Any]]:

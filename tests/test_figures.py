@@ -434,10 +434,9 @@ def test_published_differences(tmp_path):
 
 
 def test_files_are_the_same_every_time(study, tmp_path):
-    def make(folder):
-        return save(bars(study), folder)
-
-    first, second = make(tmp_path / "a"), make(tmp_path / "b" / "deep")
+    plot = bars(study)
+    first = save(plot, tmp_path / "a")
+    second = save(bars(study), tmp_path / "b" / "deep")
     assert {path.suffix for path in first} == {*FORMATS, ".csv"}
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes(), one.name
@@ -445,7 +444,7 @@ def test_files_are_the_same_every_time(study, tmp_path):
             assert not re.search(rb"CreationDate|dc:date", one.read_bytes())
     assert b"/FontFile2" in first[2].read_bytes()  # TrueType, embedded
     table = pd.read_csv(first[3])
-    assert table.reward.tolist() == pytest.approx(bars(study).data.reward.tolist())
+    assert table.reward.tolist() == pytest.approx(plot.data.reward.tolist())
 
 
 def test_files_that_cannot_be_written(study, tmp_path):

@@ -19,6 +19,7 @@ from baselines.cascade import (
     cascade_for,
     damped_projection,
 )
+from baselines.modelled_cascade import ModelledCascade
 from baselines.nullspace_control import Aim, Controller
 from baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
 from benchmarks import qp_solvers
@@ -75,12 +76,24 @@ def test_without_active_limits_the_cascade_is_the_closed_form(solver):
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_a_modelling_language_gives_the_same(solver):
     """cvxpy is told the two levels as they are defined; limits are active in half of them."""
-    modelled = qp_solvers.Modelled(ROBOT.dof, solver)
+    modelled = ModelledCascade(ROBOT.dof, solver)
     assert all(level.is_dcp(dpp=True) for level in modelled.levels)
     cascade = cascade_for(ROBOT.dof, solver)
     for problem in (*problems(5, 3), *problems(5, 4, rate=4.0, preferred=1.0)):
         found = cascade.solve(*problem)
         np.testing.assert_allclose(found, modelled.solve(*problem), rtol=0, atol=1e-8)
+
+
+def test_the_method_through_cvxpy_is_the_same_to_the_last_bit():
+    task, found = load_task("ascending"), []
+    for modelling in ("none", "cvxpy"):
+        method = NextGoal(NextGoal.Parameters(hands="RRR", period=10, modelling=modelling))
+        session = Session(task, 0, method.told, trusted=True)
+        result = method.solve(session)
+        found.append(
+            ([(m.hand, *m.target) for m in result.solution], session.meter.solver_iterations)
+        )
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
@@ -303,7 +316,7 @@ def test_table_of_solvers(monkeypatch):
     monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-304")
     found = qp_solvers.recorded(6)
     figures = qp_solvers.measure(found)
-    figures["osqp"].modelled.failures.append("cvxpy: osqp ended user_limit")
+    figures["osqp"].modelled.failures.append("level 2: osqp ended user_limit")
     figures["osqp"].modelled.solutions[0] = None
     text = qp_solvers.table(found, figures)
     rows = [line.strip("| ").split(" | ") for line in text.splitlines()[2:6]]
@@ -313,5 +326,5 @@ def test_table_of_solvers(monkeypatch):
         assert 0 < int(row[6].rstrip("%")) < 100
         assert max(float(figure) for figure in row[7:10]) < 1e-6
         assert row[10] == ("0, 1" if row[0] == "osqp" else "0, 0")
-    assert text.endswith("osqp: cvxpy: osqp ended user_limit")
+    assert text.endswith("osqp: level 2: osqp ended user_limit")
     assert all(f"{name} " in qp_solvers.conditions() for name in ("cvxpy", "daqp", "osqp"))

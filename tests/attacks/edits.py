@@ -33,12 +33,9 @@ trials = 40
 
 [[cells]]
 tasks = ["ascending"]
-methods = ["dual-process/EC1", "nullspace-qp/none", "corrective-alone/given"]
-
-[[cells]]
-tasks = ["ascending"]
-methods = ["optimum/branch-and-bound"]
-parameters = { nodes = 40, graphs = 1, most_nodes = 100 }
+methods = [
+    "dual-process/EC1", "nullspace-qp/none", "corrective-alone/given", "optimum/branch-and-bound",
+]
 
 [[cells]]
 tasks = ["two-armed-2"]
