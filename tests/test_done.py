@@ -142,6 +142,7 @@ def test_another_plan_is_another_plan(tmp_path, checks):
     assert report.progress.done == 2
 
 
+@pytest.mark.usefixtures("one_by_one")
 def test_a_forgery_with_its_hash_in_the_manifest_is_refused_and_then_undone(tmp_path):
     """The command finds nothing to do; who reads finds the forgery, and says what helps."""
     perform(tmp_path)
