@@ -172,7 +172,6 @@ def correct_lanes(
     at = lanes.at
     if how.nullspace_gain > 0.0:
         copy_lanes(at.q, at.start)
-    rows = 2 * len(at.q) + len(at.length) + 3  # down to its start
     iteration = 0
     while count > 0:
         place(at, count)
@@ -192,7 +191,7 @@ def correct_lanes(
                 ends.iterations[run] = iteration + (at.fate[lane] == _STUCK)
                 ends.evaluations[run] += ends.iterations[run] + 1
                 count -= 1
-                fill(lanes, lane, count, 0, rows)
+                fill(lanes, lanes.corrected, lane, count)
         iteration += 1
 
 

@@ -9,6 +9,8 @@ does not depend on its neighbours, on their number or on the width of the vector
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,8 +31,10 @@ class Lanes(NamedTuple):
 
     at: Any
     """The rows, by name; see :func:`lanes_for`."""
-    rows: Any
-    """The same memory, shape ``(rows, LANES)``."""
+    corrected: Any
+    """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``."""
+    moved: Any
+    """Those of one that moves."""
     run: Any
     """Index of the run in each lane, shape ``(LANES,)``."""
     first: Any
@@ -69,11 +73,20 @@ def lanes_for(robot: Robot) -> Lanes:
         **dict.fromkeys(("step", "last", "distance", "speed", "bend"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
-    height = corrected | shared | moved | passing
-    rows = np.zeros(1, [(name, np.float64, (*shape, LANES)) for name, shape in height.items()])
+    shapes = corrected | shared | moved | passing
+    at = np.zeros(1, [(name, np.float64, (*shape, LANES)) for name, shape in shapes.items()])
+    rows = at.view(np.float64).reshape(-1, LANES)
+    first, last = _height(corrected), _height(corrected | shared)
     return Lanes(
-        rows[0], rows.view(np.float64).reshape(-1, LANES), *np.zeros((3, LANES), np.int64)
+        at[0],
+        rows[:last],
+        rows[first : last + _height(moved)],
+        *np.zeros((3, LANES), np.int64),
     )
+
+
+def _height(shapes: Mapping[str, tuple[int, ...]]) -> int:
+    return sum(math.prod(shape) for shape in shapes.values())
 
 
 @inner
@@ -110,15 +123,15 @@ def copy_lanes(source: Any, destination: Any) -> None:
 
 
 @inner
-def fill(lanes: Any, lane: int, last: int, first_row: int, end_row: int) -> None:
-    """Move the last lane into one that has ended."""
+def fill(lanes: Any, rows: Any, lane: int, last: int) -> None:
+    """Move ``rows`` of the last lane into one that has ended."""
     if lane == last:
         return
     lanes.run[lane] = lanes.run[last]
     lanes.first[lane] = lanes.first[last]
     lanes.links[lane] = lanes.links[last]
-    for row in range(first_row, end_row):
-        lanes.rows[row, lane] = lanes.rows[row, last]
+    for row in range(len(rows)):
+        rows[row, lane] = rows[row, last]
 
 
 @inner

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.compiled import Generators
+from coartic.corrective import correct
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.exploration import ExplorationCondition, load_condition
 from coartic.initial import InitialSearch, search_initial_hands
@@ -304,6 +305,7 @@ def warm_up() -> None:
 
     task = load_task("ascending")
     learn(task, "EC1", seed=0, trials=1).execute()
+    correct(task.robot, task.q0, "right", task.goals[0])
     make_trials(task, "RRR", np.empty((0, len(task.goals), task.robot.dof)))
 
 

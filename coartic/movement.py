@@ -186,8 +186,6 @@ def move_lanes(
     becomes the one in which it stopped; its ``ends`` says how.
     """
     at = lanes.at
-    first_row = len(at.q) + 1
-    rows = 2 * len(at.q) + 2 * len(at.length) + 11
     evaluations = 0
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
@@ -214,7 +212,7 @@ def move_lanes(
             ends.ticks[run] = int(at.step[lane]) + 1
             ends.evaluations[run] += evaluations
             count -= 1
-            fill(lanes, lane, count, first_row, first_row + rows)
+            fill(lanes, lanes.moved, lane, count)
 
 
 @entry
