@@ -41,6 +41,7 @@ _PRESENTATION = {
     "files.py",
     "rows.py",
     "inputs.py",
+    "packs.py",
     "codec.py",
     "record.py",
     "scores.py",

@@ -61,6 +61,7 @@ RUNS = pa.schema(
         ("wall_s", pa.float64()),
         ("cpu_s", pa.float64()),
         ("warm", pa.bool_()),  # the process had run this method before
+        ("together", pa.int32()),  # runs performed side by side; times are equal shares
         ("process_peak_mb", pa.float64()),  # of the worker so far, all its runs included
         ("commit", pa.string()),
         ("code", pa.string()),  # hash of the code that produced the result
@@ -74,6 +75,7 @@ TIMINGS = (
     "wall_s",
     "cpu_s",
     "warm",
+    "together",
     "process_peak_mb",
     "commit",
     "packages",
@@ -334,6 +336,7 @@ def _run_row(suite: str, cell: PlannedCell, record: Record) -> dict[str, Any]:
         "wall_s": record.timing.wall_s,
         "cpu_s": record.timing.cpu_s,
         "warm": record.timing.warm,
+        "together": record.timing.together,
         "process_peak_mb": record.timing.process_peak_mb,
         "commit": commit and commit.id + ("+" if commit.dirty else ""),
         "code": record.code,

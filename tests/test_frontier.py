@@ -50,7 +50,7 @@ def run(method, rewards=None, *, reward=None, number=0, **more):
         "told": "corrective process, reward by trial", "trials": len(learned),
         "movement_ticks": -sum(done), "forward_kinematics": 100 * max(1, len(learned)),
         "jacobians": 10 * max(1, len(learned)), "solver_iterations": 0, "build_s": 0.0,
-        "solve_s": 0.5, "wall_s": 1.0, "warm": True, "solution_corrections": 0,
+        "solve_s": 0.5, "wall_s": 1.0, "warm": True, "together": 1, "solution_corrections": 0,
         "other_arm_travel": 0.0, "proven_bound": None, **more,
     }  # fmt: skip
 

@@ -183,6 +183,7 @@ def _timing_and_model(study: Study) -> Iterator[str]:
         processor=escaped(environment.processor or "an unnamed processor"),
         cores=environment.cores,
         share=_percent(int(cold.sum()) / len(runs)),
+        together=_percent(int((runs.together > 1).sum()) / len(runs)),
     )
     yield _said("model")
     yield _said("one_posture")

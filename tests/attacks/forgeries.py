@@ -26,7 +26,7 @@ from .edits import SUITE, Command, accepted, at, finished, method_of, other
 Record = dict[str, Any]
 LEARNER, PATHS = "dual-process/EC1", "nullspace-qp/none"
 GIVEN, OPTIMUM = "corrective-alone/given", "optimum/branch-and-bound"
-MAY_DIFFER = {"wall_s", "cpu_s", "build_s", "solve_s", "warm", "process_peak_mb"}
+MAY_DIFFER = {"wall_s", "cpu_s", "build_s", "solve_s", "warm", "together", "process_peak_mb"}
 """Columns in which a run that was performed again may differ from the first time."""
 
 
@@ -305,6 +305,7 @@ forge("time negative", put("timing", "wall_s", to=-1.0))
 forge("time is NaN", put("timing", "wall_s", to=math.nan))
 forge("time is text", put("timing", "wall_s", to="short"))
 forge("times gone", gone("timing", "wall_s"))
+forge("together is 0", put("timing", "together", to=0))
 forge("warm is text", put("timing", "warm", to="lukewarm"))
 forge(
     "faster",

@@ -27,7 +27,8 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
         "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
         "told": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
-        "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "warm": run > 0,
+        "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0,
+        "warm": run > 0, "together": 1,
         "solution_corrections": 0, "other_arm_travel": travel, "proven_bound": None, **more,
     }  # fmt: skip
 
@@ -78,7 +79,7 @@ def fake_results(tmp_path, runs, *, task="two-armed-1", method="dual-process/EC2
     frame = frame.assign(
         told="corrective process, reward by trial", parameters="{}", other_arm_travel=1.0,
         movement_ticks=1, forward_kinematics=1, jacobians=1, solver_iterations=0, build_s=0.0,
-        solve_s=0.1, wall_s=0.2, warm=True, solution_corrections=0, proven_bound=None,
+        solve_s=0.1, wall_s=0.2, warm=True, together=1, solution_corrections=0, proven_bound=None,
     )  # fmt: skip
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
     sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
