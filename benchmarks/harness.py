@@ -26,6 +26,7 @@ Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
 MOST_REWARDS = 1_000_000
 """Trials whose rewards are kept of a method that is not built in."""
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
+_SURE = frozenset({"ok", "infeasible"})  # whoever was beside
 RETRIED = frozenset({"timeout", "crashed"})
 
 
@@ -88,7 +89,7 @@ def perform_missing(
             lot, idle = lots.pop(answer["run_id"]), 0
             records = records_of(answer, lot)
             if len(lot) > 1:  # one that went wrong beside others may have had it from them
-                alone.update(record.run_id for record in records if record.status in RETRIED)
+                alone.update(record.run_id for record in records if record.status not in _SURE)
                 records = [record for record in records if record.run_id not in alone]
             store.write(records)
             for record in records:
@@ -168,7 +169,7 @@ def records_of(answer: Answer, specs: Sequence[RunSpec]) -> list[Record]:
     """
 
     def failed(status: Status, reason: str, wall_s: float = 0.0) -> list[Record]:
-        return [_failure(spec, status, reason, wall_s / len(specs)) for spec in specs]
+        return [_failure(spec, status, reason, wall_s) for spec in specs]
 
     if "outcome" not in answer:
         return failed(answer["failure"], answer["reason"], answer["wall_s"])
@@ -279,7 +280,7 @@ def _record(spec: RunSpec, outcome: Outcome, **scores: Solved) -> Record:
         meter=outcome.meter,
         details=outcome.details,
         rewards=outcome.rewards,
-        timing=outcome.timing,
+        timing=outcome.timing.model_copy(update={"time_limit_s": spec.limits.time_s}),
         origin=spec.entry.origin,
         environment=outcome.environment,
     )

@@ -12,7 +12,7 @@ from benchmarks.sandbox import supervise
 from benchmarks.specification import Limits, RunSpec, Setting
 from benchmarks.store import Store
 from coartic import CoarticError, Trajectory, trajectory
-from coartic.packs import Packs
+from coartic.packs import Packs, check_layout
 from coartic.record import Record, RecordError
 from coartic.text import shell_line
 
@@ -24,6 +24,8 @@ def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
     """
     wanted = _safe(prefix)
     folders = sorted({path.parent for path in folder.glob("**/records") if path.is_dir()})
+    for place in folders:
+        check_layout(place)
     packs = [(Store(place), Packs(place)) for place in folders]
     found = [
         (store, run_id) for store, own in packs for run_id in own if run_id.startswith(wanted)

@@ -78,14 +78,14 @@ class Setting:
     def job(self, specs: Sequence[RunSpec]) -> dict[str, Any]:
         """What a worker needs to perform runs of this setting side by side, as plain data.
 
-        It is named after the first of them.
+        It is named after the first of them, and has the time of one: what takes longer side by
+        side is performed again alone, so that a run's fate does not depend on who is beside it.
         """
-        limit_s, seeds = self.limits.time_s, [spec.seed for spec in specs]
         return {
             **self._shared,
             "run_id": specs[0].run_id,
-            "seeds": seeds,
-            "time_limit_s": None if limit_s is None else limit_s * len(seeds),
+            "seeds": [spec.seed for spec in specs],
+            "time_limit_s": self.limits.time_s,
         }
 
     def specs(self, seeds: Sequence[int]) -> Iterator[RunSpec]:

@@ -19,7 +19,7 @@ from filelock import FileLock, Timeout
 from coartic import CoarticError
 from coartic.codec import encode
 from coartic.files import clear_leftovers, write_atomically
-from coartic.packs import Packs, check_layout, number_of, packs_in
+from coartic.packs import Packs, check_layout, is_pack, number_of, packs_in
 from coartic.record import Record, RecordError
 
 
@@ -139,9 +139,13 @@ class Store:
             raise CoarticError(f"{path}: cannot be moved: {_why(error)}") from None
 
     def drop_superseded(self) -> None:
-        """Remove the packs all of whose runs were written again since."""
-        for path in self.packs().superseded():
-            path.unlink(missing_ok=True)
+        """Remove the packs all of whose runs were written again since, and well."""
+        packs = self.packs()
+        for path in packs.superseded():
+            with contextlib.suppress(RecordError):
+                for run_id in packs.runs_in(path):
+                    packs.read(run_id, packs.path(run_id))
+                path.unlink(missing_ok=True)
 
     def stale(self, run_ids: Collection[str]) -> list[str]:
         """Records of the same specifications made by other code."""
@@ -156,6 +160,8 @@ class Store:
         while True:
             self._last += 1
             path = self.records / f"{self._last:08}.pack"
+            if not is_pack(path):
+                raise CoarticError(f"{self.records} has no number left for {path.name}")
             if not os.path.lexists(path):
                 return path
 

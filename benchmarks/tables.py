@@ -8,12 +8,16 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from benchmarks.store import Store
+from coartic.errors import CoarticError
 from coartic.files import check_folder, check_no_report, digest_of, holds, publish, temporary
+from coartic.inputs import read_bytes
 from coartic.packs import Packs, digest_of_packs
 from coartic.tables import (
+    LARGEST_MANIFEST,
     TABLES,
     Manifest,
     Planned,
@@ -21,6 +25,7 @@ from coartic.tables import (
     row_groups,
     schemas,
 )
+from coartic.text import plain
 
 OWNER = "run"
 """Whose files of a results folder these are, and ``comparison.md`` and ``methods.csv``."""
@@ -47,9 +52,12 @@ def is_done(store: Store, manifest: Manifest, pages: Collection[str]) -> bool:
         return False  # nobody knows which code made them
     if not holds(store.folder, (*DERIVED, *pages), owner=OWNER):
         return False  # the list has tables and manifest as they were written together
-    text = (store.folder / "manifest.json").read_text(encoding="utf-8")
-    with contextlib.suppress(ValueError, LookupError, TypeError):
+    with contextlib.suppress(CoarticError, ValueError, LookupError, TypeError, RecursionError):
+        data = read_bytes(store.folder / "manifest.json", LARGEST_MANIFEST)
+        text = data.decode()
         found = json.loads(text)
+        if found["tables"] != _digests(store.folder):
+            return False
         then = {
             "date": found["environment"]["date"],
             "command": tuple(found["environment"]["command"]),
@@ -79,12 +87,15 @@ def write_tables(store: Store, manifest: Manifest) -> None:
             for name, schema in schemas(plan).items()
         }
         for name, table in row_groups(plan, _checked(manifest, packs)):
-            writers[name].write_table(table)
+            writers[name].write_table(table, row_group_size=max(1, len(table)))
         for writer in writers.values():
             writer.close()
         digests = {f"{name}.parquet": digest_of(part) for name, part in parts.items()}
         whole = manifest.model_copy(update={"records": packs.digest, "tables": digests})
         files = {f"{name}.parquet": part for name, part in parts.items()}
+        for name in PAGES:  # of the tables before these: none is better than an old one
+            if holds(store.folder, [name], owner=OWNER):
+                (store.folder / name).unlink()
         publish(
             store.folder,
             {**files, "manifest.json": whole.text().encode()},
@@ -96,9 +107,21 @@ def write_tables(store: Store, manifest: Manifest) -> None:
 
 def statuses(folder: Path) -> Counter[str]:
     """How many runs of a finished folder ended in which way."""
-    table = pq.read_table(folder / "runs.parquet", columns=["status"])
+    path = folder / "runs.parquet"
+    try:
+        table = pq.read_table(path, columns=["status"])
+    except (pa.ArrowException, OSError) as error:
+        raise CoarticError(f"{path} cannot be read: {plain(str(error))}") from None
     counts = table["status"].value_counts().to_pylist()
     return Counter({row["values"]: row["counts"] for row in counts})
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    digests = {}
+    for name in TABLES:
+        with (folder / f"{name}.parquet").open("rb") as file:
+            digests[f"{name}.parquet"] = digest_of(file)
+    return digests
 
 
 def _checked(manifest: Manifest, packs: Packs) -> Iterator[Planned]:

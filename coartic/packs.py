@@ -20,15 +20,19 @@ from coartic.record import Record, RecordError
 
 LARGEST_PACK = 1 << 28
 """Bytes of a pack: rewards of ten million trials, twice over."""
-_PACK = re.compile(r"\d{8,18}\.pack")
+_PACK = re.compile(r"(\d{8}|[1-9]\d{8,17})\.pack")
 _OLD = re.compile(r"[0-9a-f]{16}-[0-9a-f]+\.json")
 _OPEN = 4  # packs kept in memory
 
 
 def packs_in(folder: Path) -> list[Path]:
     """What is named as a pack of a results folder, in the order of the numbers."""
-    found = (path for path in (folder / "records").glob("*.pack") if _PACK.fullmatch(path.name))
-    return sorted(found, key=number_of)
+    return sorted(filter(is_pack, (folder / "records").glob("*.pack")), key=number_of)
+
+
+def is_pack(path: Path) -> bool:
+    """Whether a file is named as a pack."""
+    return _PACK.fullmatch(path.name) is not None
 
 
 def check_layout(folder: Path) -> None:

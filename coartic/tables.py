@@ -69,6 +69,8 @@ RUNS = pa.schema(
         ("result", pa.string()),  # hash of status, solutions, rewards of all trials, bound
     ]
 )
+LARGEST_MANIFEST = 1 << 28
+"""Bytes of a manifest."""
 TIMINGS = (
     "build_s",
     "solve_s",

@@ -12,6 +12,7 @@ from benchmarks.provenance import surroundings
 from benchmarks.run import plan_cells
 from benchmarks.specification import Limits
 from benchmarks.suites import load_suite
+from benchmarks.tables import PAGES
 from coartic import CoarticError
 from coartic.packs import Packs
 from coartic.record import Commit, Record
@@ -168,3 +169,22 @@ def test_a_forgery_with_its_hash_in_the_manifest_is_refused_and_then_undone(tmp_
     found = records_of(tmp_path)
     assert found[run_id]["solution"] == honest[run_id]["solution"]
     load_results(tmp_path)
+
+
+def test_pages_of_earlier_tables_are_not_kept(tmp_path):
+    """More runs without pages, as from Python, then the same with them."""
+    cells = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
+    suite = load_suite("paper")
+
+    def perform(runs, **options):
+        plan = plan_cells(suite, cells, runs=runs, trials=3)
+        return plan.perform(tmp_path, executor=InProcess(), **options)
+
+    def pages(folder):
+        count = len(Packs(folder))
+        return {page: f"of {count} runs".encode() for page in PAGES}
+
+    perform(1, pages=pages)
+    perform(4)
+    perform(4, pages=pages)
+    assert {(tmp_path / page).read_text() for page in PAGES} == {"of 4 runs"}

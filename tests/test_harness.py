@@ -685,3 +685,16 @@ def test_a_selection_of_a_wrong_type_has_a_sentence():
         Selection(tasks=3)
     with pytest.raises(CoarticError, match="an item of tasks is 3; it must be a name or a path"):
         Selection(tasks=[3])
+
+
+def test_a_run_of_more_trials_than_a_row_group_would_hold(tmp_path, monkeypatch):
+    """Parquet would divide the rows of a run: readers want them in one group."""
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", _in_small_groups)
+    cells = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
+    study = run_and_write(tmp_path, cells, runs=2, trials=50)
+    assert len(study.runs) == 2
+    assert pq.ParquetFile(tmp_path / "learning.parquet").num_row_groups == 1
+
+
+def _in_small_groups(writer, table, row_group_size=20, write=pq.ParquetWriter.write_table):
+    write(writer, table, row_group_size)

@@ -10,6 +10,7 @@ from numba import njit
 
 from benchmarks.harness import perform_missing
 from benchmarks.sandbox import failure
+from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import run_specs
 from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
@@ -164,15 +165,15 @@ def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
     assert {found[1].read(run_id).timing.together for run_id in found[1].packs()} == {1}
 
 
-def test_side_by_side_has_the_time_of_all(tmp_path):
+def test_side_by_side_has_the_time_of_one():
     (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
-    planned = [spec for _, spec in run_specs([cell], runs=4, seed=0, trials=3)]
+    limits = Limits(60.0)
+    planned = [spec for _, spec in run_specs([cell], runs=4, seed=0, trials=3, limits=limits)]
     job = planned[0].setting.job(planned)
     assert job["run_id"] == planned[0].run_id
     assert job["seeds"] == [spec.seed for spec in planned]
     assert json.loads(json.dumps(job)) == job
-    alone = planned[0].job()["time_limit_s"]
-    assert job["time_limit_s"] == (None if alone is None else 4 * alone)
+    assert job["time_limit_s"] == planned[0].job()["time_limit_s"] == 60.0
 
 
 def test_long_runs_are_fewer_side_by_side():

@@ -21,10 +21,11 @@ from pydantic import ValidationError
 from coartic import CoarticError, parse_task
 from coartic.files import digest_of
 from coartic.inputs import open_regular, problems_inline, read_bytes
-from coartic.packs import Packs
+from coartic.packs import Packs, check_layout
 from coartic.record import BUILT_IN, Record, RecordError
 from coartic.tables import (
     FORMAT,
+    LARGEST_MANIFEST,
     DeclaredMethod,
     Manifest,
     Plan,
@@ -40,8 +41,6 @@ AGAIN = (
     "start the same `coartic run` again, without the file manifest.json where it finds nothing "
     "to do"
 )
-LARGEST_MANIFEST = 1 << 28
-"""Bytes."""
 BASE = "task"  # base locked as the task has it: the case that rewards compare with
 
 
@@ -55,6 +54,7 @@ def read_manifest(folder: Path) -> Manifest:
 
     Raises CoarticError where there is none, it has another format, or was altered.
     """
+    check_layout(folder)
     path = folder / "manifest.json"
     if not path.exists() and (folder / "records").is_dir():
         raise CoarticError(
