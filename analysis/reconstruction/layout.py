@@ -1,0 +1,80 @@
+"""Arrangements of goals that a search goes through (``layouts.toml``)."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A task's goals as functions of P parameters, and where these may lie."""
+
+    task: str
+    goals: tuple[tuple[str, str], ...]
+    """Parameters that are x and y of each goal."""
+    grid: dict[str, tuple[float, float, float]]
+    """Lowest, highest and step of each parameter, length unit."""
+    less: tuple[tuple[str, str, float], ...]
+    """a, b, gap: a + gap <= b."""
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The parameters, in the order in which the grid goes through them, the last fastest."""
+        return tuple(self.grid)
+
+    @cached_property
+    def _values(self) -> tuple[Array, ...]:
+        return tuple(
+            low + step * np.arange(round((high - low) / step) + 1)
+            for low, high, step in self.grid.values()
+        )
+
+    @property
+    def size(self) -> int:
+        """Points of the grid, those that the layout does not allow included."""
+        return int(np.prod([len(values) for values in self._values]))
+
+    def blocks(self, length: int) -> Iterator[Array]:
+        """The allowed points of the grid, shape ``(<= length, P)``, in order."""
+        shape = tuple(len(values) for values in self._values)
+        for first in range(0, self.size, length):
+            index = np.unravel_index(np.arange(first, min(first + length, self.size)), shape)
+            points = np.stack([v[i] for v, i in zip(self._values, index, strict=True)], axis=1)
+            yield points[self.allowed(points)]
+
+    def places(self, points: Array) -> Array:
+        """Goals, shape ``(N, G, 2)``, of ``points`` (N, P)."""
+        columns = [[self.names.index(name) for name in goal] for goal in self.goals]
+        return np.asarray(points[:, np.array(columns)])
+
+    def allowed(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points lie within the ranges and are arranged as the layout says, ``(N,)``."""
+        low, high, _ = np.array(list(self.grid.values())).T
+        inside = ((points >= low) & (points <= high)).all(axis=1)
+        column = dict(zip(self.names, points.T, strict=True))
+        for a, b, gap in self.less:
+            inside &= column[a] + gap <= column[b] + 1e-9
+        return np.asarray(inside)
+
+
+def layouts() -> dict[str, Layout]:
+    """The layouts by task."""
+    content = tomllib.loads(Path(__file__).with_name("layouts.toml").read_text("utf-8"))
+    return {
+        task: Layout(
+            task,
+            tuple(map(tuple, entry["goals"])),
+            {name: tuple(values) for name, values in entry["grid"].items()},
+            tuple(map(tuple, entry["less"])),
+        )
+        for task, entry in content.items()
+    }

@@ -1,0 +1,99 @@
+"""How likely what is printed of a cell is under a reading, by the reading's own runs.
+
+A cell's runs fall into hand sequences, and the runs of each have a mean and an SD. The counts
+are multinomial; mean and SD are taken together, as they come out where as many runs as were
+printed are drawn from ours with the same hands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from analysis.reconstruction.scoring import Figure, Learned
+
+DRAWS = 4_000
+"""Samples of runs from which the distribution of mean and SD is estimated."""
+FEWEST = 20
+"""Runs with a hand sequence below which nothing is said about its mean and SD."""
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """How likely something printed is."""
+
+    what: str
+    log_density: float
+    """Natural logarithm; of counts that of their probability."""
+    p: float
+    """Chance of something as unlikely as this or less likely."""
+
+
+def likelihoods(figures: Sequence[Figure], learned: Learned) -> list[Likelihood]:
+    """Of the counts of a cell, and of mean and SD of each group of runs that are printed.
+
+    Groups with fewer than FEWEST of our runs are left out: that they are few lowers the
+    likelihood of the counts.
+    """
+    shares = [figure for figure in figures if figure.kind == "share"]
+    found = [_of_counts(shares, learned)] if shares else []
+    spreads = {figure.hands: figure for figure in figures if figure.kind == "sd"}
+    for mean in figures:
+        if mean.kind != "mean":
+            continue
+        chosen = np.array([mean.hands in (None, hands) for hands in learned.hands], dtype=bool)
+        if chosen.sum() >= FEWEST:
+            found.append(_of_group(mean, spreads.get(mean.hands), learned.rewards[chosen]))
+    return found
+
+
+def together(parts: Sequence[Likelihood]) -> Likelihood:
+    """All parts as one, by Fisher's method; they are independent."""
+    p = stats.combine_pvalues([max(part.p, 1e-300) for part in parts]).pvalue
+    return Likelihood("all", sum(part.log_density for part in parts), float(p))
+
+
+def _of_counts(shares: Sequence[Figure], learned: Learned) -> Likelihood:
+    """Multinomial, of printed sequences and all others; half a run more is added to each."""
+    runs = shares[0].runs
+    printed = [round(share.value * runs) for share in shares]
+    own = [sum(hands == share.hands for hands in learned.hands) for share in shares]
+    printed, own = [*printed, runs - sum(printed)], [*own, len(learned.hands) - sum(own)]
+    chances = (np.array(own) + 0.5) / (sum(own) + 0.5 * len(own))
+    model = stats.multinomial(runs, chances)
+    log_chance = float(model.logpmf(printed))
+    drawn = model.logpmf(model.rvs(100_000, random_state=np.random.default_rng(0)))
+    words = ", ".join(
+        f"{share.hands} {count}" for share, count in zip(shares, printed, strict=False)
+    )
+    p = (1 + np.sum(drawn <= log_chance + 1e-9)) / (1 + len(drawn))
+    return Likelihood(f"{shares[0].condition} counts: {words} of {runs}", log_chance, float(p))
+
+
+def _of_group(mean: Figure, sd: Figure | None, rewards: np.ndarray) -> Likelihood:
+    """Kernel estimate of the density of mean and logarithm of the SD, both as printed."""
+    rng = np.random.default_rng(0)
+    drawn = rng.choice(rewards, size=(2 * DRAWS, mean.runs))
+    printed = [mean.value]
+    figures = [_rounded(drawn.mean(axis=1), mean.digits)]
+    if sd is not None:
+        printed.append(math.log(sd.value))
+        spread = _rounded(drawn.std(axis=1, ddof=1), sd.digits)
+        figures.append(np.log(np.maximum(spread, 10.0**-sd.digits)))
+    # Density from one half of the samples, its distribution from the other.
+    fitted, judged = np.split(np.array(figures), 2, axis=1)
+    fitted = fitted + 1e-6 * rng.standard_normal(fitted.shape)
+    density = stats.gaussian_kde(fitted)
+    log_density = float(density.logpdf(printed)[0])
+    below = np.sum(density.logpdf(judged) <= log_density)
+    words = f"{mean.condition} {mean.hands or 'all'}: {mean.value:g}"
+    words += "" if sd is None else f" ± {sd.value:g}"
+    return Likelihood(words, log_density, float((1 + below) / (1 + judged.shape[1])))
+
+
+def _rounded(values: np.ndarray, digits: int) -> np.ndarray:
+    return np.asarray(np.round(values, digits))

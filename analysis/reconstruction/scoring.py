@@ -1,0 +1,148 @@
+"""How far a reconstruction's learned figures are from the printed ones.
+
+Every printed mean, SD and number of runs is one figure; its distance is the difference in
+units of its own uncertainty and that of our runs (the implausibility of history matching:
+Craig et al. 1997; Gonçalves et al. 2020, doi:10.7554/eLife.56261).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic import PAPER, MotionModel, Task, learn_many
+from coartic.exploration import ExplorationCondition
+
+
+class Learned(NamedTuple):
+    """What the runs of a cell learned."""
+
+    rewards: NDArray[np.float64]
+    """Learned reward of each run that completed a trial, ``(N,)``."""
+    hands: tuple[str, ...]
+    """The hand sequence of each."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A printed figure of a cell, and how it was got."""
+
+    condition: str
+    kind: Literal["mean", "sd", "share"]
+    value: float
+    runs: int
+    """Runs that it rests on; of a share, those of the experiment."""
+    hands: str | None = None
+    """Those runs alone that learned this sequence; None for all."""
+    sd: float | None = None
+    """Printed SD of the runs, for a mean."""
+    digits: int = 0
+    """Decimals that are printed."""
+
+    @property
+    def label(self) -> str:
+        """Such as ``EC2 RRLR mean``."""
+        return " ".join(filter(None, (self.condition, self.hands, self.kind)))
+
+    def ours(self, learned: Learned) -> float:
+        """The same figure of our runs; NaN where too few runs learned the sequence."""
+        chosen = np.array([self.hands in (None, hands) for hands in learned.hands], dtype=bool)
+        rewards = learned.rewards[chosen]
+        if self.kind == "share":
+            return len(rewards) / len(chosen)
+        if self.kind == "mean":
+            return float(rewards.mean()) if len(rewards) else math.nan
+        return float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
+
+    def distance(self, learned: Learned) -> float:
+        """Difference in standard errors, positive where ours is the larger; NaN as above."""
+        ours = self.ours(learned)
+        chosen = [self.hands in (None, hands) for hands in learned.hands]
+        own = learned.rewards[np.array(chosen, dtype=bool)]
+        rounding = 10.0**-self.digits / math.sqrt(12.0)
+        if self.kind == "share":
+            pooled = (self.value * self.runs + sum(chosen) + 1.0) / (self.runs + len(chosen) + 2.0)
+            variance = pooled * (1.0 - pooled) * (1.0 / self.runs + 1.0 / len(chosen))
+            return (ours - self.value) / math.sqrt(variance)
+        if len(own) < 2:
+            return math.nan
+        if self.kind == "mean":
+            spread = self.sd or float(own.std(ddof=1))
+            error = spread**2 / self.runs + own.var(ddof=1) / len(own) + rounding**2
+            return (ours - self.value) / math.sqrt(error)
+        # The logarithm of an SD is nearly normal, with variance 1 / (2 (n - 1)).
+        error = 0.5 / (self.runs - 1) + 0.5 / (len(own) - 1) + (rounding / self.value) ** 2
+        return math.log(max(ours, 1e-3) / self.value) / math.sqrt(error)
+
+
+@dataclass(frozen=True)
+class Order:
+    """A condition's mean reward is printed as higher than another's."""
+
+    condition: str
+    than: str
+
+    @property
+    def label(self) -> str:
+        """Such as ``EC4 above EC3``."""
+        return f"{self.condition} above {self.than}"
+
+
+Test = Figure | Order
+ABSENT = 5.0
+"""Distance, in standard errors, of a figure of a hand sequence that too few runs learned."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A printed figure and ours."""
+
+    test: Test
+    ours: float
+    distance: float
+    """In standard errors; positive where ours is the larger."""
+
+
+def learned(
+    task: Task,
+    condition: str | ExplorationCondition,
+    seeds: Iterable[int],
+    *,
+    model: MotionModel = PAPER,
+    trials: int = 10_000,
+    jobs: int = 1,
+) -> Learned:
+    """Learned rewards and hand sequences of runs with these seeds."""
+    runs = learn_many(task, condition, seeds=seeds, trials=trials, model=model, jobs=jobs)
+    completed = [run for run in runs if run.reward is not None]
+    return Learned(
+        np.array([run.reward for run in completed], dtype=np.float64),
+        tuple(run.hands or "" for run in completed),
+    )
+
+
+def compared(tests: Sequence[Test], cells: Mapping[str, Learned]) -> list[Compared]:
+    """Each printed figure beside that of our runs, ``cells`` by condition."""
+    return [_compared(test, cells) for test in tests]
+
+
+def _compared(test: Test, cells: Mapping[str, Learned]) -> Compared:
+    if isinstance(test, Figure):
+        cell = cells[test.condition]
+        return Compared(test, test.ours(cell), test.distance(cell))
+    above, below = cells[test.condition].rewards, cells[test.than].rewards
+    difference = float(above.mean() - below.mean())
+    error = math.sqrt(above.var(ddof=1) / len(above) + below.var(ddof=1) / len(below) + 1e-12)
+    return Compared(test, difference, min(0.0, difference / error))
+
+
+def distance(comparisons: Iterable[Compared]) -> float:
+    """Root mean square of the distances, standard errors; absent figures count as ABSENT."""
+    values = [each.distance for each in comparisons]
+    squares = [ABSENT**2 if math.isnan(value) else value**2 for value in values]
+    return math.sqrt(sum(squares) / len(squares))
