@@ -19,7 +19,13 @@ from coartic.exploration import (
     CONDITIONS,
     NULLSPACE_GAIN,
     VARIANTS,
+    EqualDistance,
     ExplorationCondition,
+    FirstTrial,
+    Learned,
+    Ties,
+    UnknownTarget,
+    Update,
 )
 from coartic.initial import InitialSearch, search_initial_hands
 from coartic.lanes import LANES
@@ -38,6 +44,13 @@ class DualProcessParameters(Parameters):
     """ε"""
     noise_sd: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = 0.05
     """SD of η, length unit (base) or rad (joints)."""
+    ties: Ties = "left"
+    equal_distance: EqualDistance = "random"
+    first_trial: FirstTrial = "learns"
+    unknown_target: UnknownTarget = "corrects"
+    update: Update = "greater"
+    learned: Learned = "best"
+    """What the paper leaves open (:class:`coartic.exploration.ExplorationCondition`)."""
 
 
 class NullspaceParameters(DualProcessParameters):
@@ -69,7 +82,7 @@ class DualProcess(Method):
         return self.condition.why_not(task)
 
     def solve(self, session: Session) -> Result:
-        """Learn; the solution is the best trial's."""
+        """Learn; the solution is the best trial's, or the replay's if that is learned."""
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
             raise result
@@ -109,10 +122,10 @@ def _result(session: Session, run: LearningRun) -> Result | MethodError:
     session.add_solving(run.wall_s)
     session.spend(**asdict(run.counters))
     session.record_rewards(run.rewards.tolist())  # None where a trial failed
-    if run.best_trial is None:
+    if run.status != "ok":
         return MethodError("infeasible", run.reason)
     return Result(
-        run.solution,
+        run.learned,
         initial=run.initial,
         replay=run.replay if run.replay_completed else (),
     )

@@ -13,7 +13,7 @@ process away. What each does to learning is measured in docs/model.md.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
 
 from coartic.errors import CoarticError
 from coartic.robot import HANDS, Hand
@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from coartic.task import Task
 
 HandExploration = Literal["none", "closest", "random"]
+Ties = Literal["left", "right", "random", "nearest", "previous"]
+EqualDistance = Literal["random", "computed"]
+FirstTrial = Literal["learns", "forgotten"]
+UnknownTarget = Literal["corrects", "explores"]
+Update = Literal["greater", "not-less"]
+Learned = Literal["best", "replay"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,19 @@ class ExplorationCondition:
     corrects: bool = True
     """Whether **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
+    ties: Ties = "left"
+    """The hand among those of equal Q, most often unknown ones."""
+    equal_distance: EqualDistance = "random"
+    """The closest hand where both are as near: a random one, or what rounding makes nearer."""
+    first_trial: FirstTrial = "learns"
+    """Whether trial 0 fills Q and q*."""
+    unknown_target: UnknownTarget = "corrects"
+    """Of a pair (s, a) without a stored target: **A** acts at once, or first the noise, from
+    where the robot stands."""
+    update: Update = "greater"
+    """Whether a trial replaces what is stored where R > Q, or where R >= Q."""
+    learned: Learned = "best"
+    """What is learned in the end: the best trial, or the noiseless replay after the last."""
 
     def __post_init__(self) -> None:
         if not self.hands or any(hand not in HANDS for hand in self.hands):
@@ -55,10 +74,12 @@ class ExplorationCondition:
             raise ValueError(f"nullspace_gain {self.nullspace_gain} is not within 0 to 1")
         if not 0.0 <= self.bias < float("inf"):
             raise ValueError(f"bias {self.bias} is not a finite number >= 0")
-        if self.hand_exploration not in ("none", "closest", "random"):
-            raise ValueError(
-                f"hand_exploration {self.hand_exploration!r}: it is 'none', 'closest' or 'random'"
-            )
+        for name, options in _CHOICES.items():
+            if getattr(self, name) not in options:
+                *others, last = map(repr, options)
+                raise ValueError(
+                    f"{name} {getattr(self, name)!r}: it is {', '.join(others)} or {last}"
+                )
 
     def why_not(self, task: Task) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
@@ -76,6 +97,13 @@ class ExplorationCondition:
             )
         return None
 
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    name: get_args(kind)
+    for name, kind in get_type_hints(ExplorationCondition).items()
+    if get_origin(kind) is Literal
+}
+"""What each field that is a choice may be."""
 
 CONDITIONS = {
     condition.id: condition

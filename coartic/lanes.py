@@ -70,7 +70,7 @@ def lanes_for(robot: Robot) -> Lanes:
         "rate": (links,),  # of the absolute link angles, rad a step
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
-        **dict.fromkeys(("step", "last", "distance", "speed", "bend"), ()),
+        **dict.fromkeys(("step", "last", "whole", "distance", "speed", "bend"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing

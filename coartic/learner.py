@@ -9,9 +9,10 @@ One call of a compiled kernel performs many runs side by side, goal by goal and 
 trial (:mod:`coartic.learning` makes it). Each draws from a NumPy generator of its own
 (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
 ε, where hands are explored; a second one that picks a hand, where the first fell below ε
-and the pick is random; one standard normal per explored joint, in the order of ``q``,
-where a target is stored; a bias draws nothing. Runs share nothing: the result of one
-depends neither on the others nor on their number.
+and the pick is random, or where two hands are equal and ties are broken at random; one
+standard normal per explored joint, in the order of ``q``, where a target is stored; a bias
+draws nothing. Runs share nothing: the result of one depends neither on the others nor on
+their number.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from coartic.task import Task
 NO_HAND = 2  # ∅, the previous hand before goal 1
 LEARNED, CORRECTIVE = 0, 1
 _EXPLORATION = {"none": 0, "random": 1, "closest": 2}
+_TIES = {"left": 0, "right": 1, "random": 2, "nearest": 3, "previous": 4}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 
 
@@ -47,6 +49,11 @@ class Rules(NamedTuple):
     noise_sd: float
     bias: float
     corrects: bool
+    ties: int
+    rounding: float  # distances that differ by no more are equal
+    first_learns: bool
+    explores_unknown: bool
+    update_equal: bool
 
 
 class Tables(NamedTuple):
@@ -134,6 +141,11 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         noise_sd=float(condition.noise_sd),
         bias=float(condition.bias),
         corrects=bool(condition.corrects),
+        ties=_TIES[condition.ties],
+        rounding=_EQUALLY_NEAR if condition.equal_distance == "random" else -1.0,
+        first_learns=condition.first_trial == "learns",
+        explores_unknown=condition.unknown_target == "explores",
+        update_equal=condition.update == "not-less",
     )
 
 
@@ -204,6 +216,12 @@ def _greedy(values: Any, hands: Any) -> int:
 
 
 @inner
+def _equal(values: Any, hands: Any) -> bool:
+    """Whether there are two hands, of equal value."""
+    return len(hands) > 1 and bool(values[hands[0]] == values[hands[1]])
+
+
+@inner
 def _random_hand(hands: Any, rng: Any) -> int:
     return int(hands[int(rng.random() * len(hands))])
 
@@ -215,10 +233,24 @@ def _closest_hand(run: int, number: int, problem: Any, rules: Any, rng: Any, wor
     tie = False
     for hand in rules.hands[1:]:
         distance = _goal_distance(run, number, hand, problem, work)
-        tie = abs(distance - nearest_distance) <= _EQUALLY_NEAR
+        tie = abs(distance - nearest_distance) <= rules.rounding
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
     return int(_random_hand(rules.hands, rng)) if tie else int(nearest)
+
+
+@inlined
+def _untied(run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+    """Which of two hands of equal value, where it is not always the left one."""
+    hand = 1
+    if rules.ties == 2:
+        hand = _random_hand(rules.hands, rng)
+    elif rules.ties == 3:
+        left = _goal_distance(run, number, 0, problem, work)
+        hand = 1 if _goal_distance(run, number, 1, problem, work) < left else 0
+    elif rules.ties == 4:
+        hand = 1 if work.previous[run] == 1 else 0
+    return hand
 
 
 @inlined
@@ -229,7 +261,7 @@ def _choose_hands(
     for run in range(len(work.q)):
         if not work.going[run]:
             continue
-        hand = _greedy(tables.value[run, number, work.previous[run]], rules.hands)
+        hand = -1
         if explore and rules.exploration != 0:
             rng = rngs[run]
             if rng.random() < rules.epsilon:
@@ -237,6 +269,11 @@ def _choose_hands(
                     hand = _random_hand(rules.hands, rng)
                 else:
                     hand = _closest_hand(run, number, problem, rules, rng, work)
+        if hand < 0:
+            values = tables.value[run, number, work.previous[run]]
+            hand = _greedy(values, rules.hands)
+            if rules.ties != 0 and _equal(values, rules.hands):
+                hand = _untied(run, number, problem, rules, rngs[run], work)
         work.hand[run] = hand
 
 
@@ -253,7 +290,14 @@ def _set_target(
 
 @inlined
 def _aim(
-    number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
+    number: int,
+    first: bool,
+    explore: bool,
+    problem: Any,
+    rules: Any,
+    tables: Any,
+    rngs: Any,
+    work: Any,
 ) -> None:
     """Where something is learned, set the target; elsewhere see whether the goal is hit."""
     goal = goal_of(problem, number)
@@ -262,12 +306,15 @@ def _aim(
         if not work.going[run]:
             continue
         hand, previous = work.hand[run], work.previous[run]
+        stored = tables.target[run, number, previous, hand]
         work.known[run] = tables.value[run, number, previous, hand] > -math.inf
+        if not work.known[run] and rules.explores_unknown and explore and not first:
+            work.known[run] = True
+            stored = work.q[run]
         if not work.known[run]:
             distance = _goal_distance(run, number, hand, problem, work)
             work.ends.hit[run] = distance <= problem.radius
             continue
-        stored = tables.target[run, number, previous, hand]
         _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rngs[run])
         if explore and rules.bias > 0.0:
             # The mean of η moves into the direction in which **A** would step from q*(s, a).
@@ -301,14 +348,17 @@ def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
             depart(lanes, count, run, work.q[run], work.target[run], arm, problem.model)
             count += 1
     goal = goal_of(problem, number)
-    learned = kind == LEARNED
-    move_lanes(lanes, count, goal, learned, problem.model, work.q, work.target, ends)
+    stops = kind == LEARNED or problem.model.corrective_arrival
+    move_lanes(lanes, count, goal, stops, problem.model, work.q, work.target, ends)
     for run in range(len(work.q)):
         if work.acting[run]:
             ticks = ends.ticks[run]
             work.total[run] += ticks
             work.counts[run, COUNT.ticks] += ticks
             _record(log, run, number, work.hand[run], kind, ticks, work.target[run])
+            if kind == CORRECTIVE and not ends.hit[run]:
+                work.counts[run, COUNT.failed] += 1
+                work.going[run] = False
 
 
 @inlined
@@ -366,9 +416,9 @@ def _trial(
             work.hand[:] = first_hands[number]
         else:
             _choose_hands(number, explore, problem, rules, tables, rngs, work)
-        _aim(number, explore, problem, rules, tables, rngs, work)
+        _aim(number, first, explore, problem, rules, tables, rngs, work)
         for kind in range(2):
-            if kind == CORRECTIVE:  # it ends inside the goal: its tolerance is below the radius
+            if kind == CORRECTIVE:
                 _correct(number, problem, rules, log, work)
             _move(number, kind, problem, log, work)
         for run in range(len(work.q)):
@@ -381,11 +431,12 @@ def _trial(
 
 
 @inlined
-def _update(run: int, reward: float, tables: Any, log: Any) -> None:
+def _update(run: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
     previous = NO_HAND
     for number in range(log.hands.shape[1]):
         hand = log.hands[run, number]
-        if reward > tables.value[run, number, previous, hand]:
+        value = tables.value[run, number, previous, hand]
+        if reward > value or (rules.update_equal and reward == value):
             tables.value[run, number, previous, hand] = reward
             fill_row(tables.target[run, number, previous, hand], log.reached[run, number])
         previous = hand
@@ -403,7 +454,7 @@ def _copy(run: int, source: Any, destination: Any) -> None:
 
 
 @inlined
-def _learn_from(trial: int, tables: Any, kept: Any, log: Any, work: Any) -> None:
+def _learn_from(trial: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*."""
     for run in range(len(work.q)):
         reward = -work.total[run]
@@ -413,7 +464,8 @@ def _learn_from(trial: int, tables: Any, kept: Any, log: Any, work: Any) -> None
             continue
         if trial == 0:
             _copy(run, log, kept.first)
-        _update(run, float(reward), tables, log)
+        if trial > 0 or rules.first_learns:
+            _update(run, float(reward), rules, tables, log)
         best = kept.best_trial[run]
         if best < 0 or reward > kept.rewards[run, best]:
             kept.best_trial[run] = trial
@@ -443,7 +495,7 @@ def learn_kernel(
             fill_row(kept.counts[run], work.counts[run])
         _trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
         if not replay:
-            _learn_from(trial, tables, kept, log, work)
+            _learn_from(trial, rules, tables, kept, log, work)
     for run in range(len(work.q)):
         kept.replayed[run] = work.going[run]
         _copy(run, log, kept.replay)

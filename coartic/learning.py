@@ -107,15 +107,25 @@ class LearningRun:
         return f"{METHOD_PREFIX}{self.condition.id}"
 
     @property
+    def learned(self) -> tuple[Movement, ...]:
+        """Movements of what was learned: the best trial, or the replay where the condition
+        says so; none where there is no such trial."""
+        if self.condition.learned == "best":
+            return self.solution
+        return self.replay if self.replay_completed else ()
+
+    @property
     def status(self) -> str:
-        """``"ok"``, or ``"infeasible"`` where no trial was completed."""
-        return "ok" if self.best_trial is not None else "infeasible"
+        """``"ok"``, or ``"infeasible"`` where nothing was learned."""
+        return "ok" if self.learned else "infeasible"
 
     @property
     def reason(self) -> str:
         """Why the run has no solution; empty where it has one."""
-        if self.best_trial is not None:
+        if self.status == "ok":
             return ""
+        if self.best_trial is not None:
+            return "the replay of what was learned did not hit every goal"
         return (
             f"the corrective process failed in all {self.counters.trials} trials; "
             "no trial hit every goal"
@@ -123,13 +133,16 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Learned reward: the highest total reward of any trial, max Q of state 1."""
+        """Learned reward: the highest total reward of any trial, max Q of state 1; that of
+        the replay where the condition says so."""
+        if self.condition.learned == "replay":
+            return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])
 
     @property
     def hands(self) -> str | None:
-        """Hand sequence of the best trial."""
-        return _hands(self.solution) if self.best_trial is not None else None
+        """Hand sequence of what was learned."""
+        return _hands(self.learned) if self.learned else None
 
     @property
     def initial_reward(self) -> int | None:
@@ -149,10 +162,10 @@ class LearningRun:
         return _hands(self.replay) if self.replay_completed else None
 
     def execute(self) -> Execution:
-        """Execute the best trial again, apart from the learner."""
-        if self.best_trial is None:
+        """Execute what was learned again, apart from the learner."""
+        if not self.learned:
             raise CoarticError(f"nothing to execute: {self.reason}")
-        return execute(self.task, self.solution, model=self.model)
+        return execute(self.task, self.learned, model=self.model)
 
 
 def learn(

@@ -28,6 +28,15 @@ class MotionModel(NamedTuple):
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""
 
+    arrival_tick: int = 1
+    """Ticks beyond its steps that a movement takes, to detect arrival: 1 (inferred) or 0."""
+
+    corrective_arrival: bool = False
+    """Whether a corrective movement also stops where its hand has arrived."""
+
+    whole_last_step: bool = False
+    """Whether the last step is as long as the others and goes beyond the target."""
+
 
 PAPER = MotionModel()
 
@@ -46,6 +55,8 @@ def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionM
         raise ValueError(
             f"model.arrival_tolerance is {model.arrival_tolerance}; it must be 0 to 1e6"
         )
+    if model.arrival_tick not in (0, 1):
+        raise ValueError(f"model.arrival_tick is {model.arrival_tick}; it must be 0 or 1")
     if model.max_iterations < 0:
         raise ValueError(
             f"model.max_iterations is {model.max_iterations}; it must not be negative"

@@ -120,7 +120,9 @@ def depart(lanes: Any, lane: int, run: int, q: Any, target: Any, arm: Any, model
         bend += at.length[k, lane] * rate * rate
     at.base_rate[0, lane], at.base_rate[1, lane] = base_x, base_y
     at.distance[lane], at.speed[lane], at.bend[lane] = distance, speed, bend
-    at.step[lane], at.last[lane] = 0.0, math.ceil(distance / model.step)
+    last = math.ceil(distance / model.step)
+    at.step[lane], at.last[lane] = 0.0, last
+    at.whole[lane] = -1.0 if model.whole_last_step and last > 0.0 else last
 
 
 @lanewise
@@ -131,7 +133,7 @@ def _go(at: Any, count: int, model: Any) -> None:
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
             between = begin + fraction * (end - begin)
-            at.q[j, i] = end if at.step[i] == at.last[i] else between
+            at.q[j, i] = end if at.step[i] == at.whole[i] else between
 
 
 @lanewise
@@ -203,13 +205,13 @@ def move_lanes(
             if at.fate[lane] == GOING:
                 continue
             run = lanes.run[lane]
-            whole = at.step[lane] == at.last[lane]
+            whole = at.step[lane] == at.whole[lane]
             fraction = 0.0 if whole else at.step[lane] * model.step / at.distance[lane]
             for j in range(q.shape[1]):
                 between = q[run, j] + fraction * (target[run, j] - q[run, j])
                 q[run, j] = target[run, j] if whole else between
             ends.hit[run] = at.fate[lane] == _HIT
-            ends.ticks[run] = int(at.step[lane]) + 1
+            ends.ticks[run] = int(at.step[lane]) + model.arrival_tick
             ends.evaluations[run] += evaluations
             count -= 1
             fill(lanes, lanes.moved, lane, count)
@@ -292,7 +294,7 @@ def follow(
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
     inside = np.flatnonzero(np.hypot(*misses.T) <= radius)
     k = int(inside[0]) if inside.size else last
-    return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
+    return MoveResult(np.array(points[k]), k + model.arrival_tick, bool(inside.size), k + 1)
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:

@@ -62,7 +62,7 @@ class Asked(Plain):
     task: TaskContent
     method: Line
     parameters: Values
-    model: dict[str, float | int]
+    model: dict[str, bool | int | float]
     trial_budget: Annotated[int, Field(gt=0)] | None
 
     def with_seed(self, seed: int) -> Specification:

@@ -56,12 +56,13 @@ def move(
     last = math.ceil(distance / model.step)
     expected = robot.forward_kinematics(end, hand)
     for k in range(last + 1):
-        point = end if k == last else start + (k * model.step / distance) * difference
+        at_end = k == last and not (model.whole_last_step and last > 0)
+        point = end if at_end else start + (k * model.step / distance) * difference
         position = robot.forward_kinematics(point, hand)
         hit = _distance(position, goal) <= radius
         arrived = stop_on_arrival and _distance(position, expected) <= model.arrival_tolerance
         if hit or arrived or k == last:
-            return MoveResult(np.array(point), k + 1, hit, k + 2)
+            return MoveResult(np.array(point), k + model.arrival_tick, hit, k + 2)
     raise AssertionError("a movement ends at its target at the latest")
 
 
@@ -120,9 +121,11 @@ def learn(
                 hand = first_hands[number]
             else:
                 hand = _choose(task, condition, q, goal, state, values, rng)
-            known = (state, hand) in targets
+            explores = trial > 0 and condition.unknown_target == "explores"
+            known = (state, hand) in targets or explores
             if known:
-                target = _explore(task, condition, q, hand, goal, targets[state, hand], rng)
+                stored = targets.get((state, hand), q)
+                target = _explore(task, condition, q, hand, goal, stored, rng)
                 biased += condition.bias > 0
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
@@ -141,18 +144,21 @@ def learn(
                     break
                 result = move(
                     task.robot, q, found.q, hand, goal, task.radius,
-                    stop_on_arrival=False, model=model,
+                    stop_on_arrival=model.corrective_arrival, model=model,
                 )  # fmt: skip
                 q, total = result.q, total - result.ticks
                 ticks += result.ticks
                 corrections += 1
+                if not result.hit:
+                    break
             visited.append((state, hand, q))
             previous = hand
         rewards[trial] = total
         completed[trial] = len(visited) == len(task.goals)
-        if completed[trial]:
+        if completed[trial] and (trial > 0 or condition.first_trial == "learns"):
             for state, hand, reached in visited:
-                if total > values.get((state, hand), -math.inf):
+                value = values.get((state, hand), -math.inf)
+                if total > value or (total == value and condition.update == "not-less"):
                     values[state, hand] = total
                     targets[state, hand] = reached
     return ReferenceRun(
@@ -172,11 +178,25 @@ def _choose(
     hands = [hand for hand in HANDS if hand in condition.hands]
     if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
         if condition.hand_exploration == "closest":
-            near = [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
-            if abs(max(near) - min(near)) > 1e-9:
+            near = _distances(task, q, hands, goal)
+            tolerance = 1e-9 if condition.equal_distance == "random" else -1.0
+            if abs(max(near) - min(near)) > tolerance:
                 return hands[int(np.argmin(near))]
         return hands[int(rng.random() * len(hands))]
-    return max(hands, key=lambda hand: values.get((state, hand), -math.inf))
+    learned = [values.get((state, hand), -math.inf) for hand in hands]
+    equal = [hand for hand, value in zip(hands, learned, strict=True) if value == max(learned)]
+    if len(equal) > 1:
+        if condition.ties == "random":
+            return equal[int(rng.random() * len(equal))]
+        if condition.ties == "nearest":
+            return equal[int(np.argmin(_distances(task, q, equal, goal)))]
+        if condition.ties == "right" or (condition.ties == "previous" and state[1] == "right"):
+            return equal[-1]
+    return equal[0]
+
+
+def _distances(task: Task, q: Array, hands: list[Hand], goal: tuple[float, float]) -> list[float]:
+    return [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
 
 
 def _explore(

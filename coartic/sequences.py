@@ -59,9 +59,10 @@ def _hit(g: int, problem: Any, path: Any, q: Any, target: Any, lanes: Any, ends:
             correct_lanes(lanes, 1, goal, problem.corrector, problem.model, target, ends)
             if ends.converged[0]:
                 depart(lanes, 0, 0, q[0], target[0], arm, problem.model)
-                move_lanes(lanes, 1, goal, False, problem.model, q, target, ends)
+                stops = problem.model.corrective_arrival
+                move_lanes(lanes, 1, goal, stops, problem.model, q, target, ends)
                 path.ticks[g + 1] += ends.ticks[0]
-            else:
+            if not ends.hit[0]:
                 path.ticks[g + 1] = math.nan
                 q[:] = math.nan
     fill_row(path.q[g + 1], q[0])

@@ -186,7 +186,7 @@ class _Run:
             hand,
             self.task.goals[number - 1],
             self.task.radius,
-            stop_on_arrival=kind != "corrective",
+            stop_on_arrival=kind != "corrective" or self.model.corrective_arrival,
             model=self.model,
         )
         self.evaluations += result.evaluations

@@ -65,6 +65,7 @@ def trajectory(
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
     rows = [np.empty((0, task.robot.dof))]
+    unpaid = 1 - model.arrival_tick  # the point that a movement begins with
     q = np.array(task.q0)
     elapsed = np.zeros(len(task.goals), dtype=np.int64)
     for movement in execution.movements:
@@ -72,9 +73,10 @@ def trajectory(
         assert movement.target is not None
         if movement.kind == "path":
             assert movement.waypoints is not None
-            points = path_points(task.robot, q, movement.waypoints, model)[: movement.ticks]
+            points = path_points(task.robot, q, movement.waypoints, model)
+            points = points[unpaid : unpaid + movement.ticks]
         else:
-            points = _line(q, movement.target, movement.ticks, model.step)
+            points = _line(q, movement.target, unpaid + movement.ticks, model)[unpaid:]
         if len(points):
             q = points[-1]
             rows.append(points)
@@ -82,16 +84,17 @@ def trajectory(
     return Trajectory(task, execution, np.concatenate(rows), np.maximum(elapsed - 1, 0))
 
 
-def _line(q: Array, target: Array, ticks: int, step: float) -> Array:
+def _line(q: Array, target: Array, count: int, model: MotionModel) -> Array:
     """The first points of a movement, summed and rounded as its kernel does."""
     difference = target - q
     square = 0.0
     for value in difference.tolist():
         square += value * value
     distance = math.sqrt(square)
-    last = math.ceil(distance / step)
-    k = np.arange(ticks)[:, None]
+    last = math.ceil(distance / model.step)
+    k = np.arange(count)[:, None]
     if not last:
-        return np.repeat(target[None, :], ticks, axis=0)
-    points: Array = np.where(k < last, q + k * step / distance * difference, target)
+        return np.repeat(target[None, :], count, axis=0)
+    between = q + k * model.step / distance * difference
+    points: Array = np.where((k < last) | model.whole_last_step, between, target)
     return points

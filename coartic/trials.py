@@ -119,7 +119,8 @@ def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: An
             made.corrections[0] += ends.converged[trial]
             work.acting[trial] = ends.converged[trial]
     count = _depart(arm, problem, work)
-    move_lanes(lanes, count, goal, False, problem.model, work.q, work.target, ends)
+    stops = problem.model.corrective_arrival
+    move_lanes(lanes, count, goal, stops, problem.model, work.q, work.target, ends)
     for trial in range(len(work.q)):
         if work.acting[trial]:
             made.ticks[first + trial] += ends.ticks[trial]

@@ -118,4 +118,6 @@ def try_sequences(
     blocks = [goals[first : first + _BLOCK] for first in range(0, max(len(goals), 1), _BLOCK)]
     with ThreadPoolExecutor(jobs) as pool:
         rewards, reached = zip(*pool.map(perform, blocks), strict=True)
-    return Tried(tuple(sequences), CorrectiveTrials(np.concatenate(rewards), np.concatenate(reached)))
+    return Tried(
+        tuple(sequences), CorrectiveTrials(np.concatenate(rewards), np.concatenate(reached))
+    )

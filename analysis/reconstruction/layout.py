@@ -34,7 +34,7 @@ class Layout:
     @cached_property
     def _values(self) -> tuple[Array, ...]:
         return tuple(
-            low + step * np.arange(round((high - low) / step) + 1)
+            np.linspace(low, high, round((high - low) / step) + 1)
             for low, high, step in self.grid.values()
         )
 

@@ -60,7 +60,9 @@ class Search:
         """The rewards that have to come out."""
         return tuple(c for c in self.constraints if isinstance(c, RewardIs))
 
-    def grid(self, progress: Callable[[int, int], None] = lambda done, size: None) -> tuple[Array, Array]:
+    def grid(
+        self, progress: Callable[[int, int], None] = lambda done, size: None
+    ) -> tuple[Array, Array]:
         """The round points that meet every constraint, and those that come near."""
         exact, near, done = [], [], 0
         for points in self.layout.blocks(_BLOCK):

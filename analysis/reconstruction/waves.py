@@ -114,9 +114,7 @@ def best_of_waves(
             rng = np.random.default_rng([number, wave.around])
             found = search.spread(points, wave.around, rng, wave.step)
             points = np.concatenate([points, found])
-        results = scored(
-            search, points, tests, conditions=conditions, wave=number, runs=wave.runs
-        )
+        results = scored(search, points, tests, conditions=conditions, wave=number, runs=wave.runs)
         results.sort(key=lambda each: each.distance)
         points = np.array([each.point for each in results])
         report(
