@@ -16,7 +16,7 @@ from scipy import stats
 
 from analysis.reconstruction.scoring import Figure, Learned
 
-DRAWS = 4_000
+DRAWS = 2_000
 """Samples of runs from which the distribution of mean and SD is estimated."""
 FEWEST = 20
 """Runs with a hand sequence below which nothing is said about its mean and SD."""

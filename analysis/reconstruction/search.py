@@ -25,8 +25,6 @@ from analysis.reconstruction.layout import Layout
 from coartic import PAPER, MotionModel, Task, hand_sequences
 
 Array = NDArray[np.float64]
-NEAR = 12.0
-"""Ticks by which the rewards of a point of the grid may miss the printed ones."""
 _DIFFERENCE = 0.1  # of the finite differences: rewards are whole ticks, some 100 a length unit
 _STEPS = 12
 _LONGEST = 0.5  # of a step, length unit
@@ -42,6 +40,8 @@ class Search:
     constraints: tuple[Constraint, ...]
     model: MotionModel = PAPER
     jobs: int = 2
+    near: float = 12.0
+    """Ticks by which the rewards of a point of the grid may miss the printed ones."""
     tried: Counter[str] = field(default_factory=Counter)
     """How many points each stage tried, and how many passed each constraint, by words."""
 
@@ -71,7 +71,7 @@ class Search:
             self.tried["round sets of goals"] += len(points)
             for printed in self.printed:
                 reward = self.attempt(points, [printed.hands]).reward(printed.hands)
-                points = points[np.abs(reward - printed.value) <= NEAR]
+                points = points[np.abs(reward - printed.value) <= self.near]
             near.append(points)
             exact.append(self.admitted(points, "round"))
         return np.concatenate(exact), np.concatenate(near)

@@ -1,0 +1,182 @@
+"""Searching for what the paper does not print: trials, constraints, scores, likelihoods."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
+from analysis.reconstruction.ensemble import features, spread_out
+from analysis.reconstruction.layout import Layout, layouts
+from analysis.reconstruction.likelihood import likelihoods, together
+from analysis.reconstruction.scoring import ABSENT, Figure, Learned, Order, compared, distance
+from analysis.reconstruction.search import Search
+from coartic import PAPER, corrective_trial, hand_sequences, load_task
+from coartic.sequences import CorrectiveTrials, corrective_trials
+
+TASK = load_task("two-armed-1")
+NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
+
+
+def test_trials_are_those_that_are_made_one_by_one() -> None:
+    rng = np.random.default_rng(1)
+    goals = TASK.goal_array + rng.uniform(-0.4, 0.4, (3, 4, 2))
+    goals[1, :2] = goals[0, :2]  # begins as the one before
+    model = PAPER._replace(max_iterations=400)  # some fail
+    sequences = hand_sequences(TASK)
+    found = corrective_trials(TASK, sequences, goals, model=model)
+    failed = 0
+    for (n, places), (s, hands) in itertools.product(enumerate(goals), enumerate(sequences)):
+        task = TASK.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
+        alone = corrective_trial(task, hands, model=model)
+        if not alone.completed:
+            failed += 1
+            assert math.isnan(found.rewards[n, s])
+            assert np.isnan(found.reached[n, s, -1]).all()
+            continue
+        assert found.rewards[n, s] == alone.reward
+        np.testing.assert_array_equal(found.reached[n, s], alone.configurations)
+    assert failed == 8
+
+
+def test_trials_refuse_what_does_not_fit() -> None:
+    for goals, hands in (
+        (TASK.goal_array, "RRRR"),
+        (np.full((1, 4, 2), np.nan), "RRRR"),
+        (TASK.goal_array[None], "RRR"),
+    ):
+        with pytest.raises(ValueError, match="goal"):
+            corrective_trials(TASK, [hands], goals)
+
+
+def test_constraints() -> None:
+    rewards = np.array([[-675.0, -700.0], [-675.0, -675.0], [-674.0, np.nan]])
+    reached = np.zeros((3, 2, 4, 10))
+    reached[:, 0, :, 0] = [[-1, 1, 0, 2], [-1, -2, 0, 2], [0.5, 1, 2, -1]]
+    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached))
+    for constraint, expected in (
+        (RewardIs("RRRR", -675.0), [True, True, False]),
+        (Above("RRRR", ("LLLL",)), [True, False, True]),
+        (BaseMoves("RRRR", 0, 1, "left"), [True, True, False]),
+        (BaseMoves("RRRR", 2, 3, "left"), [True, False, False]),
+        (BaseMoves("RRRR", 0, 4, "right"), [True, True, False]),
+    ):
+        assert constraint.holds(tried).tolist() == expected, str(constraint)
+
+
+@pytest.fixture(scope="module")
+def search() -> Search:
+    layout = replace(
+        layouts()["two-armed-1"],
+        grid={
+            "y": (3.04, 3.44, 0.2), "x1": (2.15, 2.55, 0.2), "x2": (3.2, 3.6, 0.2),
+            "y3": (2.76, 3.16, 0.2), "x3": (2.18, 2.58, 0.2), "x4": (7.03, 7.43, 0.2),
+        },
+    )  # fmt: skip
+    constraints = (
+        RewardIs("RRRR", -675.0),
+        RewardIs("LRLR", -532.0),
+        BaseMoves("RRRR", 2, 3, "left"),
+    )
+    return Search(TASK, layout, constraints, jobs=1, near=60.0)
+
+
+def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
+    exact, near = search.grid()
+    assert len(exact) < len(near)
+    found = search.admitted(search.solve(near), "solved")
+    assert len(found) > 10
+    more = search.spread(found, 20, np.random.default_rng(0), 0.02)
+    for points in (exact, found, more):
+        assert search.layout.allowed(points).all()
+        for point in points[:5]:
+            task = search.task_at(point)
+            assert corrective_trial(task, "RRRR").reward == -675
+            assert corrective_trial(task, "LRLR").reward == -532
+    assert search.tried["round sets of goals"] == sum(map(len, search.layout.blocks(99)))
+    assert (np.abs(exact - [3.24, 2.35, 3.4, 2.96, 2.38, 7.23]) < 1e-9).all(axis=1).any()
+
+
+def test_a_grid_holds_what_the_layout_allows() -> None:
+    layout = Layout(
+        "t", (("x", "y"), ("x", "z")), {k: (0.0, 1.0, 0.5) for k in "xyz"}, (("z", "y", 0.5),)
+    )
+    points = np.concatenate(list(layout.blocks(5)))
+    expected = [p for p in itertools.product((0, 0.5, 1), repeat=3) if p[2] + 0.5 <= p[1]]
+    np.testing.assert_array_equal(points, expected)
+    np.testing.assert_array_equal(layout.places(points)[:, 1], points[:, [0, 2]])
+
+
+def test_members_are_spread() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(60, 3))
+    chosen = spread_out(points, 20)
+    assert len(set(chosen.tolist())) == 20
+    for k in range(1, 20):
+        gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
+        assert gaps[chosen[k]] == pytest.approx(gaps.max())
+
+
+def test_features_weigh_rewards_and_postures_alike(search: Search) -> None:
+    goals = NEAR_PRINTED + np.random.default_rng(0).normal(0, 0.05, (30, 4, 2))
+    sequences = ("LRLR", "RRRR")
+    found = features(Tried(sequences, corrective_trials(TASK, sequences, goals)), ("RRRR",))
+    assert found[:, :2].var(axis=0).sum() == pytest.approx(1.0)
+    assert found[:, 2:].var(axis=0).sum() == pytest.approx(1.0)
+
+
+def test_distances_are_in_standard_errors() -> None:
+    rng = np.random.default_rng(0)
+    rewards = rng.normal(-500.0, 3.0, 400)
+    cell = Learned(rewards, ("LRLR",) * 300 + ("RRRR",) * 100)
+    mean = Figure("EC3", "mean", -502.0, 20, sd=3.0)
+    error = math.sqrt(9 / 20 + rewards.var(ddof=1) / 400 + 1 / 12)
+    assert mean.distance(cell) == pytest.approx((rewards.mean() + 502.0) / error)
+    sd = Figure("EC3", "sd", 3.0, 20, digits=1)
+    assert abs(sd.distance(cell)) < 1.0
+    assert Figure("EC3", "sd", 30.0, 20).distance(cell) < -10.0
+    share = Figure("EC3", "share", 0.75, 20, "LRLR")
+    assert share.ours(cell) == 0.75
+    assert share.distance(cell) == 0.0
+    absent = Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
+    assert math.isnan(absent.distance(cell))
+    better = Learned(rewards + 5.0, cell.hands)
+    cells = {"EC3": cell, "EC4": better}
+    assert compared([Order("EC4", "EC3")], cells)[0].distance == 0.0
+    assert compared([Order("EC3", "EC4")], cells)[0].distance < -10.0
+    assert distance(compared([absent, share], cells)) == pytest.approx(ABSENT / math.sqrt(2))
+
+
+def test_chance_of_printed_counts_is_multinomial() -> None:
+    cell = Learned(np.zeros(40), ("RRRR",) * 10 + ("RLRR",) * 30)
+    printed = [Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
+    (counts,) = likelihoods(printed, cell)
+    model = stats.multinomial(4, np.array([10.5, 30.5, 0.5]) / 41.5)
+    assert counts.log_density == pytest.approx(float(model.logpmf([2, 2, 0])))
+    every = [c for c in itertools.product(range(5), repeat=3) if sum(c) == 4]
+    chances = np.array([model.pmf(c) for c in every])
+    exact = chances[chances <= model.pmf([2, 2, 0]) + 1e-12].sum()
+    assert counts.p == pytest.approx(exact, abs=0.01)
+
+
+def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
+    """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
+    rng = np.random.default_rng(0)
+    own = Learned(rng.normal(-300.0, 3.0, 1000), ("RRR",) * 1000)
+
+    def p(runs: np.ndarray) -> float:
+        mean, sd = round(float(runs.mean())), round(float(runs.std(ddof=1)), 1)
+        figures = [
+            Figure("EC1", "mean", mean, 20, sd=sd),
+            Figure("EC1", "sd", sd, 20, digits=1),
+        ]
+        return together(likelihoods(figures, own)).p
+
+    same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(40)]
+    assert stats.kstest(same, "uniform").pvalue > 0.01
+    assert max(p(rng.normal(-305.0, 3.0, 20)) for _ in range(3)) < 0.01
