@@ -1,17 +1,26 @@
-"""The numbers printed in Shah, Barto & Fagg (2013), from ``published.toml``."""
+"""The numbers printed in Shah, Barto & Fagg (2013), put together by task and condition."""
 
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from decimal import Decimal
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, TypeVar
 
-RUNS = 20  # runs of every experiment (printed, section *Initial Solution and Learning*)
-TRIALS = 10_000  # trials of every run (printed there too)
+from analysis.printed import (
+    ENTRIES,
+    Best,
+    Count,
+    Entry,
+    InitialHands,
+    Order,
+    Reward,
+    Sd,
+    constant,
+)
+
+RUNS = int(constant("runs"))  # of every experiment
+TRIALS = int(constant("trials"))  # of every run
 
 
 @dataclass(frozen=True)
@@ -61,34 +70,37 @@ class PublishedCell:
     remark: str = ""
 
 
-def published_initial(task: str) -> tuple[str, int, bool] | None:
+def published_initial(task: str) -> tuple[str, float, bool] | None:
     """Hands, reward and whether derived, of a task's initial solution."""
-    entry = _printed(task, "initial")
-    return entry and (entry["hands"], entry["reward"], entry.get("derived", False))
+    for entry in _said(task, InitialHands):
+        reward = _corrective_reward(task, entry.hands)
+        return entry.hands, reward.number, reward.derived
+    return None
 
 
-def published_exhaustive(task: str) -> tuple[str, int] | None:
+def published_exhaustive(task: str) -> tuple[str, float] | None:
     """Best hands and reward of the corrective process alone over all sequences."""
-    entry = _printed(task, "exhaustive")
-    return entry and (entry["hands"], entry["reward"])
+    for entry in _said(task, Best):
+        return entry.hands, _corrective_reward(task, entry.hands).number
+    return None
 
 
 def published_cells() -> tuple[tuple[str, str], ...]:
     """Tasks and conditions of the paper, in its order: less exploration first."""
-    return tuple((task, name) for task in _PUBLISHED for name in _PUBLISHED[task] if "EC" in name)
+    cells = ((e.task, e.condition) for e in ENTRIES.values() if e.task and e.condition)
+    return tuple(dict.fromkeys(cells))
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
     """What is printed about a cell; None for a cell that the paper does not have."""
-    entry = _printed(task, condition)
-    if entry is None:
+    if (task, condition) not in published_cells():
         return None
-    sequences = tuple(
-        SequenceResult(item["hands"], _summary(item, runs_printed="runs" in item))
-        for item in entry.get("sequences", ())
-    )
-    remark = f"higher than {entry['better_than']}" if "better_than" in entry else ""
-    whole = _summary(entry) if "reward" in entry else pooled([s.summary for s in sequences])
+    rewards = [entry for entry in _said(task, Reward) if entry.condition == condition]
+    sequences = tuple(SequenceResult(e.hands, _summary(e)) for e in rewards if e.hands)
+    over_all = [_summary(entry) for entry in rewards if entry.hands is None]
+    whole = over_all[0] if over_all else pooled([s.summary for s in sequences])
+    lower = [e.than.condition for e in _said(task, Order) if e.condition == condition]
+    remark = f"higher than {lower[-1]}" if whole is None and lower else ""
     return PublishedCell(whole, sequences, remark)
 
 
@@ -109,24 +121,35 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-_PUBLISHED: dict[str, dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("published.toml").read_text("utf-8"), parse_float=Decimal
-)
+Kind = TypeVar("Kind", bound=Entry)
 
 
-def _printed(task: str, what: str) -> Any:
-    return _PUBLISHED.get(task, {}).get(what)
+def _said(task: str, kind: type[Kind]) -> Iterator[Kind]:
+    """Entries of one kind on a task."""
+    return (e for e in ENTRIES.values() if isinstance(e, kind) and e.task == task)
 
 
-def _summary(entry: Mapping[str, Any], *, runs_printed: bool = True) -> Summary:
-    mean, sd = entry["reward"], entry.get("sd")
-    known = None if sd is None else float(sd)
-    digits = _decimals(mean), _decimals(sd)
-    whole = mean if isinstance(mean, int) else float(mean)
-    runs = entry.get("runs", RUNS)
-    return Summary(whole, known, runs, runs_printed=runs_printed, digits=digits)
+def _corrective_reward(task: str, hands: str) -> Reward:
+    """What is printed of the corrective process alone with the hands."""
+    (reward,) = (e for e in _said(task, Reward) if (e.condition, e.hands) == (None, hands))
+    return reward
 
 
-def _decimals(printed: Decimal | int | None) -> int:
-    exponent = printed.as_tuple().exponent if isinstance(printed, Decimal) else 0
-    return -int(exponent)
+def _summary(reward: Reward) -> Summary:
+    """A reward with the SD and the number of runs that are printed beside it."""
+    sd, count = _beside(reward, Sd), _beside(reward, Count)
+    return Summary(
+        reward.number,
+        float(sd.value) if sd else None,
+        int(count.value) if count else RUNS,
+        runs_printed=count is not None or reward.hands is None,
+        digits=(reward.digits, sd.digits if sd else 0),
+    )
+
+
+def _beside(reward: Reward, kind: type[Kind]) -> Kind | None:
+    """The entry of a kind that is said of the same runs."""
+    same = {"task", "condition", "hands"}
+    of = reward.model_dump(include=same)
+    found = (e for e in _said(reward.task or "", kind) if e.model_dump(include=same) == of)
+    return next(found, None)

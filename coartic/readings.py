@@ -1,0 +1,151 @@
+"""What the paper leaves open, and what is chosen here (``readings.toml``).
+
+A reading is one open question with the choices that the text allows, the default among them.
+Each is applied to one field: of the motion model, of the exploration condition or of the task's
+robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+
+from coartic.errors import CoarticError
+from coartic.inputs import brief_value, read_toml
+from coartic.text import did_you_mean
+
+Part = Literal["model", "condition", "robot"]
+Value = bool | int | float | str
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Choice(_Frozen):
+    """One way to read the text."""
+
+    value: Value
+    """Of the parameter; lengths in the model's length unit."""
+    says: str
+    """What it means, in a line."""
+    printed: bool = False
+    """Whether the text says so if it is taken at its word."""
+
+    @property
+    def written(self) -> str:
+        """The value as it is written after a reading's id: ``0.1``, ``true``, ``left``."""
+        return str(self.value).lower() if isinstance(self.value, bool) else str(self.value)
+
+
+class Reading(_Frozen):
+    """An open question about the paper's text."""
+
+    id: str
+    question: str
+    quote: str
+    """What the text says nearest to it."""
+    place: str
+    """Section or figure of the quote."""
+    parameter: Annotated[str, Field(pattern=r"^(model|condition|robot)\.[a-z_]+$")]
+    """Where it is applied: part and field."""
+    default: Choice
+    alternatives: Annotated[tuple[Choice, ...], Field(min_length=1)]
+    why: str
+    """Why the default."""
+
+    @property
+    def part(self) -> Part:
+        """What has the field."""
+        return cast(Part, self.parameter.partition(".")[0])
+
+    @property
+    def field(self) -> str:
+        """Name of the field."""
+        return self.parameter.partition(".")[2]
+
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """All choices, the default first."""
+        return self.default, *self.alternatives
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Reading:
+        values = [choice.written for choice in self.choices]
+        if len(set(values)) < len(values):
+            raise ValueError(f"the choices {', '.join(values)} are not all different")
+        if len({type(choice.value) for choice in self.choices}) > 1:
+            raise ValueError(f"the choices {', '.join(values)} are not of one type")
+        return self
+
+
+@dataclass(frozen=True)
+class ChosenReading:
+    """A reading with one of its choices."""
+
+    reading: Reading
+    choice: Choice
+
+    @property
+    def parameter(self) -> str:
+        """Where it is applied: ``condition.ties``."""
+        return self.reading.parameter
+
+    @property
+    def value(self) -> Value:
+        """Of the parameter."""
+        return self.choice.value
+
+    def __str__(self) -> str:
+        """As :func:`load_reading` takes it."""
+        return f"{self.reading.id}={self.choice.written}"
+
+
+@cache
+def readings() -> tuple[Reading, ...]:
+    """Every reading, in the order of the table."""
+    rows: dict[str, dict[str, Any]] = read_toml(Path(__file__).with_name("readings.toml"))
+    entries = [{"id": name, **row} for name, row in rows.items()]
+    return TypeAdapter(tuple[Reading, ...]).validate_python(entries)
+
+
+def load_reading(text: str) -> ChosenReading:
+    """A reading and its choice from ``id=value``, such as ``ties=right``.
+
+    Raises CoarticError for what is not written so, an unknown reading, and a value that is not
+    among its choices.
+    """
+    name, sign, value = (part.strip() for part in text.partition("="))
+    known = {reading.id: reading for reading in readings()}
+    if not sign:
+        raise CoarticError(
+            f"reading {brief_value(text)}: a reading is written id=value, such as ties=right"
+        )
+    if name not in known:
+        raise CoarticError(
+            f"unknown reading {brief_value(name)}; known: {', '.join(known)}"
+            f"{did_you_mean(name, known)}"
+        )
+    reading = known[name]
+    for choice in reading.choices:
+        if value == choice.written or _same_number(value, choice.value):
+            return ChosenReading(reading, choice)
+    values = [choice.written for choice in reading.choices]
+    raise CoarticError(
+        f"reading {name}: {brief_value(value)} is none of its choices, which are "
+        f"{', '.join(values)}{did_you_mean(value, values)}"
+    )
+
+
+def _same_number(text: str, value: Value) -> bool:
+    """Whether the text is the number, however it is written."""
+    if isinstance(value, bool | str):
+        return False
+    try:
+        return float(text) == value
+    except ValueError:
+        return False
