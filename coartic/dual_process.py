@@ -23,6 +23,7 @@ from coartic.exploration import (
     ExplorationCondition,
     FirstTrial,
     Learned,
+    State,
     Ties,
     UnknownTarget,
     Update,
@@ -49,6 +50,7 @@ class DualProcessParameters(Parameters):
     first_trial: FirstTrial = "learns"
     unknown_target: UnknownTarget = "corrects"
     update: Update = "greater"
+    state: State = "previous-hand"
     learned: Learned = "best"
     """What the paper leaves open (:class:`coartic.exploration.ExplorationCondition`)."""
 

@@ -28,6 +28,7 @@ FirstTrial = Literal["learns", "forgotten"]
 UnknownTarget = Literal["corrects", "explores"]
 Update = Literal["greater", "not-less"]
 Learned = Literal["best", "replay"]
+State = Literal["previous-hand", "goal"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,8 @@ class ExplorationCondition:
     where the robot stands."""
     update: Update = "greater"
     """Whether a trial replaces what is stored where R > Q, or where R >= Q."""
+    state: State = "previous-hand"
+    """What Q and q* are learned for: a goal and the hand before it, or a goal alone."""
     learned: Learned = "best"
     """What is learned in the end: the best trial, or the noiseless replay after the last."""
 

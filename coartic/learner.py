@@ -54,6 +54,7 @@ class Rules(NamedTuple):
     first_learns: bool
     explores_unknown: bool
     update_equal: bool
+    goal_alone: bool
 
 
 class Tables(NamedTuple):
@@ -146,6 +147,7 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         first_learns=condition.first_trial == "learns",
         explores_unknown=condition.unknown_target == "explores",
         update_equal=condition.update == "not-less",
+        goal_alone=condition.state == "goal",
     )
 
 
@@ -425,7 +427,7 @@ def _trial(
             if work.going[run]:
                 log.hands[run, number] = work.hand[run]
                 fill_row(log.reached[run, number], work.q[run])
-                work.previous[run] = work.hand[run]
+                work.previous[run] = NO_HAND if rules.goal_alone else work.hand[run]
     for run in range(len(work.q)):
         work.counts[run, COUNT.evaluations] += work.ends.evaluations[run]
 
@@ -439,7 +441,7 @@ def _update(run: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
         if reward > value or (rules.update_equal and reward == value):
             tables.value[run, number, previous, hand] = reward
             fill_row(tables.target[run, number, previous, hand], log.reached[run, number])
-        previous = hand
+        previous = NO_HAND if rules.goal_alone else hand
 
 
 @inlined

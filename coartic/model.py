@@ -37,6 +37,9 @@ class MotionModel(NamedTuple):
     whole_last_step: bool = False
     """Whether the last step is as long as the others and goes beyond the target."""
 
+    first_step: bool = False
+    """Whether a step is made before the conditions for stopping are evaluated."""
+
 
 PAPER = MotionModel()
 

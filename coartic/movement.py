@@ -163,6 +163,8 @@ def _look(at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any) -> 
             clear = min(clear, clear_steps(gap, closing, at.speed[i], at.bend[i]))
         fate = _MISSED if stop else GOING
         fate = _HIT if goal_distance <= goal.radius else fate
+        early = (at.step[i] == 0.0) & (at.last[i] > 0.0)
+        fate = GOING if model.first_step & early else fate
         # Every step up to step + clear is clear of both discs.
         after = min(at.step[i] + 1.0 + math.floor(min(clear, at.last[i])), at.last[i])
         at.step[i] = after if fate == GOING else at.step[i]

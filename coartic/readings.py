@@ -7,6 +7,7 @@ robot.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value, read_toml
+from coartic.model import PAPER, MotionModel
+from coartic.task import Task, parse_task
 from coartic.text import did_you_mean
 
 Part = Literal["model", "condition", "robot"]
@@ -139,6 +142,46 @@ def load_reading(text: str) -> ChosenReading:
         f"reading {name}: {brief_value(value)} is none of its choices, which are "
         f"{', '.join(values)}{did_you_mean(value, values)}"
     )
+
+
+def load_readings(texts: Iterable[str]) -> tuple[ChosenReading, ...]:
+    """Several readings, in the order of the table, without those that are the default.
+
+    Raises CoarticError as :func:`load_reading`, and for two choices of one reading.
+    """
+    chosen: dict[str, ChosenReading] = {}
+    for text in texts:
+        new = load_reading(text)
+        old = chosen.setdefault(new.reading.id, new)
+        if old.choice != new.choice:
+            raise CoarticError(f"reading {new.reading.id}: {old} and {new} cannot both hold")
+    ordered = (chosen[reading.id] for reading in readings() if reading.id in chosen)
+    return tuple(new for new in ordered if new.choice != new.reading.default)
+
+
+def _fields(chosen: Iterable[ChosenReading], part: Part) -> dict[str, Any]:
+    return {each.reading.field: each.value for each in chosen if each.reading.part == part}
+
+
+def model_under(chosen: Iterable[ChosenReading]) -> MotionModel:
+    """The model as these readings have it."""
+    return PAPER._replace(**_fields(chosen, "model"))
+
+
+def condition_under(chosen: Iterable[ChosenReading]) -> dict[str, Value]:
+    """Fields of an exploration condition, and parameters of the learner, that they change."""
+    return _fields(chosen, "condition")
+
+
+def task_under(chosen: Iterable[ChosenReading], task: Task) -> Task:
+    """A task with the robot that these readings have; TaskError where it then is none."""
+    height = _fields(chosen, "robot").get("shoulder_height")
+    if height is None:
+        return task
+    content = task.model_dump(mode="json")
+    for side in ("left_shoulder", "right_shoulder"):
+        content["robot"][side][1] = height
+    return parse_task(content, f"task {task.name!r} with shoulders at {height:g}")
 
 
 def _same_number(text: str, value: Value) -> bool:

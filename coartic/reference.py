@@ -61,6 +61,8 @@ def move(
         position = robot.forward_kinematics(point, hand)
         hit = _distance(position, goal) <= radius
         arrived = stop_on_arrival and _distance(position, expected) <= model.arrival_tolerance
+        if k == 0 < last and model.first_step:
+            continue
         if hit or arrived or k == last:
             return MoveResult(np.array(point), k + model.arrival_tick, hit, k + 2)
     raise AssertionError("a movement ends at its target at the latest")
@@ -116,7 +118,7 @@ def learn(
         previous: Hand | None = None
         visited: list[tuple[State, Hand, Array]] = []
         for number, goal in enumerate(task.goals):
-            state: State = (number, previous)
+            state: State = (number, previous if condition.state == "previous-hand" else None)
             if trial == 0:
                 hand = first_hands[number]
             else:

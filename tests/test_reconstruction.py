@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
+from analysis.reconstruction import targets
 from analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
 from analysis.reconstruction.ensemble import features, spread_out
 from analysis.reconstruction.layout import Layout, layouts
 from analysis.reconstruction.likelihood import likelihoods, together
+from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
 from analysis.reconstruction.scoring import ABSENT, Figure, Learned, Order, compared, distance
 from analysis.reconstruction.search import Search
-from coartic import PAPER, corrective_trial, hand_sequences, load_task
+from analysis.reconstruction.waves import Wave
+from coartic import PAPER, CoarticError, corrective_trial, hand_sequences, load_task
 from coartic.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
@@ -27,7 +33,7 @@ def test_trials_are_those_that_are_made_one_by_one() -> None:
     rng = np.random.default_rng(1)
     goals = TASK.goal_array + rng.uniform(-0.4, 0.4, (3, 4, 2))
     goals[1, :2] = goals[0, :2]  # begins as the one before
-    model = PAPER._replace(max_iterations=400)  # some fail
+    model = PAPER._replace(max_iterations=900)  # some fail
     sequences = hand_sequences(TASK)
     found = corrective_trials(TASK, sequences, goals, model=model)
     failed = 0
@@ -41,7 +47,7 @@ def test_trials_are_those_that_are_made_one_by_one() -> None:
             continue
         assert found.rewards[n, s] == alone.reward
         np.testing.assert_array_equal(found.reached[n, s], alone.configurations)
-    assert failed == 8
+    assert 0 < failed < len(goals) * len(sequences)
 
 
 def test_trials_refuse_what_does_not_fit() -> None:
@@ -104,7 +110,7 @@ def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
 
 def test_a_grid_holds_what_the_layout_allows() -> None:
     layout = Layout(
-        "t", (("x", "y"), ("x", "z")), {k: (0.0, 1.0, 0.5) for k in "xyz"}, (("z", "y", 0.5),)
+        "t", (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
     )
     points = np.concatenate(list(layout.blocks(5)))
     expected = [p for p in itertools.product((0, 0.5, 1), repeat=3) if p[2] + 0.5 <= p[1]]
@@ -180,3 +186,28 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(40)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
     assert max(p(rng.normal(-305.0, 3.0, 20)) for _ in range(3)) < 0.01
+
+
+def test_a_reconstruction_is_found_scored_and_written(search: Search, tmp_path: Path) -> None:
+    effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30)
+    small = replace(search, tried=Counter())
+    found = reconstruct(small, effort=effort, named={"v0.1": TASK.goal_array})
+    members = pd.read_csv(found.write(tmp_path)[0])
+    assert list(members.member) == ["m001", "m002", "m003", "m004", "v0.1"]
+    for _, row in members[:4].iterrows():
+        goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
+        assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
+    assert members["EC3 LRLR share"].between(0, 1).all()
+    again = reconstruct(
+        replace(search, tried=Counter(), jobs=2), effort=effort, named={"v0.1": TASK.goal_array}
+    )
+    pd.testing.assert_frame_equal(again.members, found.members)
+
+
+def test_what_is_printed_is_what_is_searched_for() -> None:
+    found = {str(c) for c in search_for("two-armed-1").constraints}
+    assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < found
+    labels = [test.label for test in targets.tests_of("two-armed-2")]
+    assert len(set(labels)) == len(labels) == 9
+    with pytest.raises(CoarticError, match="nothing to reconstruct of task 'ascending'"):
+        search_for("ascending")

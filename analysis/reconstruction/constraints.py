@@ -41,6 +41,8 @@ class RewardIs:
 
     hands: str
     value: float
+    within: float = 0.0
+    """Ticks, where the printed value is derived from rounded ones."""
 
     @property
     def sequences(self) -> tuple[str, ...]:
@@ -49,7 +51,7 @@ class RewardIs:
 
     def holds(self, tried: Tried) -> Flags:
         """Where it does, ``(N,)``."""
-        return np.asarray(tried.reward(self.hands) == self.value)
+        return np.asarray(np.abs(tried.reward(self.hands) - self.value) <= self.within)
 
     def __str__(self) -> str:
         return f"{self.hands} gives {self.value:g}"

@@ -52,7 +52,10 @@ class Search:
 
     def task_at(self, point: Array) -> Task:
         """The task with the goals of a point."""
-        goals = self.layout.places(np.asarray(point)[None])[0]
+        return self.task_with(self.layout.places(np.asarray(point)[None])[0])
+
+    def task_with(self, goals: Array) -> Task:
+        """The task with other goals, ``(G, 2)``."""
         return self.task.model_copy(update={"goals": tuple(map(tuple, goals.tolist()))})
 
     @property

@@ -7,7 +7,7 @@ selected nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -56,9 +56,9 @@ PLAN = (
 
 @dataclass(frozen=True)
 class Scored:
-    """A point, what was learned there, and how far that is from what is printed."""
+    """Goals, what was learned there, and how far that is from what is printed."""
 
-    point: Array
+    goals: Array
     cells: Mapping[str, Learned]
     comparisons: Sequence[Compared]
 
@@ -70,29 +70,27 @@ class Scored:
 
 def scored(
     search: Search,
-    points: Array,
+    goals: Iterable[Array],
     tests: Sequence[Test],
     *,
     conditions: Sequence[str],
     wave: int,
     runs: int,
     trials: int = 10_000,
-    progress: Callable[[], None] = lambda: None,
 ) -> list[Scored]:
-    """Learning runs at points ``(N, P)``, with the seeds of a wave; in their order."""
+    """Learning runs at sets of goals (G, 2), with the seeds of a wave; in their order."""
     seeds = range(_SEEDS * wave, _SEEDS * wave + runs)
 
-    def score(point: Array) -> Scored:
-        task = search.task_at(point)
+    def score(places: Array) -> Scored:
+        task = search.task_with(places)
         cells = {
             condition: learned(task, condition, seeds, model=search.model, trials=trials)
             for condition in conditions
         }
-        progress()
-        return Scored(point, cells, compared(tests, cells))
+        return Scored(places, cells, compared(tests, cells))
 
     with ThreadPoolExecutor(search.jobs) as pool:
-        return list(pool.map(score, points))
+        return list(pool.map(score, goals))
 
 
 def best_of_waves(
@@ -102,23 +100,36 @@ def best_of_waves(
     *,
     conditions: Sequence[str],
     plan: Sequence[Wave] = PLAN,
+    trials: int = 10_000,
+    decimals: int = 3,
     report: Callable[[str], None] = lambda text: None,
-) -> list[Scored]:
+) -> Array:
     """Points by their distance to what is printed, the nearest first; those of the last wave.
 
-    ``points`` (N, P) are admissible and spread out, the first ones most.
+    ``points`` (N, P) are admissible and spread out, the first ones most; coordinates are
+    rounded to ``decimals``.
     """
     for number, wave in enumerate(plan, 1):
         points = points[: wave.points]
         if wave.around:
             rng = np.random.default_rng([number, wave.around])
-            found = search.spread(points, wave.around, rng, wave.step)
+            found = np.round(search.spread(points, wave.around, rng, wave.step), decimals)
+            found = search.admitted(found[search.layout.allowed(found)], "around the best")
             points = np.concatenate([points, found])
-        results = scored(search, points, tests, conditions=conditions, wave=number, runs=wave.runs)
-        results.sort(key=lambda each: each.distance)
-        points = np.array([each.point for each in results])
-        report(
-            f"wave {number}: {len(results)} points, {wave.runs} runs a condition; "
-            f"distances {results[0].distance:.2f} to {results[-1].distance:.2f}"
+        results = scored(
+            search,
+            search.layout.places(points),
+            tests,
+            conditions=conditions,
+            wave=number,
+            runs=wave.runs,
+            trials=trials,
         )
-    return results
+        distances = np.array([result.distance for result in results])
+        order = np.argsort(distances, kind="stable")
+        points = points[order]
+        report(
+            f"wave {number}: {len(results)} sets of goals, {wave.runs} runs a condition; "
+            f"distances {distances[order[0]]:.2f} to {distances[order[-1]]:.2f}"
+        )
+    return points
