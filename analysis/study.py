@@ -28,7 +28,7 @@ from analysis.results.folder import CellKey, CellRuns, Results, load_results
 from analysis.results.optima import optima
 from analysis.signatures.register import signature_rows, signatures_table
 from analysis.signatures.trajectories import all_trajectories
-from coartic import Task
+from coartic import MotionModel, Task
 from coartic.files import folder_named
 from coartic.text import counted, did_you_mean
 
@@ -64,6 +64,11 @@ class Study:
     def tasks(self) -> dict[str, Task]:
         """The tasks as they were run, by name."""
         return self.results.tasks
+
+    @property
+    def model(self) -> MotionModel:
+        """The constants of movement of all runs."""
+        return self.results.manifest.specification.model
 
     @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:

@@ -83,6 +83,9 @@ class Optimum(Method):
     def solve(self, session: Session) -> Result:
         """Search; the solution has the fewest ticks found."""
         parameters: OptimumParameters = self.parameters
+        if (session.model.arrival_tick, session.model.whole_last_step) != (1, False):
+            raise MethodError("infeasible", "proof and rounding need a tick for each arrival "
+                              "and a last step that ends at the target")  # fmt: skip
         task = _locked(session.hand_over(*self.told), parameters.base)
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")

@@ -64,6 +64,7 @@ def spec_of(record: Record, known: Registry, limits: Limits) -> RunSpec:
         entry=known[record.method],
         parameters=tuple(specification.parameters.items()),
         limits=Limits(limits.time_s, specification.trial_budget),
+        model=record.model,
     )
     return setting.spec(record.run, specification.seed)
 

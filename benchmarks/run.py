@@ -31,6 +31,7 @@ from coartic import CoarticError
 from coartic.files import folder_named, publish
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.packs import Packs
+from coartic.readings import ChosenReading, load_readings
 from coartic.record import Record
 from coartic.tables import Manifest
 from coartic.text import counted
@@ -107,6 +108,8 @@ class SuitePlan:
     runs: int
     seed: int
     limits: Limits
+    readings: tuple[ChosenReading, ...] = ()
+    """Those that are not the default."""
 
     @property
     def planned(self) -> list[tuple[Cell, RunSpec]]:
@@ -165,7 +168,9 @@ class SuitePlan:
         return RunReport(folder, progress, wall_s, manifest)
 
     def _manifest(self) -> Manifest:
-        return manifest_of(self.suite, self.runs, self.seed, self.cells, self.limits)
+        return manifest_of(
+            self.suite, self.runs, self.seed, self.cells, self.limits, self.readings
+        )
 
 
 def run_suite(
@@ -176,6 +181,7 @@ def run_suite(
     trials: int | None = None,
     seed: int = 0,
     select: Selection = ALL_OF_IT,
+    readings: Sequence[str] = (),
     executor: Executor | None = None,
     watch: Watcher | None = None,
 ) -> RunReport:
@@ -183,7 +189,7 @@ def run_suite(
 
     :func:`plan_suite`, then :meth:`SuitePlan.perform`, which have more to choose from.
     """
-    plan = plan_suite(suite, runs=runs, trials=trials, seed=seed, select=select)
+    plan = plan_suite(suite, runs=runs, trials=trials, seed=seed, select=select, readings=readings)
     return plan.perform(folder, executor=executor, watch=watch)
 
 
@@ -195,10 +201,12 @@ def plan_suite(
     seed: int = 0,
     select: Selection = ALL_OF_IT,
     limits: Limits | None = None,
+    readings: Sequence[str] = (),
 ) -> SuitePlan:
     """Every run of a suite: a shipped one by name, a file by path (``.toml``), or a Suite.
 
-    ``runs`` per cell, ``trials`` per run and ``limits`` are the suite's own by default. Raises
+    ``runs`` per cell, ``trials`` per run and ``limits`` are the suite's own by default.
+    ``readings`` of the paper, as ``"ties=right"``, hold in all cells, beside the suite's. Raises
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
     _check("select", select, Selection, "a Selection, as Selection(tasks=['ascending'])")
@@ -212,7 +220,9 @@ def plan_suite(
         methods=select.methods,
         task_files=[Path(path) for path in select.task_files],
     )
-    return plan_cells(suite, cells, runs=runs, trials=trials, seed=seed, limits=limits)
+    return plan_cells(
+        suite, cells, runs=runs, trials=trials, seed=seed, limits=limits, readings=readings
+    )
 
 
 def plan_cells(
@@ -223,6 +233,7 @@ def plan_cells(
     trials: int | None = None,
     seed: int = 0,
     limits: Limits | None = None,
+    readings: Sequence[str] = (),
 ) -> SuitePlan:
     """As :func:`plan_suite`, of cells made by hand in place of the suite's."""
     runs = suite.runs if runs is None else runs
@@ -242,5 +253,6 @@ def plan_cells(
         raise CoarticError(
             f"limits.time_s is {limits.time_s:g}; it must be above 0, at most {MOST_SECONDS:_}"
         )
-    plans = cell_plans(cells, runs=runs, seed=seed, trials=trials, limits=limits)
-    return SuitePlan(suite, plans, runs, seed, limits)
+    chosen = load_readings([*suite.readings, *readings])
+    plans = cell_plans(cells, runs=runs, seed=seed, trials=trials, limits=limits, chosen=chosen)
+    return SuitePlan(suite, plans, runs, seed, limits, chosen)

@@ -35,6 +35,7 @@ class Setting:
     parameters: tuple[tuple[str, Any], ...]
     """Parameters that differ from the method's defaults."""
     limits: Limits = UNLIMITED
+    model: MotionModel = PAPER
 
     @cached_property
     def all_parameters(self) -> dict[str, Any]:
@@ -53,7 +54,7 @@ class Setting:
             task=self.task.model_dump(mode="json"),
             method=self.entry.name,
             parameters=self.all_parameters,
-            model=PAPER._asdict(),
+            model=self.model._asdict(),
             trial_budget=self.limits.trials,
         )
 
@@ -133,7 +134,7 @@ class RunSpec:
     @property
     def model(self) -> MotionModel:
         """The constants of movement."""
-        return PAPER
+        return self.setting.model
 
     @property
     def specification(self) -> Specification:

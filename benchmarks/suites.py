@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -42,6 +42,8 @@ from coartic.inputs import (
     read_toml,
 )
 from coartic.learning import METHOD_PREFIX
+from coartic.model import MotionModel, checked_model
+from coartic.readings import ChosenReading, condition_under, model_under, task_under
 from coartic.record import run_seeds
 from coartic.robot import Finite
 from coartic.tables import (
@@ -158,6 +160,8 @@ class Suite(BaseModel):
     trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
     """Trials per run, for methods that have this parameter."""
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
+    readings: tuple[Line, ...] = ()
+    """How the paper is read, as ``ties=right``; what is not named is the default."""
     cells: Annotated[tuple[_Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
@@ -388,8 +392,11 @@ def cell_plans(
     seed: int,
     trials: int | None = None,
     limits: Limits = UNLIMITED,
+    chosen: Sequence[ChosenReading] = (),
 ) -> list[CellPlan]:
     """What is asked for of every cell. ``trials`` goes to methods that have it.
+
+    So does what is ``chosen`` of an exploration condition.
 
     Raises CoarticError for wrong parameters, for more than :data:`MOST_PLANNED` runs or
     :data:`MOST_TRIALS` trials, and where two cells ask for the same runs.
@@ -402,8 +409,12 @@ def cell_plans(
         )
     plans = []
     names: dict[str, Cell] = {}
+    model, read = model_under(chosen), condition_under(chosen)
     for cell in cells:
-        parameters = dict(cell.parameters)
+        cell = replace(cell, task=task_under(chosen, cell.task))
+        _check_model(cell.task, model)
+        parameters = {k: v for k, v in read.items() if k in cell.defaults} | dict(cell.parameters)
+        cell = replace(cell, parameters=tuple(parameters.items()))
         if trials is not None and "trials" in cell.defaults:
             parameters.setdefault("trials", trials)
         cell.entry.complete(parameters)  # refuse wrong parameters before any run
@@ -413,7 +424,7 @@ def cell_plans(
                 f"{cell.task.name} x {cell.label}: {asked:_} trials a run; "
                 f"at most {MOST_TRIALS:_} are kept"
             )
-        setting = Setting(cell.task, cell.entry, tuple(parameters.items()), limits)
+        setting = Setting(cell.task, cell.entry, tuple(parameters.items()), limits, model)
         plan = CellPlan(cell, setting, runs if cell.stochastic else 1, seed)
         first = names.setdefault(next(plan.specs()).run_id, cell)
         if first is not cell:
@@ -423,6 +434,13 @@ def cell_plans(
             )
         plans.append(plan)
     return plans
+
+
+def _check_model(task: Task, model: MotionModel) -> None:
+    try:
+        checked_model(model, radius=task.radius)
+    except ValueError as error:
+        raise CoarticError(f"task {task.name!r}: {error}") from None
 
 
 def _block_cells(
@@ -496,11 +514,16 @@ def _exact(value: float) -> str:
 
 
 def manifest_of(
-    suite: Suite, runs: int, seed: int, plans: Sequence[CellPlan], limits: Limits = UNLIMITED
+    suite: Suite,
+    runs: int,
+    seed: int,
+    plans: Sequence[CellPlan],
+    limits: Limits = UNLIMITED,
+    chosen: Sequence[ChosenReading] = (),
 ) -> Manifest:
     """What is asked for, and with what it is made."""
     return Manifest(
-        specification=_plan(suite, runs, seed, plans),
+        specification=_plan(suite, runs, seed, plans, chosen),
         limits=PlanLimits(time_s=limits.time_s, trials=limits.trials),
         environment=surroundings(),
         records="",  # until they are written
@@ -508,13 +531,20 @@ def manifest_of(
     )
 
 
-def _plan(suite: Suite, runs: int, seed: int, plans: Sequence[CellPlan]) -> Plan:
+def _plan(
+    suite: Suite,
+    runs: int,
+    seed: int,
+    plans: Sequence[CellPlan],
+    chosen: Sequence[ChosenReading],
+) -> Plan:
     complete = [(plan.cell, plan.setting.all_parameters) for plan in plans]
     return Plan(
         suite=suite.name,
         runs=runs,
         seed=seed,
         trials=max((trials_in(parameters) for _, parameters in complete), default=0),
+        readings=tuple(map(str, chosen)),
         tasks={cell.task.name: cell.task.model_dump(mode="json") for cell, _ in complete},
         methods={
             cell.method: DeclaredMethod(

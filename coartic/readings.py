@@ -168,7 +168,7 @@ def model_under(chosen: Iterable[ChosenReading]) -> MotionModel:
     return PAPER._replace(**_fields(chosen, "model"))
 
 
-def condition_under(chosen: Iterable[ChosenReading]) -> dict[str, Value]:
+def condition_under(chosen: Iterable[ChosenReading]) -> dict[str, Any]:
     """Fields of an exploration condition, and parameters of the learner, that they change."""
     return _fields(chosen, "condition")
 

@@ -22,7 +22,8 @@ from pydantic import Field
 from coartic.errors import NotApplicableError
 from coartic.initial import hand_sequences, ranked_sequences
 from coartic.method import Information, Meter
-from coartic.model import PAPER
+from coartic.model import MotionModel
+from coartic.readings import load_readings, model_under
 from coartic.record import RECORD_FORMAT, Asked, Environment, Record, run_seeds
 from coartic.scores import PlainMovement
 from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
@@ -158,9 +159,16 @@ class Plan(Plain):
     runs: Count
     seed: Seed
     trials: Count
+    readings: tuple[Line, ...] = ()
+    """Readings of the paper that are not the default, as ``ties=right``."""
     tasks: dict[Line, TaskContent]
     methods: dict[Line, DeclaredMethod]
     cells: tuple[PlannedCell, ...]
+
+    @property
+    def model(self) -> MotionModel:
+        """The constants of movement under these readings."""
+        return model_under(load_readings(self.readings))
 
 
 class PlanLimits(Plain):
@@ -191,7 +199,7 @@ class Manifest(Plain):
             task=plan.tasks[cell.task],
             method=cell.method,
             parameters=cell.complete,
-            model=PAPER._asdict(),
+            model=plan.model._asdict(),
             trial_budget=self.limits.trials,
         )
         seeds = run_seeds(plan.seed, cell.task, plan.runs if method.stochastic else 1)
@@ -258,7 +266,9 @@ def row_groups(plan: Plan, runs: Iterable[Planned]) -> Iterator[tuple[str, pa.Ta
             group = _Group(plan.suite, columns)
         group.add(cell, record)
     yield from group.tables()
-    sequences = [row for task in plan.tasks.values() for row in _sequence_rows(json.dumps(task))]
+    sequences = [
+        row for task in plan.tasks.values() for row in _sequence_rows(json.dumps(task), plan.model)
+    ]
     if sequences:
         yield "sequences", pa.Table.from_pylist(sequences, schema=SEQUENCES)
 
@@ -400,11 +410,11 @@ def _learning_table(rewards: Mapping[str, pa.Array]) -> pa.Table:
 
 
 @lru_cache(maxsize=64)
-def _sequence_rows(content: str) -> Sequence[dict[str, Any]]:
+def _sequence_rows(content: str, model: MotionModel) -> Sequence[dict[str, Any]]:
     """The corrective process alone on a task, one row per hand sequence, best first."""
     task = parse_task(json.loads(content), "manifest")
     try:
-        trials = ranked_sequences(task, hand_sequences(task))
+        trials = ranked_sequences(task, hand_sequences(task), model=model)
     except NotApplicableError:
         return ()  # more sequences than anyone would list
     return [

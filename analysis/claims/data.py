@@ -161,7 +161,7 @@ class Data:
 
     def initial(self, name: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
-        execution = Trajectories(self.task(name), "", "", ()).initial
+        execution = Trajectories(self.task(name), "", "", (), model=self.study.model).initial
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
         self.others.append(f"the corrective process on {name}")

@@ -60,7 +60,7 @@ def normalised_scores(study: Study) -> pd.DataFrame:
     alone = study.results.sequences.set_index(["task", "hands"]).reward
     for cell in study.cells.values():
         best = study.optima.get((cell.task, "free"))
-        start = alone.get((cell.task, initial_hands(study.tasks[cell.task])))
+        start = alone.get((cell.task, initial_hands(study.tasks[cell.task], model=study.model)))
         if best is None or start is None or pd.isna(start):
             continue
         if best.reward in (0, start):  # nothing to fall short of, or to gain

@@ -72,7 +72,7 @@ def initial_solution(study: Study, task: str) -> Solution:
 
     Raises CoarticError where that does not complete the task.
     """
-    execution = Trajectories(study.tasks[task], "", "", ()).initial
+    execution = Trajectories(study.tasks[task], "", "", (), model=study.model).initial
     if execution is None:
         raise missing(study, f"the corrective process alone does not complete {task}")
     return Solution(study.tasks[task], "", "", execution)

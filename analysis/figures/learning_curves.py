@@ -130,7 +130,7 @@ def _panel(
         axes.plot(rows.trial, rows.best, linewidth=1.3, **look.line)
         axes.plot(rows.trial, rows.trials, linewidth=0.6, **look.line)
     floor, top = data.best.min(), data.best_high.max()
-    initial = Trajectories(task, "", "", ()).initial
+    initial = Trajectories(task, "", "", (), model=study.model).initial
     if initial is not None:
         axes.axhline(-initial.ticks, **style.INITIAL)
         floor, top = -initial.ticks, max(top, -initial.ticks)

@@ -51,6 +51,28 @@ def likelihoods(figures: Sequence[Figure], learned: Learned) -> list[Likelihood]
     return found
 
 
+def of_gain(gain: float, initial: float, mean: Figure) -> Likelihood | None:
+    """Of a printed gain over the initial solution, given the printed mean; None if certain.
+
+    Both are rounded from one mean: where it rounds to what is printed, the initial reward
+    decides the gain but for a mean on the border.
+    """
+    words = f"{mean.condition} gain of {gain:g} over {initial:g}"
+    border = 0.5 * 10.0**-mean.digits
+    lowest, highest = mean.value - border, mean.value + border
+    fits = max(0.0, min(highest, initial + gain + 0.5) - max(lowest, initial + gain - 0.5))
+    if fits > 1e-9:
+        share = fits / (highest - lowest)
+        if share > 1.0 - 1e-9:
+            return None
+        return Likelihood(words, math.log(share), share)
+    # On the border: means of n runs are multiples of 1 / n.
+    touches = abs(highest - (initial + gain - 0.5)) < 1e-9
+    touches |= abs(lowest - (initial + gain + 0.5)) < 1e-9
+    chance = 1.0 / mean.runs if touches else 1e-9
+    return Likelihood(words, math.log(chance), chance)
+
+
 def together(parts: Sequence[Likelihood]) -> Likelihood:
     """All parts as one, by Fisher's method; they are independent."""
     p = stats.combine_pvalues([max(part.p, 1e-300) for part in parts]).pvalue

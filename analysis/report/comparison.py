@@ -13,6 +13,7 @@ from analysis.report.tables.common import table_ids
 from analysis.report.tables.methods import methods_table, reading_of_methods
 from analysis.report.tables.paper import beside_paper
 from analysis.study import Study
+from coartic.tables import Plan
 from coartic.text import counted
 
 
@@ -59,11 +60,16 @@ def _made(study: Study) -> str:
     specification, environment = manifest.specification, manifest.environment
     made = (
         f", {counted(specification.runs, 'run')} of {specification.trials} trials, "
-        f"seed {specification.seed}; {version_text(environment)}, model code "
-        f"{environment.model_code}; Python {environment.python}, {environment.platform}; "
-        f"{environment.date}."
+        f"seed {specification.seed}{_read(specification)}; {version_text(environment)}, "
+        f"model code {environment.model_code}; Python {environment.python}, "
+        f"{environment.platform}; {environment.date}."
     )
     return f"Suite {code(specification.suite)}{escaped(made)}"
+
+
+def _read(plan: Plan) -> str:
+    """How the paper is read, where not by default."""
+    return f", read with {' and '.join(plan.readings)}" if plan.readings else ""
 
 
 def _noted(tables: Iterable[DataTable | None], said: set[str]) -> tuple[Block, ...]:

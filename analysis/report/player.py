@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from analysis.report.document import CellKey
 from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
-from coartic import Robot, Task, Trajectory, corrective_trial, initial_hands, trajectory
+from coartic import (
+    MotionModel,
+    Robot,
+    Task,
+    Trajectory,
+    corrective_trial,
+    initial_hands,
+    trajectory,
+)
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS
 from coartic.text import json_text
@@ -95,12 +103,14 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
         index = nearest_to_median(cell)
         row = good.iloc[index]
         first = row.initial_hands
-        hands = str(first) if isinstance(first, str) and first else _initial_hands(task)
+        hands = (
+            str(first) if isinstance(first, str) and first else _initial_hands(task, study.model)
+        )
         head = {"label": key[1], "run": str(row.run_id), "runs": len(cell.runs)}
         if hands and hands not in initials:
-            execution = corrective_trial(task, hands)
+            execution = corrective_trial(task, hands, model=study.model)
             if execution.completed:
-                initials[hands] = trajectory(task, execution.movements)
+                initials[hands] = trajectory(task, execution.movements, study.model)
         if hands in initials:
             head["initial"] = hands
         chosen.append((head, cell.runs[index]))
@@ -124,9 +134,9 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
     }
 
 
-def _initial_hands(task: Task) -> str | None:
+def _initial_hands(task: Task, model: MotionModel) -> str | None:
     try:
-        return initial_hands(task)
+        return initial_hands(task, model=model)
     except NotApplicableError:
         return None
 

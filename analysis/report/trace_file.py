@@ -142,6 +142,7 @@ def command_of(plan: Plan, task: str, method: str) -> str:
         "--out": "NEW",
     }
     asked = [str(word) for option in options.items() for word in option]
+    asked += [word for reading in plan.readings for word in ("--reading", reading)]
     # After --, a name is not taken for an option.
     line = [*asked, "--", plan.suite] if plan.suite.startswith("-") else [plan.suite, *asked]
     return shell_line("coartic", "run", *line)

@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict
 
 from analysis.results.folder import Results, load_results
 from analysis.results.laws import BASE
-from coartic import CoarticError, Task
+from coartic import PAPER, CoarticError, Task
 from coartic.files import write_atomically
 from coartic.record import SEARCH
 from coartic.tables import label_of
@@ -100,7 +100,7 @@ class Optimum:
 def optima(study: Study) -> dict[tuple[str, str], Optimum]:
     """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
 
-    What the shipped data say where the task is the same in all that matters, bettered by
+    What the shipped data say where task and model are the same in all that matters, bettered by
     what the folder's own searches found; these are named as its source wherever they give it.
     """
     found: dict[tuple[str, str], Optimum] = {}
@@ -111,7 +111,7 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
         for arm in ARMS:
             searches = dict(_searches(own, arm))
             candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
-            entry = _shipped().get((essence(task), arm))
+            entry = _shipped().get((essence(task), arm)) if study.model == PAPER else None
             if entry is not None and entry.reward is not None:
                 best = tuple(entry.searches.items())
                 candidates.append(Optimum(entry.reward, entry.hands, entry.bound, best))

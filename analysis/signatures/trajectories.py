@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.signatures.subtasks import change_from
-from coartic import Execution, Hand, Task, Trajectory, corrective_trial, initial_hands, trajectory
+from coartic import (
+    PAPER,
+    Execution,
+    Hand,
+    MotionModel,
+    Task,
+    Trajectory,
+    corrective_trial,
+    initial_hands,
+    trajectory,
+)
 from coartic.errors import NotApplicableError
 from coartic.robot import Array
 from coartic.rows import movements_from
@@ -34,6 +44,7 @@ class Trajectories:
     best_hands: tuple[str, ...] = ()
     """Hand sequences that are best by the corrective process alone, as far as the folder
     knows."""
+    model: MotionModel = PAPER
 
     @cached_property
     def initial(self) -> Execution | None:
@@ -42,13 +53,13 @@ class Trajectories:
         None where it completes the task with none.
         """
         try:
-            return self.corrective(initial_hands(self.task))
+            return self.corrective(initial_hands(self.task, model=self.model))
         except NotApplicableError:
             return None
 
     def corrective(self, hands: str) -> Execution | None:
         """The corrective process alone with these hands; None where it fails the task."""
-        execution = corrective_trial(self.task, hands)
+        execution = corrective_trial(self.task, hands, model=self.model)
         return execution if execution.completed else None
 
     @cached_property
@@ -122,13 +133,13 @@ def all_trajectories(study: Study) -> dict[tuple[str, str], Trajectories]:
     solutions = dict(list(study.results.solutions().groupby("run_id")))
     waypoints = study.results.paths()
     paths = dict(list(waypoints.groupby("run_id"))) if len(waypoints) else {}
-    found = {}
+    found, model = {}, study.model
     for key, cell in study.cells.items():
         task = study.tasks[cell.task]
         runs = tuple(
-            trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)))
+            trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)), model)
             for run_id in cell.good.run_id
         )
         best = best_sequences(study.results.sequences, cell.task)
-        found[key] = Trajectories(task, cell.method, cell.variant, runs, tuple(best))
+        found[key] = Trajectories(task, cell.method, cell.variant, runs, tuple(best), model)
     return found

@@ -66,6 +66,12 @@ Records = Annotated[
     Path, typer.Option("--in", parser=folder_named, help="Folder to look for the run in.")
 ]
 Out = Annotated[str, typer.Option("--out", help="Folder for the results.")]
+Readings = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="How the paper is read, as ties=right (`coartic readings`); once for each reading.",
+    ),
+]
 Runs = Annotated[int | None, typer.Option(min=1, max=MOST_RUNS, help="Runs per cell.")]
 Trials = Annotated[int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")]
 Jobs = Annotated[int, typer.Option(min=-1, max=1024, help="Processes; -1 for one per core.")]

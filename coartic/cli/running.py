@@ -38,6 +38,7 @@ def run(
     seed: given.Seed = 0,
     time_limit: given.TimeLimit = None,
     trial_budget: given.TrialBudget = None,
+    reading: given.Readings = None,
     scheduler: given.Scheduler = None,
     retry_failed: given.RetryFailed = False,
     redo: given.Redo = False,
@@ -55,7 +56,10 @@ def run(
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
-    plan = plan_suite(chosen, runs=runs, trials=trials, seed=seed, select=select, limits=limits)
+    plan = plan_suite(
+        chosen, runs=runs, trials=trials, seed=seed, select=select, limits=limits,
+        readings=reading or (),
+    )  # fmt: skip
     perform = partial(plan.perform, out, retry_failed=retry_failed, redo=redo)
     with performing(chosen.name, out) as display:
         comparison, executor = _Comparison(display), _executor(jobs, scheduler, display)

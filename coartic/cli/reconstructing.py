@@ -1,0 +1,98 @@
+"""Commands about what the paper does not print: its readings and the goals of its tasks."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+
+from coartic.cli import arguments as given
+from coartic.cli.arguments import check_numbers
+from coartic.cli.terminal import say, show_table
+from coartic.files import folder_named
+from coartic.inputs import MOST_RUNS, MOST_TRIALS
+
+GROUP = "What is not printed"
+
+
+def readings(
+    judge: Annotated[
+        str | None, typer.Option("--judge", metavar="FOLDER", help="Judge them, into a folder.")
+    ] = None,
+    runs: Annotated[
+        int, typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task.")
+    ] = 1000,
+    trials: Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")] = 10_000,
+    pairs: Annotated[bool, typer.Option(help="Every two readings together as well.")] = False,
+    jobs: given.Jobs = -1,
+) -> None:
+    """List what the paper leaves open, or judge it by what is printed of one-armed tasks."""
+    if judge is None:
+        _list_readings()
+        return
+    from analysis.reconstruction.judge import combinations, judge_all, judged_table
+
+    check_numbers(jobs, None)
+    folder = folder_named(judge, "--judge")
+    judged = judge_all(
+        list(combinations(pairs)),
+        runs=runs,
+        trials=trials,
+        jobs=_threads(jobs),
+        progress=lambda each: say(f"{' '.join(map(str, each.chosen)) or 'default'}: "
+                                  f"p = {each.whole.p:.2g}"),
+    )  # fmt: skip
+    table = judged_table(judged)
+    folder.mkdir(parents=True, exist_ok=True)
+    table.to_csv(folder / "readings.csv", index=False, lineterminator="\n")
+    shown = table[["readings", "log likelihood", "p", "verdict"]]
+    show_table("Readings", tuple(shown.columns), [tuple(map(str, row)) for row in shown.values])
+    say("", f"Results in {folder / 'readings.csv'}.")
+
+
+def _list_readings() -> None:
+    from coartic.readings import readings as known
+
+    show_table(
+        "Readings",
+        ("reading", "what is open", "default", "alternatives"),
+        [
+            (
+                reading.id,
+                " ".join(reading.question.split()),
+                reading.default.written,
+                ", ".join(choice.written for choice in reading.alternatives),
+            )
+            for reading in known()
+        ],
+    )
+
+
+def reconstruct(
+    task: Annotated[str, typer.Argument(help="Task whose goals are not printed.")],
+    folder: given.Out,
+    members: Annotated[int, typer.Option(min=2, max=2000, help="Members of the ensemble.")] = 240,
+    runs: Annotated[int, typer.Option(min=2, max=1000, help="Runs a member and condition.")] = 20,
+    reading: given.Readings = None,
+    jobs: given.Jobs = -1,
+) -> None:
+    """Search for goals that give what is printed, and make an ensemble of them."""
+    from analysis.reconstruction.reconstruct import Effort, search_for
+    from analysis.reconstruction.reconstruct import reconstruct as perform
+    from coartic.readings import load_readings, model_under
+
+    check_numbers(jobs, None)
+    out = folder_named(folder, "--out")
+    search = search_for(task, model=model_under(load_readings(reading or ())), jobs=_threads(jobs))
+    found = perform(search, effort=Effort(members=members, runs=runs), report=say)
+    paths = found.write(out)
+    say("", f"The nearest is {found.nearest.distance:.2f} standard errors from what is printed.")
+    say(f"Results in {paths[0]} and {paths[1]}.")
+
+
+def _threads(jobs: int) -> int:
+    return (os.cpu_count() or 1) if jobs == -1 else max(jobs, 1)
+
+
+COMMANDS = (readings, reconstruct)
