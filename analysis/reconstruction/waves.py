@@ -45,12 +45,12 @@ class Wave:
 
 
 PLAN = (
-    Wave(points=600, runs=6),
-    Wave(points=100, runs=20),
-    Wave(points=20, runs=20, around=120, step=0.1),
-    Wave(points=20, runs=20, around=120, step=0.03),
-    Wave(points=30, runs=60),
-    Wave(points=8, runs=200),
+    Wave(points=300, runs=6),
+    Wave(points=60, runs=20),
+    Wave(points=12, runs=20, around=60, step=0.1),
+    Wave(points=12, runs=20, around=60, step=0.03),
+    Wave(points=16, runs=60),
+    Wave(points=5, runs=200),
 )
 
 
