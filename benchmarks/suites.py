@@ -42,6 +42,7 @@ from coartic.inputs import (
     read_toml,
 )
 from coartic.learning import METHOD_PREFIX
+from coartic.members import members
 from coartic.model import MotionModel, checked_model
 from coartic.readings import ChosenReading, condition_under, model_under, task_under
 from coartic.record import run_seeds
@@ -61,6 +62,7 @@ from coartic.text import Line, plain
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 ALL = "*"
+_MEMBERS = "-*"
 LONGEST_WORD = 100
 """Characters of a parameter's value."""
 LARGEST_INTEGER = 2**53
@@ -141,10 +143,17 @@ class _Block(BaseModel):
         return known if ALL in self.methods else self.methods
 
     def tasks_among(self, own: Iterable[str]) -> list[str]:
-        """Names (or files) of the tasks; a block for all tasks is for the user's as well."""
+        """Names (or files) of the tasks; a block for all tasks is for the user's as well.
+
+        ``TASK-*`` are the members of a task (:mod:`coartic.members`).
+        """
         every = [*builtin_tasks(), *own]
-        names = [every if name == ALL else [name] for name in self.tasks]
+        names = [every if name == ALL else _members_or(name) for name in self.tasks]
         return list(dict.fromkeys(itertools.chain(*names)))
+
+
+def _members_or(name: str) -> list[str]:
+    return list(members(name.removesuffix(_MEMBERS))) if name.endswith(_MEMBERS) else [name]
 
 
 class Suite(BaseModel):

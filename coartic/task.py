@@ -232,6 +232,11 @@ def load_task(name_or_path: str | Path) -> Task:
         for task in _shipped():
             if task.name == name_or_path:
                 return task
+        from coartic.members import members, task_of  # which are made from tasks
+
+        plain = task_of(name_or_path)
+        if plain is not None:
+            return members(plain)[name_or_path]
         hint = did_you_mean(name_or_path, builtin_tasks()) or "."
         raise TaskError(
             f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
