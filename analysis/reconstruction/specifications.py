@@ -1,0 +1,134 @@
+"""The paper's claims under other readings and with other goals: which hold whatever is chosen.
+
+A specification is a set of readings and a member of an ensemble. Its runs are judged as those of
+the default are. Specifications are not independent samples of anything: shares of them are no
+probabilities, and there is no joint p-value (Simonsohn et al. 2020,
+doi:10.1038/s41562-020-0912-z).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pandas as pd
+
+from analysis.claims.catalogue import CLAIMS, judge
+from analysis.claims.register import Judged
+from analysis.results.folder import Results
+from analysis.study import Study
+from coartic.members import task_of
+from coartic.readings import condition_under, load_readings
+from coartic.tables import variant_of
+
+COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
+VERDICTS = ("supported", "not supported", "cannot tell")
+
+
+@dataclass(frozen=True)
+class Specification:
+    """Choices that the paper leaves open."""
+
+    readings: tuple[str, ...]
+    """Those that are not the default, as ``ties=right``."""
+    task: str
+    """Whose goals are of a member; empty where all goals are the default ones."""
+    member: str
+
+    @property
+    def label(self) -> str:
+        """Such as ``two-armed-1-m017, ties=right``; ``default`` where nothing differs."""
+        return ", ".join(filter(None, (self.member, *self.readings))) or "default"
+
+
+def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
+    """The specifications in a folder, each as a study of the paper's tasks under it."""
+    plan = study.results.manifest.specification
+    own = {name: task_of(name) for name in plan.tasks}
+    members = {name: task for name, task in own.items() if task is not None}
+    plain = tuple(name for name, task in own.items() if task is None)
+    if plain:
+        view = _seen_as(study.results, {name: name for name in plain})
+        yield Specification(plan.readings, "", ""), Study(view)
+    for name, task in members.items():
+        view = _seen_as(study.results, {name: task})
+        yield Specification(plan.readings, task, name), Study(view)
+
+
+def _seen_as(results: Results, names: Mapping[str, str]) -> Results:
+    """A folder with some of its tasks alone, by other names.
+
+    Parameters of the learner that the folder's readings set are no variants.
+    """
+    plan = results.manifest.specification
+    fields = condition_under(load_readings(plan.readings))
+    cells, variants = [], {}
+    for cell in plan.cells:
+        if cell.task not in names:
+            continue
+        parameters = {
+            key: value for key, value in cell.parameters.items() if fields.get(key) != value
+        }
+        variant = variant_of(parameters, plan.methods[cell.method].defaults)
+        variants[cell.task, cell.method, cell.variant] = variant
+        changed = {"task": names[cell.task], "variant": variant, "parameters": parameters}
+        cells.append(cell.model_copy(update=changed))
+    runs = results.runs[results.runs.task.isin(list(names))].copy()
+    keys = zip(runs.task, runs.method, runs.variant, strict=True)
+    runs["variant"] = pd.Series([variants[key] for key in keys], runs.index, "string")
+    runs["task"] = runs.task.map(names).astype(runs.task.dtype)
+    sequences = results.sequences[results.sequences.task.isin(list(names))].copy()
+    sequences["task"] = sequences.task.map(names).astype(sequences.task.dtype)
+    tasks = {new: {**plan.tasks[name], "name": new} for name, new in names.items()}
+    changed_plan = plan.model_copy(update={"tasks": tasks, "cells": tuple(cells)})
+    manifest = results.manifest.model_copy(update={"specification": changed_plan})
+    return replace(results, manifest=manifest, runs=runs, sequences=sequences)
+
+
+def judged_specifications(
+    studies: Iterable[Study], *, progress: Callable[[Specification], None] = lambda spec: None
+) -> pd.DataFrame:
+    """A row a specification and claim of the paper that its runs can judge.
+
+    Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
+    ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. A
+    claim that only rests on tasks with default goals is judged once, not once a member.
+    """
+    claims = [claim for claim in CLAIMS if claim.place]
+    rows = []
+    for study in studies:
+        for spec, seen in specifications(study):
+            rows += [
+                dict(_row(spec, judged))
+                for judged in judge(seen, claims)
+                if judged.run_ids and judged.holds is not None
+            ]
+            progress(spec)
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _row(spec: Specification, judged: Judged) -> Iterator[tuple[str, Any]]:
+    yield "readings", " ".join(spec.readings)
+    yield "task", spec.task
+    yield "member", spec.member
+    yield "claim", judged.claim.id
+    yield "verdict", judged.verdict
+    first = judged.tests[0] if judged.tests else None
+    for name in ("estimate", "low", "high", "p"):
+        column = "effect" if name == "estimate" else name
+        yield column, math.nan if first is None else getattr(first, name)
+
+
+def shares(table: pd.DataFrame) -> pd.DataFrame:
+    """Verdicts of each claim, counted over specifications of one kind.
+
+    ``kind`` is ``readings`` (default goals) or the task whose goals are of members.
+    """
+    kind = table.task.where(table.task != "", "readings")
+    found = pd.crosstab([table.claim, kind.rename("kind")], table.verdict)
+    found = found.reindex(columns=list(VERDICTS), fill_value=0)
+    order = list(dict.fromkeys(zip(table.claim, kind, strict=True)))
+    found["specifications"] = found.sum(axis=1)
+    return found.loc[order].reset_index().rename_axis(columns=None)
