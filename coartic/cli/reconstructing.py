@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -91,8 +92,35 @@ def reconstruct(
     say(f"Results in {paths[0]} and {paths[1]}.")
 
 
+def robustness(
+    folders: Annotated[
+        list[Path], typer.Argument(parser=folder_named, help="Results folders, one a reading.")
+    ],
+    out: given.Out,
+) -> None:
+    """Judge the paper's claims under each reading and with the goals of each member."""
+    from analysis import load
+    from analysis.figures.plot import rendered
+    from analysis.reconstruction.curve import specification_curve
+    from analysis.reconstruction.specifications import judged_specifications, shares
+
+    folder = folder_named(out, "--out")
+    studies = (load(each) for each in folders)
+    table = judged_specifications(studies, progress=lambda spec: say(f"judged: {spec.label}"))
+    found = shares(table)
+    folder.mkdir(parents=True, exist_ok=True)
+    table.to_csv(folder / "specifications.csv", index=False, lineterminator="\n")
+    found.to_csv(folder / "shares.csv", index=False, lineterminator="\n")
+    if table.effect.notna().any():
+        for name, content in rendered(specification_curve(table), (".svg", ".pdf")).items():
+            (folder / name).write_bytes(content)
+    rows = [tuple(map(str, row)) for row in found.itertuples(index=False)]
+    show_table("Claims", tuple(found.columns), rows)
+    say("", f"Results in {folder}.")
+
+
 def _threads(jobs: int) -> int:
     return (os.cpu_count() or 1) if jobs == -1 else max(jobs, 1)
 
 
-COMMANDS = (readings, reconstruct)
+COMMANDS = (readings, reconstruct, robustness)
