@@ -43,7 +43,9 @@ def performed_here(spec):
     return record_of(answer, spec)
 
 
-def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path):
+@pytest.mark.usefixtures("no_sandbox_before")
+def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")  # a worker has one all the same
     store = Store(tmp_path)
     hung = spec_of(known, "test/sleeps", Limits(1.0))
     dying = spec_of(known, "test/dies")
