@@ -75,9 +75,9 @@ def test_lanes_do_not_mix(count, far):
     starts = rng.normal(0, 0.5, (count, robot.dof))
     starts[-1, robot.joints("left")] += LARGEST if far else 0.0
     arms = [robot.arm("left" if k % 2 or far else "right") for k in range(count)]
+    lanes = lanes_for(robot)  # with what was in them before
 
     def placed(chosen):
-        lanes = lanes_for(robot)
         for lane, number in enumerate(chosen):
             board(lanes, lane, number, starts[number], arms[number])
         place(lanes.at, len(chosen))
@@ -117,7 +117,8 @@ def test_the_listing_holds_vector_instructions():
     _correct_some(lanes, 2, goal, Corrector(True, True, 0.0), PAPER, found, ends)
     assert ends.converged.all()
     listing = _correct_some.inspect_asm(_correct_some.signatures[-1])  # takes as long as compiling
-    found = [line.split() for line in listing.splitlines() if any(v in line for v in vectors())]
+    registers = vectors()
+    found = [line.split() for line in listing.splitlines() if any(v in line for v in registers)]
     on_vectors = [words[0] for words in found]
     assert sum(name.endswith("mulpd") for name in on_vectors) > 2 * 15 * 5  # two series a link
     assert any(name.endswith("sqrtpd") for name in on_vectors)  # of the error, with its loop
