@@ -59,9 +59,11 @@ def test_a_change_in_a_called_module_is_noticed(tmp_path):
 
     (tmp_path / "kernel.py").write_text(KERNEL, encoding="utf-8")
 
-    command = [sys.executable, "-c", PROGRAM]
-    options = {"text": True, "cwd": tmp_path, "env": {"PYTHONPATH": "."}}
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **options) as own:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        cwd=tmp_path, env={"PYTHONPATH": "."},
+    ) as own:  # fmt: skip
 
         def found():
             print(file=own.stdin, flush=True)
