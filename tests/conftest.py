@@ -8,8 +8,15 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
+from benchmarks.sandbox import THREADS
+
 # What the fixtures need is imported in them: the process that hands out the tests to
 # workers reads this file, too, and runs none.
+
+# One worker, one core, as in a sandbox: BLAS threads wait for each other by spinning. NumPy reads
+# this when it is first imported.
+for _name, _number in THREADS.items():
+    os.environ.setdefault(_name, _number)
 
 # The same examples every time: a run that fails says something of the code, not of its luck.
 # Others are tried with --hypothesis-profile=new.
@@ -37,6 +44,16 @@ def _kernels(session_folder):
 
         with FileLock(session_folder / "kernels.lock"):
             warm_up()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _unsynced():
+    """Nobody cuts the power: nothing waits for the disk. That files are synced, and when, is
+    for the tests of coartic.files and of the store, which look at the calls, and what other
+    processes write is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda number: None)
+        yield
 
 
 @pytest.fixture(autouse=True)

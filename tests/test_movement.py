@@ -117,7 +117,7 @@ def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
     assert 24 < hits < 108  # both outcomes are well represented
 
 
-@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 10_000), (UNEVEN, 2_500)])
+@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 5_000), (UNEVEN, 2_000)])
 @pytest.mark.parametrize("hand", HANDS)
 def test_equals_every_step_many_thousand_times(robot, count, hand):
     rng = np.random.default_rng(15)

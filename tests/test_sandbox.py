@@ -43,7 +43,9 @@ def performed_here(spec):
     return record_of(answer, spec)
 
 
-def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path):
+@pytest.mark.usefixtures("no_sandbox_before")
+def test_hung_and_dying_methods_do_not_hang_or_kill_the_suite(known, tmp_path, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")  # a worker has one all the same
     store = Store(tmp_path)
     hung = spec_of(known, "test/sleeps", Limits(1.0))
     dying = spec_of(known, "test/dies")
@@ -215,8 +217,10 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     ``python -m benchmarks.kill_resume`` does it at a hundred moments.
     """
     jobs = "2" if word == signal.SIGINT else "1"  # a suite that ends has to end each of them
+    # Many short lots: something is kept soon, and much is left to do.
+    many = ("--runs", "200", "--trials", "1000", "--jobs", jobs)
     suite = subprocess.Popen(
-        [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, "--jobs", jobs],
+        [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, *many],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         env={**os.environ, "COARTIC_TEST_MARK": str(tmp_path)},

@@ -149,9 +149,9 @@ def test_intervals_of_very_many_values_are_the_usual_ones():
     rng = np.random.default_rng(5)
     many, more, few = (rng.normal(size=n) for n in (40_000, 90_000, 2_000))
     for found, error in (
-        (statistics.mean(many, seed=0), many.std() / 200),
-        (statistics.difference_of_means(many, few, seed=0), None),
-        (statistics.difference_of_means(more, many, seed=0), None),
+        (statistics.mean(many, seed=0, resamples=3_999), many.std() / 200),
+        (statistics.difference_of_means(many, few, seed=0, resamples=3_999), None),
+        (statistics.difference_of_means(more, many, seed=0, resamples=3_999), None),
     ):
         usual = math.hypot(
             *(s.std() / math.sqrt(len(s)) for s in samples_in(found, many, more, few))

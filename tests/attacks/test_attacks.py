@@ -38,6 +38,8 @@ COMMANDS = (
 ALL_OF = ("records/", "together/")
 """Edits of which none is like another."""
 TOGETHER = (
+    "neighbour/answers-twice",
+    "exhaust/errors",
     "score/model",
     "solution/array",
     "told/mutated",
@@ -45,10 +47,9 @@ TOGETHER = (
     "bound/text",
     "end/foreign",
     "left/daemon",
-    "neighbour/answers-twice",
-    "exhaust/errors",
 )
-"""They share processes, so those that end theirs come last."""
+"""The first two end their processes; the others share one, which is ended once it has left what is
+to end with it."""
 REFUSED = ("import/exit-0", "name/learner", "name/escape", "told/none")
 
 

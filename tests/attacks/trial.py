@@ -20,7 +20,7 @@ import pandas as pd
 
 from benchmarks import sandbox
 from benchmarks.run import run_suite
-from benchmarks.specification import RunSpec
+from benchmarks.specification import RunSpec, Setting
 from coartic import execute, load_task
 from coartic.rows import movements_from
 from tests.support.suites import InProcess
@@ -163,13 +163,13 @@ def _run_forked(
             (folder / name).mkdir(exist_ok=True)
             os.environ[variable] = str(folder / name)
         sandbox._RETRIES = 0
-        own_job = RunSpec.job
+        own_job = Setting.job
 
-        def job(spec: RunSpec) -> dict[str, Any]:
-            found = own_job(spec)
+        def job(setting: Setting, specs: Sequence[RunSpec]) -> dict[str, Any]:
+            found = own_job(setting, specs)
             return {**found, "owner": found["owner"] and "hostile"}
 
-        RunSpec.job = job  # type: ignore[method-assign]
+        Setting.job = job  # type: ignore[method-assign]
         code, text = in_process(arguments)
         said.write_text(text, encoding="utf-8", errors="backslashreplace")
         sandbox.close_all()

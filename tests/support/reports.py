@@ -41,10 +41,11 @@ def undrawn():
 
 
 @contextmanager
-def without_figures():
-    """Reports that have no figures at all."""
+def without_figures(but=()):
+    """Reports that have no figures, or some by their names in the register."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(register, "REGISTER", ())
+        kept = tuple(row for row in register.REGISTER if row.name in but)
+        patch.setattr(register, "REGISTER", kept)
         yield
 
 
