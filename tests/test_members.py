@@ -1,0 +1,125 @@
+"""Ensembles of reconstructions, and the paper's claims over them."""
+
+import csv
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests.support.made_up import manifest_for, replanned, row
+
+from analysis.reconstruction import targets
+from analysis.reconstruction.curve import specification_curve
+from analysis.reconstruction.reconstruct import search_for
+from analysis.reconstruction.specifications import (
+    judged_specifications,
+    shares,
+    specifications,
+)
+from analysis.results.folder import Results
+from analysis.study import Study
+from coartic import TaskError, load_task
+from coartic.members import members, members_file, task_of, with_members
+from coartic.tables import DeclaredMethod
+
+
+@pytest.fixture(params=with_members())
+def ensemble(request):
+    return request.param, members(request.param)
+
+
+def test_an_ensemble_has_200_members_and_begins_with_the_task(ensemble):
+    task, found = ensemble
+    own = {name: t for name, t in found.items() if name.startswith(f"{task}-m")}
+    assert len(own) >= 200
+    assert len({t.goals for t in own.values()}) == len(own)
+    assert found[f"{task}-m001"].goals == load_task(task).goals
+    for name, t in found.items():
+        assert load_task(name) is t
+        assert task_of(name) == task
+        assert t.reconstructed == load_task(task).reconstructed == ("goals",) or "goals" in t.reconstructed
+
+
+def test_members_meet_every_constraint(ensemble):
+    task, found = ensemble
+    search = search_for(task)
+    goals = [t.goal_array for name, t in found.items() if name.startswith(f"{task}-m")]
+    for constraint in search.constraints:
+        tried = targets.tried(search, np.array(goals), constraint.sequences)
+        assert constraint.holds(tried).all(), str(constraint)
+
+
+def test_a_member_that_is_not_there_is_said():
+    with pytest.raises(TaskError, match="unknown task 'two-armed-1-m999'"):
+        load_task("two-armed-1-m999")
+    assert task_of("ascending") is None
+    assert members("ascending") == {}
+
+
+def test_figures_of_members_are_complete(ensemble):
+    task, _ = ensemble
+    with members_file(task).open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for test in targets.tests_of(task):
+        assert all(test.label in each for each in rows)
+    distances = [float(each["distance"]) for each in rows]
+    assert min(distances) > 0.0
+
+
+def _results(tmp_path, tasks, means, **plan):
+    """Runs of EC3 and EC4 on tasks, the latter better by so many ticks."""
+    rng = np.random.default_rng(0)
+    rows = []
+    for task, better in zip(tasks, means, strict=True):
+        for method, mean in (("dual-process/EC3", -500.0), ("dual-process/EC4", -500.0 + better)):
+            rewards = np.round(rng.normal(mean, 3.0, 20)).astype(int)
+            rows += [
+                row(method, int(r), task=task, run=k, trials=10_000, run_id=f"{task}{method}{k}",
+                    replay_reward=int(r), initial_reward=-675)
+                for k, r in enumerate(rewards)
+            ]  # fmt: skip
+    frame = pd.DataFrame(rows)
+    manifest = manifest_for([load_task(task) for task in tasks], frame)
+    method = DeclaredMethod(
+        title="t", citation="", told=(), secondary=(), stochastic=True,
+        defaults={"ties": "left", "trials": 10_000}, origin="", code="",
+    )  # fmt: skip
+    names = ("dual-process/EC3", "dual-process/EC4")
+    manifest = replanned(manifest, methods=dict.fromkeys(names, method), **plan)
+    sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
+    return Results(tmp_path, manifest, frame, sequences)
+
+
+def test_claims_are_judged_for_each_member(tmp_path):
+    names = ["two-armed-1", "two-armed-1-m002", "two-armed-1-m003"]
+    study = Study(_results(tmp_path, names, (20.0, 20.0, -20.0)))
+    found = judged_specifications([study])
+    own = found[found.claim == "ec4-beats-ec3-one"] if False else found
+    by_member = {m: rows for m, rows in own.groupby("member")}
+    assert set(by_member) == {"", *names[1:]}
+    compared = set(found.claim)
+    assert compared
+    effects = found.dropna(subset="effect").set_index(["member", "claim"]).effect
+    claim = next(c for c in compared if ("two-armed-1-m003", c) in effects.index)
+    assert effects["two-armed-1-m002", claim] > 0 > effects["two-armed-1-m003", claim]
+    assert effects["", claim] > 0
+    counted = shares(found).set_index(["claim", "kind"])
+    assert counted.loc[(claim, "two-armed-1"), "specifications"] == 2
+    assert counted.loc[(claim, "readings"), "supported"] == 1
+    curve = specification_curve(found)
+    assert claim in curve.alt
+    assert len(curve.data) == found.effect.notna().sum()
+
+
+def test_parameters_of_a_reading_are_no_variant(tmp_path):
+    results = _results(tmp_path, ["two-armed-1"], (20.0,), readings=("ties=right",))
+    plan = results.manifest.specification
+    cells = [
+        cell.model_copy(update={"variant": "ties=right", "parameters": {"ties": "right"}})
+        for cell in plan.cells
+    ]
+    changed = replanned(results.manifest, cells=tuple(cells))
+    runs = results.runs.assign(variant="ties=right")
+    ((spec, seen),) = specifications(Study(Results(tmp_path, changed, runs, results.sequences)))
+    assert spec.label == "ties=right"
+    assert {label for _, label in seen.cells} == {"dual-process/EC3", "dual-process/EC4"}
+    assert all(len(cell.runs) == 20 for cell in seen.cells.values())
