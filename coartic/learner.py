@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import entry, fill_row, inlined, inner, joint_chain
+from coartic.compiled import entry, fill_row, generator_at, inlined, inner, joint_chain
 from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
 from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
@@ -231,7 +231,7 @@ def _choose_hands(
             continue
         hand = _greedy(tables.value[run, number, work.previous[run]], rules.hands)
         if explore and rules.exploration != 0:
-            rng = rngs[run]
+            rng = generator_at(rngs, run)
             if rng.random() < rules.epsilon:
                 if rules.exploration == 1:
                     hand = _random_hand(rules.hands, rng)
@@ -267,8 +267,8 @@ def _aim(
             distance = _goal_distance(run, number, hand, problem, work)
             work.ends.hit[run] = distance <= problem.radius
             continue
-        stored = tables.target[run, number, previous, hand]
-        _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rngs[run])
+        stored, rng = tables.target[run, number, previous, hand], generator_at(rngs, run)
+        _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rng)
         if explore and rules.bias > 0.0:
             # The mean of η moves into the direction in which **A** would step from q*(s, a).
             arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd
