@@ -24,7 +24,7 @@ from benchmarks.registry import registry
 from benchmarks.run import plan_suite
 from benchmarks.suites import Suite, load_suite, select_cells
 from coartic import CONDITIONS, Robot, Task, learn_many, load_task, parse_task, reference
-from coartic.compiled import Generators, entry
+from coartic.compiled import addresses, entry, generator_at
 from coartic.exploration import ExplorationCondition
 from coartic.lanes import LANES, board, lanes_for, place
 from coartic.learner import rules_of
@@ -201,6 +201,12 @@ def _grown() -> Iterator[tuple[str, Task, str, int]]:
 
 
 @entry
+def _board_all(lanes: Any, starts: Any, arm: Any) -> None:
+    for lane in range(LANES):
+        board(lanes, lane, lane, starts[lane], arm)
+
+
+@entry
 def _place_often(at: Any, times: int) -> None:
     for _ in range(times):
         place(at, LANES)
@@ -208,19 +214,18 @@ def _place_often(at: Any, times: int) -> None:
 
 @entry
 def _draw(generators: Any, normals: int, uniforms: int) -> float:
-    total = 0.0
+    generator, total = generator_at(generators, 0), 0.0
     for _ in range(normals):
-        total += generators[0].standard_normal()
+        total += generator.standard_normal()
     for _ in range(uniforms):
-        total += generators[0].random()
+        total += generator.random()
     return total
 
 
 def _prices(robot: Robot, count: int = 20_000) -> Prices:
     lanes, rng = lanes_for(robot), np.random.default_rng(0)
-    for lane, q in enumerate(rng.uniform(-2, 2, (LANES, robot.dof))):
-        board(lanes, lane, lane, q, robot.arm("right"))
-    generators, many = Generators([rng]), 10 * count
+    _board_all(lanes, rng.uniform(-2, 2, (LANES, robot.dof)), robot.arm("right"))
+    generators, many = addresses([rng]), 10 * count
     return Prices(
         _best_ns(lambda: _place_often(lanes.at, count)) / count / LANES,
         _best_ns(lambda: _draw(generators, many, 0)) / many,

@@ -8,11 +8,12 @@ is named after a hash of the package's sources: changed sources, fresh code.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
 import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,8 +21,10 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from llvmlite import binding
-from numba import njit, typeof, types
-from numba.extending import typeof_impl
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from coartic.robot import chain, lever
 from coartic.trigonometry import cosine, sine
@@ -100,21 +103,28 @@ def _prune(root: Path, current: Path) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
+# Kernels allocate nothing and work on arrays that their caller holds, so that they need not
+# count references to them (NRT, Numba's run time): counting takes a quarter of the time.
+_OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
+# What Python never calls needs no way to do so, which would take as long to compile.
+_INNER = _OPTIONS | {"no_cpython_wrapper": True}
+
+
 def inner(function: F) -> F:
     """Compile a function that only other compiled functions call."""
-    compiled: F = njit(nogil=True)(function)
+    compiled: F = njit(**_INNER)(function)
     return compiled
 
 
 def inlined(function: F) -> F:
     """As :func:`inner`, for a part of one other function: passing whole tables would cost."""
-    compiled: F = njit(nogil=True, inline="always")(function)
+    compiled: F = njit(**_INNER, inline="always")(function)
     return compiled
 
 
 def lanewise(function: F) -> F:
     """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
-    compiled: F = njit(nogil=True, error_model="numpy")(function)
+    compiled: F = njit(**_INNER, error_model="numpy")(function)
     return compiled
 
 
@@ -122,23 +132,48 @@ def entry(function: F) -> F:
     """Compile a function that Python calls, and keep its machine code on disk."""
     folder = _cache_folder()
     if folder is None:
-        return inner(function)
+        uncached: F = njit(**_OPTIONS)(function)
+        return uncached
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        compiled: F = njit(nogil=True, cache=True)(function)
+        compiled: F = njit(**_OPTIONS, cache=True)(function)
     finally:
         numba.config.CACHE_DIR = before
     return compiled
 
 
-class Generators(list[np.random.Generator]):
-    """NumPy generators, one a run, as kernels take them."""
+_DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy hands it to C
+_BITS = types.NumPyRandomBitGeneratorType("bit_generator")
+_GENERATOR = types.NumPyRandomGeneratorType("generator")
 
 
-@typeof_impl.register(Generators)
-def _type_of_generators(generators: Generators, _: Any) -> types.List:
-    return types.List(typeof(generators[0]))  # a plain list would be copied back after the call
+def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
+    """NumPy generators as kernels take them, a row each; they must outlive the call."""
+
+    def found(generator: np.random.Generator) -> list[int | None]:
+        c = generator.bit_generator.ctypes
+        return [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
+
+    return np.array([found(generator) for generator in generators], dtype=np.uintp)
+
+
+@intrinsic
+def _generator(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
+    def build(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        bits = cgutils.create_struct_proxy(_BITS)(context, builder)
+        bits.state, bits.fnptr_next_uint64, bits.fnptr_next_double = arguments
+        generator = cgutils.create_struct_proxy(_GENERATOR)(context, builder)
+        generator.bit_generator = bits._getvalue()
+        return generator._getvalue()
+
+    return _GENERATOR(state, next_uint64, next_double), build
+
+
+@inner
+def generator_at(addresses: Any, run: int) -> Any:
+    """The generator in a row of :func:`addresses`."""
+    return _generator(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
 @inlined

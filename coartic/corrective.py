@@ -196,11 +196,10 @@ def correct_lanes(
 
 
 @entry
-def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> Any:
+def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> None:
     """Correct ``q`` in place."""
     board(lanes, 0, 0, q, arm)
     correct_lanes(lanes, 1, goal, how, model, q.reshape((1, len(q))), ends)
-    return ends
 
 
 @inner
@@ -211,7 +210,7 @@ def shift_kernel(
 
     Only on the joints of ``mask``; by nothing where **A** would not move them.
     """
-    xs, ys, step = scratch.xs, scratch.ys, scratch.start
+    xs, ys, step = scratch.xs, scratch.ys, scratch.step
     tip = len(arm.links)
     joint_chain(q, arm, xs, ys)
     error_x = goal.x - xs[tip]
@@ -257,13 +256,14 @@ def correct(
     if not 0.0 <= nullspace_gain <= 1.0:
         raise ValueError(f"nullspace_gain is {nullspace_gain}; it must be 0 to 1")
     position = configuration(robot, q)
-    ends = _correct_one(
+    ends = ends_of(1)
+    _correct_one(
         position,
         robot.arm(hand),
         checked_goal(goal),
         Corrector("x" not in locked_base, "y" not in locked_base, float(nullspace_gain)),
         checked_model(model),
         lanes_for(robot),
-        ends_of(1),
+        ends,
     )
     return Correction(position, bool(ends.converged[0]), int(ends.iterations[0]))

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import entry, fill_row, inlined, inner, joint_chain
+from coartic.compiled import entry, fill_row, generator_at, inlined, inner, joint_chain
 from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
 from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
@@ -265,7 +265,7 @@ def _choose_hands(
             continue
         hand = -1
         if explore and rules.exploration != 0:
-            rng = rngs[run]
+            rng = generator_at(rngs, run)
             if rng.random() < rules.epsilon:
                 if rules.exploration == 1:
                     hand = _random_hand(rules.hands, rng)
@@ -275,7 +275,7 @@ def _choose_hands(
             values = tables.value[run, number, work.previous[run]]
             hand = _greedy(values, rules.hands)
             if rules.ties != 0 and _equal(values, rules.hands):
-                hand = _untied(run, number, problem, rules, rngs[run], work)
+                hand = _untied(run, number, problem, rules, generator_at(rngs, run), work)
         work.hand[run] = hand
 
 
@@ -317,7 +317,8 @@ def _aim(
             distance = _goal_distance(run, number, hand, problem, work)
             work.ends.hit[run] = distance <= problem.radius
             continue
-        _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rngs[run])
+        rng = generator_at(rngs, run)
+        _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rng)
         if explore and rules.bias > 0.0:
             # The mean of η moves into the direction in which **A** would step from q*(s, a).
             arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import Generators
+from coartic.compiled import addresses
 from coartic.corrective import correct
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.exploration import ExplorationCondition, load_condition
@@ -271,6 +271,7 @@ class _Learning:
             replay=empty_log(runs, goals, dof),
         )
         self._work = work_for(runs, task)
+        self._generators = [np.random.default_rng(seed) for seed in seeds]
         self._arguments = (
             np.array(codes, dtype=np.int64),
             problem_of(task, model, nullspace_gain=condition.nullspace_gain),
@@ -278,7 +279,7 @@ class _Learning:
             self._tables,
             self._kept,
             empty_log(runs, goals, dof),
-            Generators(map(np.random.default_rng, seeds)),
+            addresses(self._generators),
             self._work,
         )
 

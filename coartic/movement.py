@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import entry, inner, lanewise
+from coartic.compiled import entry, fill_row, inner, lanewise
 from coartic.lanes import GOING, board, copy_lanes, ends_of, fill, lanes_for, place, whole
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
@@ -45,12 +45,11 @@ class Goal(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Work space of the kernels: joint positions, link rates, start of a movement."""
+    """Work space of the kernels: joint positions of an arm, a step of the robot."""
 
-    xs: Any
+    xs: Any  # (n + 1,) for the longer arm
     ys: Any
-    rates: Any
-    start: Any
+    step: Any  # (dof,)
 
 
 class MoveResult(NamedTuple):
@@ -69,9 +68,7 @@ class MoveResult(NamedTuple):
 def scratch_for(robot: Robot) -> Scratch:
     """Work space large enough for either arm of ``robot``."""
     longest = robot.most_links
-    return Scratch(
-        np.empty(longest + 1), np.empty(longest + 1), np.empty(longest), np.empty(robot.dof)
-    )
+    return Scratch(np.empty(longest + 1), np.empty(longest + 1), np.empty(robot.dof))
 
 
 @lanewise
@@ -194,8 +191,8 @@ def move_lanes(
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
         place(at, count)
-        at.end[0] = at.x[-1]
-        at.end[1] = at.y[-1]
+        fill_row(at.end[0], at.x[-1])
+        fill_row(at.end[1], at.y[-1])
         evaluations += 1
     while count > 0:
         _go(at, count, model)
@@ -207,11 +204,11 @@ def move_lanes(
             if at.fate[lane] == GOING:
                 continue
             run = lanes.run[lane]
-            whole = at.step[lane] == at.whole[lane]
-            fraction = 0.0 if whole else at.step[lane] * model.step / at.distance[lane]
+            arrived = at.step[lane] == at.whole[lane]
+            fraction = 0.0 if arrived else at.step[lane] * model.step / at.distance[lane]
             for j in range(q.shape[1]):
                 between = q[run, j] + fraction * (target[run, j] - q[run, j])
-                q[run, j] = target[run, j] if whole else between
+                q[run, j] = target[run, j] if arrived else between
             ends.hit[run] = at.fate[lane] == _HIT
             ends.ticks[run] = int(at.step[lane]) + model.arrival_tick
             ends.evaluations[run] += evaluations
@@ -229,14 +226,13 @@ def _move_one(
     model: Any,
     lanes: Any,
     ends: Any,
-) -> Any:
+) -> None:
     """Move ``q`` in place."""
     depart(lanes, 0, 0, q, target, arm, model)
     shape = (1, len(q))
     move_lanes(
         lanes, 1, goal, stop_on_arrival, model, q.reshape(shape), target.reshape(shape), ends
     )
-    return ends
 
 
 def move(
@@ -260,7 +256,8 @@ def move(
     """
     position = configuration(robot, q)
     end = configuration(robot, target)
-    ends = _move_one(
+    ends = ends_of(1)
+    _move_one(
         position,
         end,
         robot.arm(hand),
@@ -268,7 +265,7 @@ def move(
         stop_on_arrival,
         checked_model(model),
         lanes_for(robot),
-        ends_of(1),
+        ends,
     )
     return MoveResult(position, int(ends.ticks[0]), bool(ends.hit[0]), int(ends.evaluations[0]))
 

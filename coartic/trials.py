@@ -66,6 +66,15 @@ class _Work(NamedTuple):
 
 
 @inner
+def _empty(target: Any) -> bool:
+    """Whether no joint has a target."""
+    for figure in target:  # noqa: SIM110 (which the compiler does not know)
+        if not math.isnan(figure):
+            return False
+    return True
+
+
+@inner
 def _depart(arm: Any, problem: Any, work: Any) -> int:
     """Put the acting trials on their way; how many."""
     count = 0
@@ -87,7 +96,7 @@ def _attempt(first: int, number: int, arm: Any, problem: Any, made: Any, work: A
             if not work.going[trial]:
                 continue
             target = made.targets[first + trial, number]
-            work.acting[trial] = given != np.isnan(target).all()
+            work.acting[trial] = given != _empty(target)
             if work.acting[trial]:
                 for j in range(len(target)):
                     at = work.q[trial, j]

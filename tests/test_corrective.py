@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct, reference
+from coartic.compiled import entry
 from coartic.corrective import shift_kernel
 from coartic.movement import Goal, scratch_for
 from coartic.robot import HANDS
@@ -195,6 +196,11 @@ def test_other_nullspace_gains_are_refused(gain):
         correct(ROBOT, np.zeros(10), "right", (3.0, 2.0), nullspace_gain=gain)
 
 
+@entry
+def _shift(target, q, arm, goal, mask, length, scratch):
+    shift_kernel(target, q, arm, goal, mask, length, scratch)
+
+
 @pytest.mark.parametrize("hand", HANDS)
 def test_shift_is_along_the_steepest_descent(hand):
     """Its direction by finite differences of the squared distance; its length as asked."""
@@ -203,7 +209,7 @@ def test_shift_is_along_the_steepest_descent(hand):
         q, goal = rng.uniform(-2, 2, 10), rng.uniform(-3, 3, 2)
         mask = rng.random(10) < 0.7
         target = np.array(q)
-        shift_kernel(target, q, ROBOT.arm(hand), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT))
+        _shift(target, q, ROBOT.arm(hand), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT))
         nearby = q + 1e-6 * np.concatenate([np.eye(10), -np.eye(10)])
         distances = ((ROBOT.forward_kinematics(nearby, hand) - goal) ** 2).sum(axis=1)
         descent = (distances[10:] - distances[:10]) * mask
@@ -213,7 +219,5 @@ def test_shift_is_along_the_steepest_descent(hand):
 def test_no_shift_where_the_corrective_process_would_not_move():
     q, target = np.zeros(10), np.ones(10)
     for goal, mask in [((4.5, 0.1), np.ones(10, bool)), ((2.0, 1.0), np.zeros(10, bool))]:
-        shift_kernel(
-            target, q, ROBOT.arm("right"), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT)
-        )
+        _shift(target, q, ROBOT.arm("right"), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT))
     np.testing.assert_array_equal(target, np.ones(10))

@@ -14,6 +14,7 @@ from benchmarks.specification import Limits
 from benchmarks.store import Store
 from benchmarks.suites import run_specs
 from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
+from coartic.compiled import entry
 from coartic.corrective import Corrector, correct_lanes
 from coartic.lanes import LANES, board, ends_of, lanes_for, place
 from coartic.movement import Goal
@@ -67,6 +68,16 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
         assert any(run.counters.failed_trials for run in together)
 
 
+@entry
+def _board(lanes, lane, run, q, arm):
+    board(lanes, lane, run, q, arm)
+
+
+@entry
+def _place(at, count):
+    place(at, count)
+
+
 @pytest.mark.parametrize("count", [1, 2, 9, LANES])
 @pytest.mark.parametrize("far", [False, True])
 def test_lanes_do_not_mix(count, far):
@@ -79,8 +90,8 @@ def test_lanes_do_not_mix(count, far):
 
     def placed(chosen):
         for lane, number in enumerate(chosen):
-            board(lanes, lane, number, starts[number], arms[number])
-        place(lanes.at, len(chosen))
+            _board(lanes, lane, number, starts[number], arms[number])
+        _place(lanes.at, len(chosen))
         return lanes.at["x"][:, : len(chosen)].copy(), lanes.at["y"][:, : len(chosen)].copy()
 
     xs, ys = placed(range(count))
@@ -112,7 +123,7 @@ def test_the_listing_holds_vector_instructions():
     robot, task = Robot(left_links=(0.8,) * 5, right_links=(0.8,) * 5), load_task("ascending")
     lanes, ends, found = lanes_for(robot), ends_of(2), np.zeros((2, robot.dof))
     for lane in range(2):
-        board(lanes, lane, lane, found[lane] + 0.1, robot.arm("right"))
+        _board(lanes, lane, lane, found[lane] + 0.1, robot.arm("right"))
     goal = Goal(*task.goal_array[0], task.radius)
     _correct_some(lanes, 2, goal, Corrector(True, True, 0.0), PAPER, found, ends)
     assert ends.converged.all()

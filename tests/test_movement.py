@@ -17,28 +17,26 @@ ROBOT = Robot()
 
 
 @entry
-def _every_step(q, target, arm, goal_x, goal_y, radius, stop_on_arrival, model, xs, ys):
+def _every_step(q, start, target, arm, goal_x, goal_y, radius, stop_on_arrival, model, xs, ys):
     """The definition of a movement with the kernels' own kinematics: no step skipped."""
     tip = len(arm.links)
     joint_chain(target, arm, xs, ys)
     end_x, end_y = xs[tip], ys[tip]
     square = 0.0
     for j in range(len(q)):
-        square += (target[j] - q[j]) * (target[j] - q[j])
+        square += (target[j] - start[j]) * (target[j] - start[j])
     distance = math.sqrt(square)
     last = math.ceil(distance / model.step)
-    point = np.empty_like(q)
     for k in range(last + 1):
         for j in range(len(q)):
-            point[j] = target[j]
+            q[j] = target[j]
             if k < last:
-                point[j] = q[j] + k * model.step / distance * (target[j] - q[j])
-        joint_chain(point, arm, xs, ys)
+                q[j] = start[j] + k * model.step / distance * (target[j] - start[j])
+        joint_chain(q, arm, xs, ys)
         miss = math.sqrt((goal_x - xs[tip]) ** 2 + (goal_y - ys[tip]) ** 2)
         rest = math.sqrt((end_x - xs[tip]) ** 2 + (end_y - ys[tip]) ** 2)
         hit = miss <= radius
         if hit or k == last or (stop_on_arrival and rest <= model.arrival_tolerance):
-            q[:] = point
             return k + 1, hit
     return -1, False
 
@@ -48,11 +46,10 @@ def assert_equals_every_step(
 ):
     """The kernel against the loop above: the same to the last bit, ties included."""
     fast = move(robot, q, target, hand, goal, radius, stop_on_arrival=stop_on_arrival, model=model)
-    arm, position = robot.arm(hand), np.array(q)
+    arm, position, start = robot.arm(hand), np.array(q), np.array(q)
     xs, ys = np.empty(len(arm.links) + 1), np.empty(len(arm.links) + 1)
-    ticks, hit = _every_step(
-        position, np.array(target), arm, *map(float, goal), radius, stop_on_arrival, model, xs, ys
-    )
+    rules = (*map(float, goal), radius, stop_on_arrival, model)
+    ticks, hit = _every_step(position, start, np.array(target), arm, *rules, xs, ys)
     assert (fast.ticks, fast.hit) == (ticks, hit)
     assert (fast.q == position).all()
     return fast
@@ -232,17 +229,22 @@ def test_skips_most_steps():
     assert evaluations < ticks / 4
 
 
+@entry
+def _cleared(gap, closing, speed, bend):
+    return clear_steps(gap, closing, speed, bend)
+
+
 def test_the_bound_keeps_its_promise():
     """In the steps it clears, no motion within the bounds can close the gap."""
     rng = np.random.default_rng(16)
     for _ in range(5000):
         gap, speed, bend = rng.uniform(0, 3), rng.uniform(0, 0.1), rng.uniform(0, 1e-3)
         closing = rng.uniform(-1, 1) * speed
-        steps = clear_steps(gap, closing, speed, bend)
+        steps = _cleared(gap, closing, speed, bend)
         assert min(speed * steps, closing * steps + bend * steps**2 / 2) < gap - 5e-10
     for gap in (0.0, 1e-10, 1e-9):  # too near to call
-        assert clear_steps(gap, 0.01, 0.01, 1e-3) == 0.0
-    assert clear_steps(1.0, 0.0, 0.0, 0.0) == np.inf
+        assert _cleared(gap, 0.01, 0.01, 1e-3) == 0.0
+    assert _cleared(1.0, 0.0, 0.0, 0.0) == np.inf
 
 
 def test_equals_every_step_at_the_largest_figures():

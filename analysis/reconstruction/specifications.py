@@ -19,7 +19,7 @@ from analysis.claims.catalogue import CLAIMS, judge
 from analysis.claims.register import Judged
 from analysis.results.folder import Results
 from analysis.study import Study
-from coartic.members import task_of
+from coartic.members import task_of, with_members
 from coartic.readings import condition_under, load_readings
 from coartic.tables import variant_of
 
@@ -44,7 +44,10 @@ class Specification:
 
 
 def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
-    """The specifications in a folder, each as a study of the paper's tasks under it."""
+    """The specifications in a folder, each as a study of the paper's tasks under it.
+
+    Beside a member of one task are the default goals of the others, where the folder has them.
+    """
     plan = study.results.manifest.specification
     own = {name: task_of(name) for name in plan.tasks}
     members = {name: task for name, task in own.items() if task is not None}
@@ -52,8 +55,10 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
     if plain:
         view = _seen_as(study.results, {name: name for name in plain})
         yield Specification(plan.readings, "", ""), Study(view)
+    default = {task: task if task in own else f"{task}-m001" for task in with_members()}
     for name, task in members.items():
-        view = _seen_as(study.results, {name: task})
+        others = {at: t for t, at in default.items() if t != task and at in own}
+        view = _seen_as(study.results, {name: task} | others)
         yield Specification(plan.readings, task, name), Study(view)
 
 
