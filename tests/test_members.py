@@ -5,7 +5,6 @@ import csv
 import numpy as np
 import pandas as pd
 import pytest
-from tests.support.made_up import manifest_for, replanned, row
 
 from analysis.reconstruction import targets
 from analysis.reconstruction.constraints import try_sequences
@@ -21,6 +20,7 @@ from analysis.study import Study
 from coartic import PAPER, TaskError, load_task
 from coartic.members import members, members_file, task_of, with_members
 from coartic.tables import DeclaredMethod
+from tests.support.made_up import manifest_for, replanned, row
 
 
 @pytest.fixture(params=with_members())
