@@ -48,7 +48,7 @@ def test_what_is_shipped_holds(entry):
     assert execution.hands == entry.hands
     assert execution.corrections == 0
     if entry.other_arm == "still":
-        assert other_arm_travel(task, execution) == 0.0
+        assert other_arm_travel(task, hands_of(execution.hands), execution.configurations) == 0.0
     locked = {"task": "", "y": "y", "xy": "xy"}[entry.base]
     for axis in (*locked, *task.locked_base):
         column = "xy".index(axis)
