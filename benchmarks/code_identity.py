@@ -42,10 +42,11 @@ def built_in_code(module: str) -> str:
 
 
 @cache
-def built_in_sources() -> str:
-    """Hash of the very text of all that :func:`built_in_code` can be made of, and of the Python
-    that reads it, at a hundredth of the cost: where it is equal, so is that."""
-    digest = hashlib.sha256(sys.version.encode())
+def built_in_sources(code: str) -> str:
+    """Hash of what :func:`built_in_code` gave and of the very text of all that it can be made
+    of, with the Python that reads it: where this is equal, that need not be made again, which
+    takes a hundred times as long."""
+    digest = hashlib.sha256(f"{code} {sys.version}".encode())
     folder = PACKAGE.parent
     for path in [*_model_files(), *sorted((folder / "baselines").rglob("*.py"))]:
         text = _text(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -9,7 +10,7 @@ from typing import Annotated
 
 from pydantic import Field, ValidationError
 
-from benchmarks.executors import Answer, Executor
+from benchmarks.executors import Answer, Executor, Local
 from benchmarks.provenance import surroundings
 from benchmarks.specification import RunSpec
 from benchmarks.store import Damage, Store
@@ -25,6 +26,8 @@ from coartic.text import counted, plain
 Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
 MOST_REWARDS = 1_000_000
 """Trials whose rewards are kept of a method that is not built in."""
+LEAST_TOGETHER = 8
+"""Runs of a cell that are not divided among workers."""
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
 _SURE = frozenset({"ok", "infeasible"})  # whoever was beside
 RETRIED = frozenset({"timeout", "crashed"})
@@ -83,7 +86,7 @@ def perform_missing(
     alone: set[str] = set()  # runs that are performed beside no others
     while missing and idle < _ROUNDS:
         idle += 1
-        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), alone)}
+        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), alone, _workers(executor))}
         jobs = [lot[0].setting.job(lot) for lot in lots.values()]
         for answer in executor.perform(jobs):
             lot, idle = lots.pop(answer["run_id"]), 0
@@ -104,8 +107,19 @@ def perform_missing(
     return progress
 
 
-def _lots(specs: Iterable[RunSpec], alone: Collection[str]) -> Iterator[Sequence[RunSpec]]:
-    """Runs that are performed side by side; results do not depend on which these are."""
+def _workers(executor: Executor) -> int:
+    return executor.workers if isinstance(executor, Local) else 1
+
+
+def _lots(
+    specs: Collection[RunSpec], alone: Collection[str], workers: int
+) -> Iterator[Sequence[RunSpec]]:
+    """Runs that are performed side by side; results do not depend on which these are.
+
+    Where there are few, each worker has its part, but lots are not made smaller than
+    :data:`LEAST_TOGETHER`: a run beside many takes a fraction of its time alone.
+    """
+    share = max(math.ceil(len(specs) / workers), LEAST_TOGETHER)
     for _, group in groupby(specs, key=lambda spec: id(spec.setting)):
         together: list[RunSpec] = []
         for spec in group:
@@ -113,7 +127,7 @@ def _lots(specs: Iterable[RunSpec], alone: Collection[str]) -> Iterator[Sequence
                 yield [spec]
                 continue
             together.append(spec)
-            if len(together) == spec.setting.most_together:
+            if len(together) == min(spec.setting.most_together, share):
                 yield together
                 together = []
         if together:

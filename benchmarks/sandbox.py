@@ -325,8 +325,8 @@ class Keeper:
         kernels = job["links"], learns
         if kernels in self._ready:
             return None
-        question = {"task": specification["task"], "reach": job["reach"], "learns": learns}
-        ready = sandbox.ask({"question": "prepare", **question}, _START_LIMIT_S)
+        question = {"question": "prepare", "task": specification["task"], "learns": learns}
+        ready = sandbox.ask(question, _START_LIMIT_S)
         if isinstance(ready, Failure):
             return ready
         self._ready.add(kernels)

@@ -69,7 +69,7 @@ class Setting:
         return {
             "specification": self.asked.model_dump(mode="json"),
             "code": code,
-            "sources": built_in_sources(),
+            "sources": built_in_sources(code),
             "links": self.task.robot.most_links,
             "told": list(self.entry.declared.told),
             "foreign": None if foreign is None else foreign.model_dump(mode="json"),

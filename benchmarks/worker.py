@@ -55,8 +55,7 @@ def answer(question: dict[str, Any]) -> Any:
     """What is asked for, as plain data. Raises CoarticError where that cannot be had."""
     what = question["question"]
     if what == "prepare":
-        task = parse_task(question["task"], "specification", reach=question["reach"])
-        warm_up(task, learns=question["learns"])
+        warm_up(parse_task(question["task"], "a job", reach=False), learns=question["learns"])
         return "ready"
     if what == "solve":
         return perform(question)
@@ -131,7 +130,7 @@ def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) ->
     """The method of a job, with the job's code. Raises ForeignCodeError otherwise."""
     try:
         method = _method(name, foreign)
-        if foreign is None and job["sources"] == built_in_sources():
+        if foreign is None and job["sources"] == built_in_sources(job["code"]):
             return method  # to the letter what the job's code was made of
         code = built_in_code(method.__module__) if foreign is None else _foreign_code(foreign)
     except CoarticError as error:

@@ -15,6 +15,7 @@ from coartic import builtin_tasks, execute, load_task
 from coartic.method import MethodError, Session
 from coartic.rows import movement_rows, movements_from
 from coartic.solution import other_arm_travel
+from coartic.task import hands_of
 from tests.support.made_up import manifest_for
 from tests.support.strategies import changed
 
