@@ -20,7 +20,7 @@ from coartic.lanes import LANES, ends_of, lanes_for
 from coartic.model import MotionModel, checked_model
 from coartic.movement import LARGEST, depart, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS, Array, Hand
 from coartic.task import Task
 
 
@@ -29,7 +29,7 @@ class Straight(NamedTuple):
 
     goals: Sequence[int]
     """Of each movement, from 1."""
-    hands: Sequence[str]
+    hands: Sequence[Hand]
     kinds: Sequence[str]
     targets: Sequence[Sequence[float]]
 
@@ -147,7 +147,10 @@ def execute_straight(
     targets = np.array([target for own in chosen for target in own.targets], dtype=np.float64)
     starts = np.cumsum([0, *(len(own.targets) for own in chosen)])
     first = np.array(list(laid.values()), dtype=np.int64) + starts[:-1, None]
-    codes = [[HANDS.index(own.hands[k]) for k in at[:-1]] for own, at in zip(chosen, laid.values(), strict=True)]
+    codes = [
+        [HANDS.index(own.hands[index]) for index in firsts[:-1]]
+        for own, firsts in zip(chosen, laid.values(), strict=True)
+    ]
     shape = len(chosen), len(task.goals), task.robot.dof
     rows = _Rows(
         first=first,
@@ -196,9 +199,9 @@ def _fit(
     before = np.concatenate([task.q0[None, :], targets[:-1]])
     before[starts[:-1]] = task.q0
     length = np.add.reduceat(np.sqrt(((targets - before) ** 2).sum(axis=1)), starts[:-1])
-    good: NDArray[np.bool_] = (np.abs(targets) <= LARGEST).all(axis=1)
+    good = np.asarray((np.abs(targets) <= LARGEST).all(axis=1))
     for coordinate in task.locked_base:
         joint = "xy".index(coordinate)
         good &= targets[:, joint] == task.q0[joint]
-    whole: NDArray[np.bool_] = np.logical_and.reduceat(good, starts[:-1]) & (length < 0.9 * longest)
-    return whole
+    whole = np.logical_and.reduceat(good, starts[:-1])
+    return np.asarray(whole & (length < 0.9 * longest))

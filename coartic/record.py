@@ -36,7 +36,6 @@ from coartic.stored import (
     TaskContent,
     Values,
     canonical,
-    content_hash,
 )
 from coartic.task import INITIAL_POLICIES, Task, parse_task
 from coartic.text import LONGEST_REASON, Line, printable
@@ -238,7 +237,7 @@ _OTHERWISE = (b"0.0000", b"e-", b"e+", b"e1", b"e2", b"e3")
 
 
 def _canonical(part: Any) -> bytes:
-    """:func:`coartic.stored.canonical` of a part of a record, most often at a tenth of its cost."""
+    """:func:`coartic.stored.canonical` of a part of a record, at a tenth of its cost."""
     content = part
     if isinstance(part, Solved):
         rows = [dict(sorted(vars(row).items())) for row in part.movements]
@@ -286,9 +285,7 @@ def _errors_in(records: Sequence[Record]) -> list[RecordError | None]:
     return [None if text is None else RecordError(text) for text in words]
 
 
-def _difference(
-    record: Record, name: str, stored: Solved, again: Solved | Unscored
-) -> str | None:
+def _difference(record: Record, name: str, stored: Solved, again: Solved | Unscored) -> str | None:
     if not isinstance(again, Solved):
         return f"run {record.run_id}: its {name} cannot be executed: {again}"
     if again != stored:

@@ -176,9 +176,7 @@ def _scored(task: Task, execution: Execution) -> Solved:
     )
 
 
-def _side_by_side(
-    task: Task, asked: Sequence[_Exact], model: MotionModel
-) -> dict[_Exact, Solved]:
+def _side_by_side(task: Task, asked: Sequence[_Exact], model: MotionModel) -> dict[_Exact, Solved]:
     """The scores of those that can be executed so."""
     straight = {
         number: Straight(*zip(*rows, strict=True))
@@ -192,9 +190,9 @@ def _side_by_side(
 
 def _straight(
     movements: tuple[PlainMovement, ...],
-) -> list[tuple[int, str, str, tuple[float, ...]]] | None:
+) -> list[tuple[int, Hand, Kind, tuple[float, ...]]] | None:
     """Goal, hand, kind and target of each; None where one is a path or lacks its target."""
-    rows = []
+    rows: list[tuple[int, Hand, Kind, tuple[float, ...]]] = []
     for row in movements:
         if row.target is None or row.waypoints is not None or row.kind == "path":
             return None

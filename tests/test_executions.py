@@ -8,7 +8,12 @@ from coartic import scores as scores_module
 from coartic.errors import CoarticError
 from coartic.scores import MANY, MOST_STEPS, PlainMovement, Solved, scored_together, solved
 
-CELLS = [("ascending", "EC1"), ("two-armed-1", "EC2"), ("two-armed-1", "EC4"), ("two-armed-2", "EC3")]
+CELLS = [
+    ("ascending", "EC1"),
+    ("two-armed-1", "EC2"),
+    ("two-armed-1", "EC4"),
+    ("two-armed-2", "EC3"),
+]
 RUNS = 12
 
 

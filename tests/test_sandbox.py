@@ -25,9 +25,16 @@ from coartic import CoarticError, load_task
 from tests.support.packs import packs_of
 from tests.support.suites import InProcess, ask_here, perform_plan, spec_of
 
-SPECIFICATION = {"method": "dual-process/EC1", "task": load_task("ascending").model_dump(mode="json")}
-JOB = {"run_id": "x", "owner": None, "time_limit_s": 1.0, "specification": SPECIFICATION, "links": 4}
-PREPARE = {"question": "prepare", "task": SPECIFICATION["task"], "learns": True}
+TASK = load_task("ascending").model_dump(mode="json")
+SPECIFICATION = {"method": "dual-process/EC1", "task": TASK}
+JOB = {
+    "run_id": "x",
+    "owner": None,
+    "time_limit_s": 1.0,
+    "specification": SPECIFICATION,
+    "links": 4,
+}
+PREPARE = {"question": "prepare", "task": TASK, "learns": True}
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 
