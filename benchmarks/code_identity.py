@@ -41,6 +41,19 @@ def built_in_code(module: str) -> str:
     return _code_hash(found[name] for name in sorted(found))
 
 
+@cache
+def built_in_sources(code: str) -> str:
+    """Hash of what :func:`built_in_code` gave and of the very text of all that it can be made
+    of, with the Python that reads it: where this is equal, that need not be made again, which
+    takes a hundred times as long."""
+    digest = hashlib.sha256(f"{code} {sys.version}".encode())
+    folder = PACKAGE.parent
+    for path in [*_model_files(), *sorted((folder / "baselines").rglob("*.py"))]:
+        text = _text(path)
+        digest.update(f"{path.relative_to(folder)} {len(text)} ".encode() + text)
+    return digest.hexdigest()
+
+
 def foreign_code(foreign: Foreign) -> str:
     """Hash for a method file with the local modules it imports, or for an installed package.
 
@@ -95,8 +108,13 @@ def _code_hash(sources: Iterable[str | bytes], name: str = "") -> str:
 @cache
 def _model() -> bytes:
     """The model, and the worker that hands it to methods."""
-    files = [*model_files(), Path(__file__).with_name("worker.py")]
-    return b"".join(path.name.encode() + _essence(_text(path), str(path)) for path in files)
+    return b"".join(
+        path.name.encode() + _essence(_text(path), str(path)) for path in _model_files()
+    )
+
+
+def _model_files() -> list[Path]:
+    return [*model_files(), Path(__file__).with_name("worker.py")]
 
 
 def _essence(source: str | bytes, name: str) -> bytes:

@@ -34,10 +34,15 @@ class Local:
     def __init__(self, jobs: int = -1) -> None:
         self.jobs = jobs
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
-        """Answers as they come. Raises SandboxError where no worker can be started."""
+    @property
+    def workers(self) -> int:
+        """Workers at once, where there are jobs enough."""
         from joblib import effective_n_jobs
 
+        return int(effective_n_jobs(self.jobs))
+
+    def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
+        """Answers as they come. Raises SandboxError where no worker can be started."""
         waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
         for job in jobs:
             waiting.put(job)
@@ -55,7 +60,7 @@ class Local:
             except BaseException as error:
                 answers.put(error)
 
-        workers = min(effective_n_jobs(self.jobs), len(jobs))
+        workers = min(self.workers, len(jobs))
         threads = [threading.Thread(target=work, daemon=True) for _ in range(workers)]
         for thread in threads:
             thread.start()

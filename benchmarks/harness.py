@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Annotated
 
 from pydantic import Field, ValidationError
 
-from benchmarks.executors import Answer, Executor
+from benchmarks.executors import Answer, Executor, Local
 from benchmarks.provenance import surroundings
 from benchmarks.specification import RunSpec
 from benchmarks.store import Damage, Store
@@ -17,14 +18,16 @@ from coartic import CoarticError
 from coartic.errors import IncompleteError
 from coartic.inputs import problems_inline
 from coartic.method import Information
-from coartic.record import SEARCH, Environment, Record, Status, Timing
-from coartic.scores import MOST_MOVEMENTS, PlainMovement, Solved, scored
+from coartic.record import SEARCH, SOLUTIONS, Environment, Record, Status, Timing
+from coartic.scores import MOST_MOVEMENTS, PlainMovement, Solved, Unscored, scored_together
 from coartic.stored import Plain, Reward, Spent, Values
 from coartic.text import counted, plain
 
 Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
 MOST_REWARDS = 1_000_000
 """Trials whose rewards are kept of a method that is not built in."""
+LEAST_TOGETHER = 8
+"""Runs of a cell that are not divided among workers."""
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
 _SURE = frozenset({"ok", "infeasible"})  # whoever was beside
 RETRIED = frozenset({"timeout", "crashed"})
@@ -83,7 +86,7 @@ def perform_missing(
     alone: set[str] = set()  # runs that are performed beside no others
     while missing and idle < _ROUNDS:
         idle += 1
-        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), alone)}
+        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), alone, _workers(executor))}
         jobs = [lot[0].setting.job(lot) for lot in lots.values()]
         for answer in executor.perform(jobs):
             lot, idle = lots.pop(answer["run_id"]), 0
@@ -104,8 +107,19 @@ def perform_missing(
     return progress
 
 
-def _lots(specs: Iterable[RunSpec], alone: Collection[str]) -> Iterator[Sequence[RunSpec]]:
-    """Runs that are performed side by side; results do not depend on which these are."""
+def _workers(executor: Executor) -> int:
+    return executor.workers if isinstance(executor, Local) else 1
+
+
+def _lots(
+    specs: Collection[RunSpec], alone: Collection[str], workers: int
+) -> Iterator[Sequence[RunSpec]]:
+    """Runs that are performed side by side; results do not depend on which these are.
+
+    Where there are few, each worker has its part, but lots are not made smaller than
+    :data:`LEAST_TOGETHER`: a run beside many takes a fraction of its time alone.
+    """
+    share = max(math.ceil(len(specs) / workers), LEAST_TOGETHER)
     for _, group in groupby(specs, key=lambda spec: id(spec.setting)):
         together: list[RunSpec] = []
         for spec in group:
@@ -113,7 +127,7 @@ def _lots(specs: Iterable[RunSpec], alone: Collection[str]) -> Iterator[Sequence
                 yield [spec]
                 continue
             together.append(spec)
-            if len(together) == spec.setting.most_together:
+            if len(together) == min(spec.setting.most_together, share):
                 yield together
                 together = []
         if together:
@@ -142,8 +156,17 @@ class Outcome(Plain):
     used: tuple[Information, ...] = ()
     meter: Spent | None = None
     rewards: tuple[Reward | None, ...] = ()
+
+
+class Made(Plain):
+    """In which time each of the runs of an answer was made, and with what."""
+
     timing: Timing
     environment: Environment
+
+
+class _Answered(Made):
+    runs: tuple[Outcome, ...]
 
 
 class _Said(Plain):
@@ -151,7 +174,7 @@ class _Said(Plain):
 
     error: str | None
     foreign_code: bool = False
-    answer: tuple[Outcome, ...] | None
+    answer: _Answered | None
 
 
 def record_of(answer: Answer, spec: RunSpec) -> Record:
@@ -182,33 +205,38 @@ def records_of(answer: Answer, specs: Sequence[RunSpec]) -> list[Record]:
         raise CoarticError(plain(said.error or "other code"))
     if said.answer is None:
         return failed("crashed", said.error or "it gave no answer")
-    if len(said.answer) != len(specs):
-        reason = f"it answers for {counted(len(said.answer), 'run')} of {len(specs)}"
+    outcomes = said.answer.runs
+    if len(outcomes) != len(specs):
+        reason = f"it answers for {counted(len(outcomes), 'run')} of {len(specs)}"
         return failed("solver-failed", reason)
-    return [_scored(*pair) for pair in zip(specs, said.answer, strict=True)]
+    given = [_handed(outcome) for outcome in outcomes]
+    found = iter(
+        scored_together(
+            specs[0].task, [rows for own in given for rows in own.values()], specs[0].model
+        )
+    )
+    return [
+        _scored(spec, outcome, said.answer, {name: next(found) for name in own})
+        for spec, outcome, own in zip(specs, outcomes, given, strict=True)
+    ]
 
 
-def _scored(spec: RunSpec, outcome: Outcome) -> Record:
+def _scored(
+    spec: RunSpec, outcome: Outcome, made: Made, found: Mapping[str, Solved | Unscored]
+) -> Record:
     false = _false_claim(spec, outcome)
     if false is not None:
         return _failure(spec, *false)
-    try:
-        record = _record(spec, outcome, **_scores(spec, outcome))
-    except _UnsolvedError as error:
-        unsolved = {"status": error.status, "reason": str(error)}
-        record = _record(spec, outcome.model_copy(update=unsolved))
+    scores = {name: score for name, score in found.items() if isinstance(score, Solved)}
+    unsolved = next((score for score in found.values() if not isinstance(score, Solved)), None)
+    if unsolved is None:
+        record = _record(spec, outcome, made, **scores)
+    else:
+        record = _record(spec, outcome.model_copy(update=_ending(unsolved)), made)
     problem = record.disagreement()
     if problem is not None:
         return _failure(spec, "solver-failed", f"what it states contradicts itself: {problem}")
     return record
-
-
-class _UnsolvedError(Exception):
-    """What a run hands over as a solution is none."""
-
-    def __init__(self, status: Status, reason: str) -> None:
-        super().__init__(reason)
-        self.status = status
 
 
 def _false_claim(spec: RunSpec, outcome: Outcome) -> tuple[Status, str] | None:
@@ -231,37 +259,35 @@ def _false_claim(spec: RunSpec, outcome: Outcome) -> tuple[Status, str] | None:
     return None
 
 
-def _scores(spec: RunSpec, outcome: Outcome) -> dict[str, Solved]:
-    """The scores of what an outcome hands over; _UnsolvedError where there is none to be had."""
+def _handed(outcome: Outcome) -> dict[str, Handed]:
+    """What an outcome hands over to be executed."""
     if outcome.status != "ok":
         return {}
     return {
-        name: _solved(spec, movements)
-        for name in ("solution", "initial", "replay")
+        name: movements
+        for name in SOLUTIONS
         if (movements := getattr(outcome, name)) or name == "solution"
     }
 
 
-def _solved(spec: RunSpec, movements: tuple[PlainMovement, ...]) -> Solved:
-    """A solution's score. What is stored of it is executed again before any table is written."""
-    try:
-        return scored(spec.task, movements, spec.model)
-    except IncompleteError as error:
-        raise _UnsolvedError("infeasible", str(error)) from None
-    except (CoarticError, TypeError, ValueError, OverflowError) as error:
-        reason = f"the solution cannot be executed: {error}"
-        raise _UnsolvedError("solver-failed", reason) from None
+def _ending(unscored: Unscored) -> dict[str, str]:
+    """How a run ended that hands over as a solution what is none."""
+    if isinstance(unscored, IncompleteError):
+        return {"status": "infeasible", "reason": str(unscored)}
+    return {
+        "status": "solver-failed",
+        "reason": f"the solution cannot be executed: {unscored}",
+    }
 
 
 def _failure(spec: RunSpec, status: Status, reason: str, wall_s: float = 0.0) -> Record:
     """The record of a run that has left nothing but how it ended."""
     timing = Timing(wall_s=wall_s, time_limit_s=spec.limits.time_s)
-    return _record(
-        spec, Outcome(status=status, reason=reason, timing=timing, environment=surroundings())
-    )
+    made = Made(timing=timing, environment=surroundings())
+    return _record(spec, Outcome(status=status, reason=reason), made)
 
 
-def _record(spec: RunSpec, outcome: Outcome, **scores: Solved) -> Record:
+def _record(spec: RunSpec, outcome: Outcome, made: Made, **scores: Solved) -> Record:
     good = outcome.status == "ok"
     return Record(
         run_id=spec.run_id,
@@ -280,7 +306,7 @@ def _record(spec: RunSpec, outcome: Outcome, **scores: Solved) -> Record:
         meter=outcome.meter,
         details=outcome.details,
         rewards=outcome.rewards,
-        timing=outcome.timing.model_copy(update={"time_limit_s": spec.limits.time_s}),
+        timing=made.timing.model_copy(update={"time_limit_s": spec.limits.time_s}),
         origin=spec.entry.origin,
-        environment=outcome.environment,
+        environment=made.environment,
     )

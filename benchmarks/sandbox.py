@@ -21,13 +21,14 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO, Any
 
 import psutil
 
 from benchmarks.guard import end, end_below
 from coartic.errors import CoarticError
+from coartic.learning import METHOD_PREFIX
 from coartic.text import plain
 
 # One run, one core: BLAS and OpenMP threads would only get in each other's way.
@@ -253,6 +254,7 @@ class Keeper:
 
     def __init__(self) -> None:
         self._sandbox: Sandbox | None = None
+        self._ready: set[tuple[int, bool]] = set()
         self._owner: str | None = None
         self._dismissed = False
 
@@ -289,6 +291,10 @@ class Keeper:
             sandbox.close()
 
     def _ask(self, sandbox: Sandbox, job: dict[str, Any]) -> bytes | Failure:
+        unready = self._prepare(sandbox, job)
+        if unready is not None:
+            reason = f"its worker could not be prepared: {unready.reason}"
+            return replace(unready, outcome="crashed", reason=reason)
         question = {"question": "solve", **job}
         return sandbox.ask(question, job["time_limit_s"], patient=job["owner"] is None)
 
@@ -306,10 +312,25 @@ class Keeper:
         self._owner = job["owner"]
         if self._dismissed:  # while it started
             sandbox.close()
-        ready = sandbox.ask({"question": "prepare"}, _START_LIMIT_S)
-        if isinstance(ready, Failure):
-            raise SandboxError(f"a worker process did not start: {ready.reason}")
+        self._ready.clear()
+        unready = self._prepare(sandbox, job)
+        if unready is not None:
+            raise SandboxError(f"a worker process did not start: {unready.reason}")
         return sandbox
+
+    def _prepare(self, sandbox: Sandbox, job: dict[str, Any]) -> Failure | None:
+        """Have the kernels compiled that the job's runs need, on nobody's clock."""
+        specification = job["specification"]
+        learns = specification["method"].startswith(METHOD_PREFIX)
+        kernels = job["links"], learns
+        if kernels in self._ready:
+            return None
+        question = {"question": "prepare", "task": specification["task"], "learns": learns}
+        ready = sandbox.ask(question, _START_LIMIT_S)
+        if isinstance(ready, Failure):
+            return ready
+        self._ready.add(kernels)
+        return None
 
 
 def failure(run_id: str, outcome: str, reason: str, wall_s: float) -> dict[str, Any]:

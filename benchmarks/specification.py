@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from benchmarks.code_identity import built_in_sources
 from benchmarks.provenance import command
 from benchmarks.registry import Entry
 from coartic import PAPER, MotionModel, Task
@@ -69,6 +70,8 @@ class Setting:
         return {
             "specification": self.asked.model_dump(mode="json"),
             "code": code,
+            "sources": built_in_sources(code),
+            "links": self.task.robot.most_links,
             "told": list(self.entry.declared.told),
             "foreign": None if foreign is None else foreign.model_dump(mode="json"),
             "owner": None if foreign is None else f"{name} {code}",

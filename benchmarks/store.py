@@ -20,7 +20,7 @@ from coartic import CoarticError
 from coartic.codec import encode
 from coartic.files import clear_leftovers, write_atomically
 from coartic.packs import Packs, check_layout, is_pack, number_of, packs_in
-from coartic.record import Record, RecordError
+from coartic.record import Record, RecordError, check_together, in_lots
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,16 @@ class Store:
         A record is what is written last of it that agrees with itself.
         """
         packs = self.packs()
+        doubtful: list[str] = []
+        for lot in in_lots(_readable(packs, run_ids, doubtful)):
+            try:
+                check_together(lot)
+            except RecordError:
+                doubtful += [record.run_id for record in lot]
+            else:
+                yield from lot
         damaged = {path: Damage(path, reason) for path, reason in packs.damaged.items()}
-        for run_id in run_ids:
+        for run_id in doubtful:
             for path in packs.places(run_id):
                 try:
                     record = packs.read(run_id, path)
@@ -164,6 +172,16 @@ class Store:
                 raise CoarticError(f"{self.records} has no number left for {path.name}")
             if not os.path.lexists(path):
                 return path
+
+
+def _readable(packs: Packs, run_ids: Iterable[str], doubtful: list[str]) -> Iterator[Record]:
+    """The newest records of runs that have one; runs whose cannot be read are doubtful."""
+    for run_id in run_ids:
+        if run_id in packs:
+            try:
+                yield packs[run_id]
+            except RecordError:
+                doubtful.append(run_id)
 
 
 def _why(error: Exception) -> str:

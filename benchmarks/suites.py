@@ -381,19 +381,6 @@ class CellPlan:
         return self.setting.specs(run_seeds(self.seed, self.cell.task.name, self.runs))
 
 
-def run_specs(
-    cells: Sequence[Cell],
-    *,
-    runs: int,
-    seed: int,
-    trials: int | None = None,
-    limits: Limits = UNLIMITED,
-) -> list[tuple[Cell, RunSpec]]:
-    """Every run of every cell, in order (:func:`cell_plans`)."""
-    plans = cell_plans(cells, runs=runs, seed=seed, trials=trials, limits=limits)
-    return [(plan.cell, spec) for plan in plans for spec in plan.specs()]
-
-
 def cell_plans(
     cells: Sequence[Cell],
     *,

@@ -16,6 +16,7 @@ from coartic.errors import CoarticError
 from coartic.files import check_folder, check_no_report, digest_of, holds, publish, temporary
 from coartic.inputs import read_bytes
 from coartic.packs import Packs, digest_of_packs
+from coartic.record import check_together, in_lots
 from coartic.tables import (
     LARGEST_MANIFEST,
     TABLES,
@@ -126,7 +127,7 @@ def _digests(folder: Path) -> dict[str, str]:
 
 def _checked(manifest: Manifest, packs: Packs) -> Iterator[Planned]:
     for cell in manifest.specification.cells:
-        for run_id in manifest.run_ids(cell):
-            record = packs[run_id]
-            record.check()
-            yield cell, record
+        for lot in in_lots(packs[run_id] for run_id in manifest.run_ids(cell)):
+            check_together(lot)
+            for record in lot:
+                yield cell, record

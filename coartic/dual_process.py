@@ -8,7 +8,7 @@ declares holds under all its parameters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import chain
 from typing import Annotated, ClassVar
 
@@ -122,7 +122,7 @@ class DualProcess(Method):
 
 def _result(session: Session, run: LearningRun) -> Result | MethodError:
     session.add_solving(run.wall_s)
-    session.spend(**asdict(run.counters))
+    session.spend(**vars(run.counters))
     session.record_rewards(run.rewards.tolist())  # None where a trial failed
     if run.status != "ok":
         return MethodError("infeasible", run.reason)

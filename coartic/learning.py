@@ -30,6 +30,7 @@ from coartic.learner import (
     work_for,
 )
 from coartic.model import PAPER, MotionModel, checked_model
+from coartic.movement import move
 from coartic.problem import problem_of
 from coartic.robot import HANDS, Array
 from coartic.solution import Execution, Movement, execute
@@ -222,9 +223,7 @@ def learn_many(
                 on_done(run)
         return runs
 
-    if (links := task.robot.most_links) not in _compiled_for:
-        _Learning(task, condition, model, search, [0], 0).perform()
-        _compiled_for.add(links)
+    _compile_for(task, condition, model, search)
     if threads == 1:
         return [run for lot in lots for run in perform(lot)]
     with ThreadPoolExecutor(threads) as pool:
@@ -313,14 +312,34 @@ class _Learning:
         )
 
 
-def warm_up() -> None:
-    """Compile the kernels, or load them, so that no run's time contains it."""
-    from coartic.task import load_task
+def warm_up(task: Task | None = None, *, learns: bool = True) -> None:
+    """Compile the kernels, or load them, so that no run's time contains it.
 
-    task = load_task("ascending")
-    learn(task, "EC1", seed=0, trials=1).execute()
-    correct(task.robot, task.q0, "right", task.goals[0])
-    make_trials(task, "RRR", np.empty((0, len(task.goals), task.robot.dof)))
+    They are those of the number of links that a task's robot has, of the shipped tasks' without
+    one; the learner's too if it ``learns``.
+    """
+    if task is None:
+        from coartic.task import load_task
+
+        task = load_task("ascending")
+    hand, goal = task.hands[0], task.goals[0]
+    hands = letters_of([hand] * len(task.goals))
+    move(task.robot, task.q0, task.q0, hand, goal, task.radius)
+    correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
+    make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
+    if learns:
+        condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
+        _compile_for(task, condition, PAPER, InitialSearch(hands))
+
+
+def _compile_for(
+    task: Task, condition: ExplorationCondition, model: MotionModel, search: InitialSearch
+) -> None:
+    """Compile the learner's kernel, unless it is, for the number of links of a task's robot."""
+    links = task.robot.most_links
+    if links not in _compiled_for:
+        _Learning(task, condition, model, search, [0], 0).perform()
+        _compiled_for.add(links)
 
 
 def _counters(trials: int, counts: NDArray[np.int64]) -> Counters:

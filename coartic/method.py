@@ -13,7 +13,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Literal
 
@@ -140,7 +140,7 @@ class Meter:
 
     def as_dict(self) -> dict[str, Any]:
         """Counters and times."""
-        return asdict(self)
+        return dict(vars(self))
 
 
 @dataclass(frozen=True)

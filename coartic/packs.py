@@ -22,7 +22,7 @@ LARGEST_PACK = 1 << 28
 """Bytes of a pack: rewards of ten million trials, twice over."""
 _PACK = re.compile(r"(\d{8}|[1-9]\d{8,17})\.pack")
 _OLD = re.compile(r"[0-9a-f]{16}-[0-9a-f]+\.json")
-_OPEN = 4  # packs kept in memory
+_OPEN = 1 << 26  # bytes of packs kept in memory, or one pack
 
 
 def packs_in(folder: Path) -> list[Path]:
@@ -76,6 +76,7 @@ class Packs(Mapping[str, Record]):
         self._newest: dict[str, Path] = {}
         self._older: dict[str, list[Path]] = {}
         self._open: OrderedDict[Path, dict[str, Line]] = OrderedDict()
+        self._sizes: dict[Path, int] = {}
         digest = hashlib.sha256()
         for path in self.paths:
             try:
@@ -148,7 +149,9 @@ class Packs(Mapping[str, Record]):
         if path not in self._open:
             data = read_bytes(path, LARGEST_PACK, error=RecordError)
             self._open[path] = {line.run_id: line for line in lines(data)[0]}
-            if len(self._open) > _OPEN:
-                self._open.popitem(last=False)
+            self._sizes[path] = len(data)
+            while len(self._open) > 1 and sum(self._sizes.values()) > _OPEN:
+                dropped, _ = self._open.popitem(last=False)
+                del self._sizes[dropped]
         self._open.move_to_end(path)
         return self._open[path]

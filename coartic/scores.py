@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from coartic.errors import IncompleteError, SolutionError
+from coartic.errors import CoarticError, IncompleteError, SolutionError
+from coartic.executions import Made, Straight, execute_straight
 from coartic.model import MotionModel
 from coartic.movement import configuration
 from coartic.robot import Hand
 from coartic.solution import Execution, Kind, Movement, execute, other_arm_travel
 from coartic.stored import Amount, Count, Itself, Plain, Reward
-from coartic.task import Task
+from coartic.task import Task, hands_of, letters_of
 
 MOST_MOVEMENTS = 10_000
 """Movements of one solution."""
 MOST_STEPS = 1_000_000
 """Movement steps along one solution, its targets visited in order: thousands do."""
+MANY = 32
+"""Solutions from which on they are executed side by side: for fewer its kernel is not compiled."""
+_KNOWN = 512  # scores that are kept
+Unscored = CoarticError | ValueError | TypeError | OverflowError
+"""Why a solution has no score."""
+_REASONS = (CoarticError, ValueError, TypeError, OverflowError)
 
 
 class PlainMovement(Plain):
@@ -108,8 +114,41 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
 def scored(task: Task, movements: tuple[PlainMovement, ...], model: MotionModel) -> Solved:
     """:func:`solved` of movements that are kept, once for those that agree to the last bit:
     runs that begin alike, and a folder that is read again."""
-    exact = _Exact(b"".join(row.text() for row in movements), movements)
-    return _once(Itself(task), exact, model)
+    (found,) = scored_together(task, [movements], model)
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def scored_together(
+    task: Task, solutions: Iterable[tuple[PlainMovement, ...]], model: MotionModel
+) -> list[Solved | Unscored]:
+    """:func:`scored` of many solutions of a task, in their order; what it raises in place of a
+    score that cannot be had.
+
+    Many are executed side by side (:mod:`coartic.executions`), which gives the same.
+    """
+    whose = Itself(task)
+    asked = [_Exact(b"".join(row.text() for row in rows), rows) for rows in solutions]
+    found: dict[_Exact, Solved | Unscored] = {}
+    for exact in dict.fromkeys(asked):
+        if (before := _known.get((whose, exact, model))) is not None:
+            found[exact] = before
+    new = [exact for exact in dict.fromkeys(asked) if exact not in found]
+    if len(new) >= MANY:
+        found |= _side_by_side(task, new, model)
+    for exact in new:
+        if exact not in found:
+            try:
+                rows = [row.movement() for row in exact.movements]
+                found[exact] = solved(task, rows, model)
+            except _REASONS as error:
+                found[exact] = error.with_traceback(None)
+        if isinstance(score := found[exact], Solved):
+            _known[whose, exact, model] = score
+    while len(_known) > _KNOWN:
+        _known.pop(next(iter(_known)), None)
+    return [found[exact] for exact in asked]
 
 
 @dataclass(frozen=True)
@@ -120,9 +159,7 @@ class _Exact:
     movements: tuple[PlainMovement, ...] = field(compare=False)
 
 
-@lru_cache(maxsize=512)
-def _once(task: Itself, exact: _Exact, model: MotionModel) -> Solved:
-    return solved(task.object, [row.movement() for row in exact.movements], model)
+_known: dict[tuple[Itself, _Exact, MotionModel], Solved] = {}
 
 
 def _scored(task: Task, execution: Execution) -> Solved:
@@ -132,6 +169,49 @@ def _scored(task: Task, execution: Execution) -> Solved:
         hands=execution.hands,
         ticks_by_goal=execution.ticks_by_goal(),
         corrections=execution.corrections,
-        other_arm_travel=other_arm_travel(task, execution),
+        other_arm_travel=other_arm_travel(
+            task, hands_of(execution.hands), execution.configurations
+        ),
         movements=tuple(map(PlainMovement.of, execution.movements)),
+    )
+
+
+def _side_by_side(task: Task, asked: Sequence[_Exact], model: MotionModel) -> dict[_Exact, Solved]:
+    """The scores of those that can be executed so."""
+    straight = {
+        number: Straight(*zip(*rows, strict=True))
+        for number, exact in enumerate(asked)
+        if 0 < len(exact.movements) <= MOST_MOVEMENTS
+        and (rows := _straight(exact.movements)) is not None
+    }
+    made = execute_straight(task, straight, model, most_steps=MOST_STEPS)
+    return {asked[number]: _solved(task, asked[number], own) for number, own in made.items()}
+
+
+def _straight(
+    movements: tuple[PlainMovement, ...],
+) -> list[tuple[int, Hand, Kind, tuple[float, ...]]] | None:
+    """Goal, hand, kind and target of each; None where one is a path or lacks its target."""
+    rows: list[tuple[int, Hand, Kind, tuple[float, ...]]] = []
+    for row in movements:
+        if row.target is None or row.waypoints is not None or row.kind == "path":
+            return None
+        rows.append((row.goal, row.hand, row.kind, row.target))
+    return rows
+
+
+def _solved(task: Task, exact: _Exact, made: Made) -> Solved:
+    rows, ticks = [], [0] * len(task.goals)
+    for row, spent in zip(exact.movements, made.ticks, strict=True):
+        if spent is not None:
+            ticks[row.goal - 1] += spent
+            rows.append(row if row.ticks == spent else row.model_copy(update={"ticks": spent}))
+    hands = {row.goal: row.hand for row in rows}
+    return Solved(
+        reward=-sum(ticks),
+        hands=letters_of(list(hands.values())),
+        ticks_by_goal=tuple(ticks),
+        corrections=sum(row.kind == "corrective" for row in rows),
+        other_arm_travel=other_arm_travel(task, hands.values(), made.reached),
+        movements=tuple(rows),
     )

@@ -8,6 +8,7 @@ says of its own solution, its score is what comes out here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -108,17 +109,18 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     return run.outcome()
 
 
-def other_arm_travel(task: Task, execution: Execution) -> float:
+def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Joint travel of the arm that is not chosen, summed over the movements to each goal.
 
+    ``hands`` hit the goals, with the robot in the configurations ``reached``, shape ``(G, dof)``.
     In rad, from hit to hit; 0 where that arm keeps still, as in exploration conditions 1
     and 3 of the learner.
     """
-    travel, before = 0.0, np.array(task.q0)
-    for letter, q in zip(execution.hands, execution.configurations, strict=True):
-        other: Hand = "right" if letter == "L" else "left"
-        joints = task.robot.joints(other)
-        travel += float(np.linalg.norm(q[joints] - before[joints]))
+    travel, before = 0.0, task.q0
+    for hand, q in zip(hands, reached, strict=True):
+        joints = task.robot.joints("right" if hand == "left" else "left")
+        difference = q[joints] - before[joints]
+        travel += math.sqrt(difference.dot(difference))
         before = q
     return travel
 

@@ -107,7 +107,7 @@ def _prints(c: str) -> bool:
 
 
 def _printable(text: str) -> str:
-    for c in text:
+    for c in "" if text.isprintable() else text:
         if not _prints(c):
             escape = c.encode("unicode_escape").decode()
             raise PydanticCustomError(

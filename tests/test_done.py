@@ -32,8 +32,10 @@ def unchanged(monkeypatch):
 @pytest.fixture
 def checks(monkeypatch):
     """Ids of the runs that are checked."""
-    found, check = [], Record.check
-    monkeypatch.setattr(Record, "check", lambda self: (found.append(self.run_id), check(self))[1])
+    found, check = [], Record.disagreement
+    monkeypatch.setattr(
+        Record, "disagreement", lambda self: (found.append(self.run_id), check(self))[1]
+    )
     return found
 
 

@@ -24,7 +24,6 @@ from benchmarks.suites import (
     Cell,
     distinct,
     load_suite,
-    run_specs,
     select_cells,
     suites,
 )
@@ -38,7 +37,14 @@ from coartic.record import run_seeds
 from coartic.rows import movements_from
 from coartic.tables import FORMAT, RUNS
 from tests.support.strategies import tiny_task
-from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables, suite_of
+from tests.support.suites import (
+    KNOWN,
+    paper_cells,
+    run_and_write,
+    run_specs,
+    same_tables,
+    suite_of,
+)
 
 FIRST_COLUMNS = [
     *"run_id suite task method variant label run seed status reason hands reward".split(),

@@ -8,11 +8,10 @@ import pytest
 from llvmlite import binding
 from numba import njit
 
-from benchmarks.harness import perform_missing
+from benchmarks.harness import _lots, perform_missing, records_of
 from benchmarks.sandbox import failure
 from benchmarks.specification import Limits
 from benchmarks.store import Store
-from benchmarks.suites import run_specs
 from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
 from coartic.compiled import entry
 from coartic.corrective import Corrector, correct_lanes
@@ -20,7 +19,7 @@ from coartic.lanes import LANES, board, ends_of, lanes_for, place
 from coartic.movement import Goal
 from coartic.trigonometry import LARGEST
 from tests.support.strategies import UNEVEN
-from tests.support.suites import InProcess, paper_cells
+from tests.support.suites import InProcess, paper_cells, run_specs
 
 SOON_FAILED = MotionModel(max_iterations=60)
 
@@ -193,3 +192,32 @@ def test_long_runs_are_fewer_side_by_side():
         4,
         1,
     ]
+
+
+@pytest.mark.parametrize(
+    ("runs", "workers", "sizes"),
+    [(40, 2, [20, 20]), (20, 8, [8, 8, 4]), (100, 2, [40, 40, 20]), (40, 1, [40])],
+)
+def test_a_cell_is_divided_among_workers(runs, workers, sizes):
+    (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
+    planned = [spec for _, spec in run_specs([cell], runs=runs, seed=0, trials=3)]
+    lots = list(_lots(planned, set(), workers))
+    assert [len(lot) for lot in lots] == sizes
+    assert [spec for lot in lots for spec in lot] == planned
+
+
+def test_what_is_no_solution_is_that_of_one_run_of_a_lot_alone():
+    """Of runs side by side each is executed by itself."""
+    (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
+    planned = [spec for _, spec in run_specs([cell], runs=LANES, seed=0, trials=3)]
+    (answer,) = InProcess().perform([planned[0].setting.job(planned)])
+    said = json.loads(answer["outcome"])
+    fifth, seventh = (said["answer"]["runs"][run]["solution"] for run in (5, 7))
+    fifth[0]["target"].pop()
+    seventh[:] = [row for row in seventh if row["goal"] < 3]
+    forged = records_of({**answer, "outcome": json.dumps(said)}, planned)
+    honest = records_of(answer, planned)
+    assert [run for run, record in enumerate(forged) if record.status != "ok"] == [5, 7]
+    assert [record.status for record in (forged[5], forged[7])] == ["solver-failed"] * 2
+    for run, (one, other) in enumerate(zip(forged, honest, strict=True)):
+        assert run in (5, 7) or one.result() == other.result()

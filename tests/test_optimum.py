@@ -15,6 +15,7 @@ from coartic import builtin_tasks, execute, load_task
 from coartic.method import MethodError, Session
 from coartic.rows import movement_rows, movements_from
 from coartic.solution import other_arm_travel
+from coartic.task import hands_of
 from tests.support.made_up import manifest_for
 from tests.support.strategies import changed
 
@@ -48,7 +49,7 @@ def test_what_is_shipped_holds(entry):
     assert execution.hands == entry.hands
     assert execution.corrections == 0
     if entry.other_arm == "still":
-        assert other_arm_travel(task, execution) == 0.0
+        assert other_arm_travel(task, hands_of(execution.hands), execution.configurations) == 0.0
     locked = {"task": "", "y": "y", "xy": "xy"}[entry.base]
     for axis in (*locked, *task.locked_base):
         column = "xy".index(axis)

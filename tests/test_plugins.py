@@ -13,10 +13,10 @@ import pytest
 from benchmarks import executors, reproduce
 from benchmarks import registry as registry_module
 from benchmarks.registry import registry
-from benchmarks.suites import Cell, run_specs
+from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
 from tests.support.commands import call
-from tests.support.suites import InProcess, ask_here, performed
+from tests.support.suites import InProcess, ask_here, performed, run_specs
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "tests" / "example_plugin"

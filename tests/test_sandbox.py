@@ -21,10 +21,20 @@ from benchmarks.reproduce import perform_once
 from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
 from benchmarks.specification import Limits
 from benchmarks.store import Store
-from coartic import CoarticError
+from coartic import CoarticError, load_task
 from tests.support.packs import packs_of
 from tests.support.suites import InProcess, ask_here, perform_plan, spec_of
 
+TASK = load_task("ascending").model_dump(mode="json")
+SPECIFICATION = {"method": "dual-process/EC1", "task": TASK}
+JOB = {
+    "run_id": "x",
+    "owner": None,
+    "time_limit_s": 1.0,
+    "specification": SPECIFICATION,
+    "links": 4,
+}
+PREPARE = {"question": "prepare", "task": TASK, "learns": True}
 ROOT = Path(__file__).parent.parent
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 
@@ -79,7 +89,7 @@ def test_a_killed_worker_is_a_crash_with_its_signal(known):
     sandbox = Sandbox()
     (worker,) = workers_of(os.getpid())
     os.kill(worker, signal.SIGKILL)
-    answer = sandbox.ask({"question": "prepare"}, 60.0)
+    answer = sandbox.ask(PREPARE, 60.0)
     assert isinstance(answer, Failure)
     assert answer.disturbed
     assert "killed by SIGKILL" in answer.reason
@@ -92,7 +102,7 @@ def test_a_worker_does_not_outlive_its_guard():
     (worker,) = map(psutil.Process, workers_of(os.getpid()))
     worker.suspend()  # it would answer still
     worker.parent().kill()
-    answer = own.ask({"question": "prepare"}, 60.0)
+    answer = own.ask(PREPARE, 60.0)
     assert isinstance(answer, Failure)
     assert answer.disturbed
     assert "killed by SIGKILL" in answer.reason
@@ -280,15 +290,17 @@ class Counted:
 
     made: ClassVar[list["Counted"]] = []
     answers = staticmethod(lambda question: b"done")
+    preparations: ClassVar[list[bytes | Failure]] = [b"ready"]
 
     def __init__(self):
-        self.jobs, self.alive = [], True
+        self.jobs, self.prepared, self.alive = [], 0, True
         self.made.append(self)
 
     def ask(self, question, limit_s, *, patient=False):
-        if question["question"] == "prepare":
-            return b"ready"
         assert self.alive
+        if question["question"] == "prepare":
+            self.prepared += 1
+            return self.preparations[min(self.prepared, len(self.preparations)) - 1]
         self.jobs.append(question["run_id"])
         answer = self.answers(question)
         self.alive = isinstance(answer, bytes)
@@ -309,7 +321,7 @@ def test_a_method_that_is_not_built_in_has_a_process_of_its_own(counted):
     keeper = Keeper()
     reusable = []
     for number, owner in enumerate(["a", "a", "b", None, None, "a"]):
-        answer = keeper.perform({"run_id": number, "owner": owner, "time_limit_s": 1.0})
+        answer = keeper.perform({**JOB, "run_id": number, "owner": owner})
         assert answer == {"run_id": number, "outcome": "done"}
         reusable.append(keeper.reusable)
         assert [one.alive for one in counted.made] == [False] * (len(counted.made) - 1) + [True]
@@ -318,13 +330,35 @@ def test_a_method_that_is_not_built_in_has_a_process_of_its_own(counted):
     assert reusable == [False, False, False, True, True, False]
 
 
+def test_kernels_are_compiled_before_the_first_run_that_needs_them(counted):
+    keeper, other = Keeper(), {**SPECIFICATION, "method": "corrective-alone/given"}
+    jobs = [JOB, JOB, {**JOB, "links": 3}, {**JOB, "specification": other}, {**JOB, "links": 3}]
+    seen = []
+    for job in jobs:
+        keeper.perform(job)
+        seen.append(counted.made[0].prepared)
+    assert seen == [1, 1, 2, 3, 3]
+    assert len(counted.made) == 1
+
+
+def test_a_worker_that_cannot_be_prepared_again_loses_that_run_alone(counted, monkeypatch):
+    """A method that was there before may be why: the suite goes on."""
+    failed = Failure("timeout", "time limit of 300 s exceeded", 300.0)
+    monkeypatch.setattr(counted, "preparations", [b"ready", failed])
+    keeper = Keeper()
+    assert keeper.perform(JOB)["outcome"] == "done"
+    answer = keeper.perform({**JOB, "links": 3})
+    assert answer["failure"] == "crashed"
+    assert "could not be prepared: time limit of 300 s" in answer["reason"]
+
+
 @pytest.mark.parametrize(("disturbed", "tries"), [(True, 3), (False, 1)])
 def test_a_run_that_was_disturbed_is_tried_again_in_fresh_processes(
     counted, monkeypatch, disturbed, tries
 ):
     failed = Failure("crashed", "killed", 0.5, disturbed=disturbed)
     monkeypatch.setattr(counted, "answers", staticmethod(lambda question: failed))
-    answer = Keeper().perform({"run_id": "x", "owner": None, "time_limit_s": 1.0})
+    answer = Keeper().perform(JOB)
     assert answer == sandbox.failure("x", "crashed", "killed", 0.5)
     assert [one.jobs for one in counted.made] == [["x"]] * tries
 
@@ -342,7 +376,7 @@ def test_a_line_from_elsewhere_is_no_answer():
         line = b'{"error": null, "answer": 1}\n'
         other = threading.Timer(0.05, lambda: stream.write_bytes(line))
         other.start()
-        answer = own.ask({"question": "prepare"}, 60.0)  # loads kernels, which takes longer
+        answer = own.ask(PREPARE, 60.0)  # loads kernels, which takes longer
         other.join()
     finally:
         own.close()

@@ -459,7 +459,9 @@ def test_waiting_arms_keep_still_under_condition_3_only():
 def test_travel_is_the_column_of_the_runs():
     run = learn(load_task("two-armed-1"), "EC4", seed=3, trials=500)
     path = trajectory(run.task, run.solution)
-    assert travel(path).sum() == pytest.approx(other_arm_travel(run.task, path.execution))
+    assert travel(path).sum() == pytest.approx(
+        other_arm_travel(run.task, path.hands, path.execution.configurations)
+    )
     assert travel(path).sum() > 0
 
 

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from benchmarks.harness import record_of
 from benchmarks.specification import Limits
 from benchmarks.store import Damage, RecordError, Store
-from benchmarks.suites import run_specs
 from coartic import CoarticError, codec, files
 from tests.support.packs import (
     pack_lines,
@@ -25,7 +24,7 @@ from tests.support.packs import (
     write_lines,
     write_pack,
 )
-from tests.support.suites import InProcess, paper_cells, perform_plan
+from tests.support.suites import InProcess, paper_cells, perform_plan, run_specs
 
 ROOT = Path(__file__).parent.parent
 pytestmark = pytest.mark.usefixtures("one_by_one")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -22,7 +22,7 @@ from coartic import CoarticError, parse_task
 from coartic.files import digest_of
 from coartic.inputs import open_regular, problems_inline, read_bytes
 from coartic.packs import Packs, check_layout
-from coartic.record import BUILT_IN, Record, RecordError
+from coartic.record import BUILT_IN, Record, RecordError, check_together, in_lots
 from coartic.tables import (
     FORMAT,
     LARGEST_MANIFEST,
@@ -114,19 +114,24 @@ def _checked(folder: Path, manifest: Manifest) -> Iterator[Planned]:
         raise CoarticError(f"{reason}; {AGAIN}")
     for cell in manifest.specification.cells:
         method = manifest.specification.methods[cell.method]
-        for run, run_id in enumerate(manifest.run_ids(cell)):
-            try:
-                record = packs[run_id]
-                record.check()
-            except RecordError as error:
-                raise CoarticError(f"{error}; {AGAIN}") from None
+        for run, record in enumerate(_sound(packs, manifest.run_ids(cell))):
             problem = _departure(method, run, record)
             if problem is not None:
-                why = f"run {run_id} is not as planned: it has another {problem}"
+                why = f"run {record.run_id} is not as planned: it has another {problem}"
                 damaged(folder / "manifest.json", why)
             proofs.add(cell.task, record)
             yield cell, record
     proofs.check()
+
+
+def _sound(packs: Packs, run_ids: Iterable[str]) -> Iterator[Record]:
+    """The records of runs, each true to its solution."""
+    try:
+        for lot in in_lots(packs[run_id] for run_id in run_ids):
+            check_together(lot)
+            yield from lot
+    except RecordError as error:
+        raise CoarticError(f"{error}; {AGAIN}") from None
 
 
 class _Table:

@@ -71,7 +71,11 @@ def main() -> None:
     try:
         _check_arguments()
         _check_packages()
-        app(prog_name="coartic")
+        try:
+            app(prog_name="coartic")
+        except SystemExit:
+            sys.stdout.flush()  # a full disk is noticed here, and said
+            raise
     except CoarticError as error:
         complain("error", str(error))
         sys.exit(2)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from coartic.text import counted, one_line
@@ -103,7 +104,10 @@ def performing(suite: str, folder: Path) -> Iterator[Display]:
     with Display(suite) as display:
         try:
             yield display
-        except KeyboardInterrupt:
+        except BaseException as error:
+            # Whatever else becomes of it, what comes after a Ctrl-C is its consequence.
+            if not (display.interrupted or isinstance(error, KeyboardInterrupt)):
+                raise
             display.close()
             done = (
                 f"{counted(display.done, 'run')} done now {'is' if display.done == 1 else 'are'}"
@@ -132,17 +136,26 @@ def writing(folder: Path) -> None:
     if_interrupted(f"{folder} holds old files beside new ones until the same command has ended")
 
 
+_FROM_COMPILED = frozenset({"numba", "llvmlite", "pydantic"})
+"""Packages whose compiled code calls Python in the middle of its work: it drops an exception of a
+signal there, makes another one of it, or crashes."""
+
+
 class Interrupts:
     """Until they end, Ctrl-C is a KeyboardInterrupt that does not get lost."""
 
     def __init__(self) -> None:
-        self._asked = False
+        self.asked = False
         self._before = signal.getsignal(signal.SIGINT)
         if self._before is not signal.SIG_IGN:  # as it is in the background
             signal.signal(signal.SIGINT, self._interrupt)
 
-    def _interrupt(self, *_: object) -> None:
-        self._asked = True
+    def _interrupt(self, _: int, frame: FrameType | None) -> None:
+        self.asked = True
+        while frame is not None:
+            if frame.f_globals.get("__name__", "").partition(".")[0] in _FROM_COMPILED:
+                return  # until the next check
+            frame = frame.f_back
         raise KeyboardInterrupt
 
     def check(self) -> None:
@@ -150,7 +163,7 @@ class Interrupts:
 
         An exception that a signal raises in a destructor or a callback is printed and dropped.
         """
-        if self._asked:
+        if self.asked:
             raise KeyboardInterrupt
 
     def end(self) -> None:
@@ -192,6 +205,11 @@ class Display:
     def __exit__(self, *_: object) -> None:
         self.close()
         self._interrupts.end()
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether there was a Ctrl-C, whatever became of its exception."""
+        return self._interrupts.asked
 
     def close(self) -> None:
         """Leave the terminal as it was."""

@@ -13,7 +13,7 @@ from benchmarks.registry import registry
 from benchmarks.run import plan_cells
 from benchmarks.sandbox import failure
 from benchmarks.specification import Limits
-from benchmarks.suites import Cell, load_suite, run_specs, select_cells
+from benchmarks.suites import Cell, cell_plans, load_suite, select_cells
 from benchmarks.worker import answer, perform
 from coartic import CoarticError, load_task
 from coartic.tables import TIMINGS
@@ -22,6 +22,11 @@ ROOT = Path(__file__).parents[2]
 
 
 KNOWN = registry()
+
+
+def run_specs(cells, **options):
+    """Every run of every cell, in order, as :func:`benchmarks.suites.cell_plans` has them."""
+    return [(plan.cell, spec) for plan in cell_plans(cells, **options) for spec in plan.specs()]
 
 
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
