@@ -132,7 +132,8 @@ def execute_straight(
     """Execute solutions from the task's start; by number those of which something can be said.
 
     Of the others :func:`coartic.solution.execute` has to say what they are: those that miss a
-    goal, hit one on the way, are longer than ``most_steps`` or break the task's rules. Raises
+    goal, hit one on the way, are longer than ``most_steps`` or break the task's rules, and all of
+    them where corrective movements end on arrival. Raises
     ValueError for a model that no movement can be made with.
     """
     checked_model(model, radius=task.radius)
@@ -141,7 +142,7 @@ def execute_straight(
         for number, solution in solutions.items()
         if (firsts := _firsts(task, solution)) is not None
     }
-    if not laid:
+    if not laid or model.corrective_arrival:
         return {}
     chosen = [solutions[number] for number in laid]
     targets = np.array([target for own in chosen for target in own.targets], dtype=np.float64)
