@@ -8,6 +8,7 @@ the key and what would be right.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -108,6 +109,13 @@ class Task(_Frozen):
         goals = np.array(self.goals, dtype=np.float64)
         goals.setflags(write=False)
         return goals
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
+        """A copy, unchecked, with some fields changed; arrays are made of those anew."""
+        copied = super().model_copy(update=update, deep=deep)
+        for name in ("q0", "goal_array"):
+            copied.__dict__.pop(name, None)
+        return copied
 
     @property
     def initial_is_policy(self) -> bool:

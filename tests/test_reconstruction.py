@@ -21,8 +21,16 @@ from analysis.reconstruction.likelihood import likelihoods, together
 from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
 from analysis.reconstruction.scoring import ABSENT, Figure, Learned, Order, compared, distance
 from analysis.reconstruction.search import Search
-from analysis.reconstruction.waves import Wave
-from coartic import PAPER, CoarticError, corrective_trial, hand_sequences, load_task
+from analysis.reconstruction.waves import Wave, scored
+from coartic import (
+    PAPER,
+    CoarticError,
+    corrective_trial,
+    hand_sequences,
+    learn,
+    load_task,
+    parse_task,
+)
 from coartic.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
@@ -186,6 +194,28 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(40)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
     assert max(p(rng.normal(-305.0, 3.0, 20)) for _ in range(3)) < 0.01
+
+
+def test_a_task_with_other_goals_is_another_task() -> None:
+    assert TASK.goal_array is not None  # kept from now on
+    search = Search(TASK, layouts()["two-armed-1"], (), jobs=1)
+    first, second = (
+        result.cells["EC3"].rewards
+        for result in scored(
+            search,
+            [TASK.goal_array, NEAR_PRINTED],
+            targets.tests_of("two-armed-1"),
+            conditions=("EC2", "EC3", "EC4"),
+            wave=1,
+            runs=3,
+            trials=50,
+        )
+    )
+    changed = load_task("two-armed-1").model_dump() | {"goals": NEAR_PRINTED.tolist()}
+    task = parse_task(changed, "test")
+    seeds = range(1_000_000, 1_000_003)
+    own = [learn(task, "EC3", seed=seed, trials=50).reward for seed in seeds]
+    assert second.tolist() == own != first.tolist()
 
 
 def test_a_reconstruction_is_found_scored_and_written(search: Search, tmp_path: Path) -> None:
