@@ -40,13 +40,15 @@ class _Path(NamedTuple):
     ticks: Any  # (G + 1,), NaN after a failure
     hand: Any  # (G,) by which a goal was hit; -1 before the first trial
     goal: Any  # (G, 2)
+    here: Any  # (1, dof) where the robot is
+    target: Any  # (1, dof) and where it is to go
 
 
 @inner
-def _hit(g: int, problem: Any, path: Any, q: Any, target: Any, lanes: Any, ends: Any) -> None:
+def _hit(g: int, problem: Any, path: Any, lanes: Any, ends: Any) -> None:
     """From before goal ``g`` of a path to after it."""
     goal = Goal(path.goal[g, 0], path.goal[g, 1], problem.radius)
-    arm = arm_of(problem, path.hand[g])
+    arm, q, target = arm_of(problem, path.hand[g]), path.here, path.target
     path.ticks[g + 1] = path.ticks[g]
     fill_row(q[0], path.q[g])
     fill_row(target[0], path.q[g])
@@ -79,7 +81,6 @@ def _try_all(
     lanes: Any,
     ends: Any,
 ) -> None:
-    q, target = np.empty((1, path.q.shape[1])), np.empty((1, path.q.shape[1]))
     length = goals.shape[1]
     for number in range(len(goals)):
         for sequence in range(len(codes)):
@@ -90,7 +91,7 @@ def _try_all(
                 same &= (path.hand[g] == hand) & (path.goal[g, 0] == x) & (path.goal[g, 1] == y)
                 if not same:
                     path.hand[g], path.goal[g, 0], path.goal[g, 1] = hand, x, y
-                    _hit(g, problem, path, q, target, lanes, ends)
+                    _hit(g, problem, path, lanes, ends)
                 fill_row(reached[number, sequence, g], path.q[g + 1])
             rewards[number, sequence] = -path.ticks[length]
 
@@ -123,6 +124,8 @@ def corrective_trials(
         ticks=np.zeros(shape[2] + 1),
         hand=np.full(shape[2], -1),
         goal=np.zeros((shape[2], 2)),
+        here=np.empty((1, task.robot.dof)),
+        target=np.empty((1, task.robot.dof)),
     )
     codes = [[HANDS.index(hand) for hand in hands_of(hands)] for hands in sequences]
     _try_all(
