@@ -410,7 +410,9 @@ def completed(monkeypatch, capsys, *words):
 
 
 def test_completion(monkeypatch, capsys):
-    assert completed(monkeypatch, capsys, "r") == ["run", "reproduce", "report"]
+    assert completed(monkeypatch, capsys, "r") == [
+        "run", "reproduce", "report", "readings", "reconstruct", "robustness",
+    ]  # fmt: skip
     assert completed(monkeypatch, capsys, "run", "p") == ["paper"]
     assert completed(monkeypatch, capsys, "run", "paper", "--tr") == ["--trials", "--trial-budget"]
     command = ("run", "paper", "--out", "x")

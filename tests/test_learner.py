@@ -258,7 +258,7 @@ def test_best_trial_is_the_first_of_equals():
 
 
 def test_constants_of_the_paper():
-    assert MotionModel() == (0.01, 0.01, 0.05, 0.01, 20_000)
+    assert MotionModel()[:5] == (0.01, 0.01, 0.05, 0.01, 20_000)
     for condition in CONDITIONS.values():
         assert (condition.epsilon, condition.noise_sd) == (0.2, 0.05)
     assert TRIALS == 10_000
