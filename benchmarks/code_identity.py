@@ -50,7 +50,7 @@ def built_in_sources(code: str) -> str:
     folder = PACKAGE.parent
     for path in [*_model_files(), *sorted((folder / "baselines").rglob("*.py"))]:
         text = _text(path)
-        digest.update(f"{path.relative_to(folder)} {len(text)} ".encode() + text)
+        digest.update(f"{path.parent.name}/{path.name} {len(text)} ".encode() + text)
     return digest.hexdigest()
 
 

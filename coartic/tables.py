@@ -30,7 +30,7 @@ from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, cont
 from coartic.task import parse_task
 from coartic.text import Line
 
-FORMAT: Literal[6] = 6  # of manifest and tables; raised when one of them changes its meaning
+FORMAT: Literal[7] = 7  # of manifest and tables; raised when one of them changes its meaning
 
 RUNS = pa.schema(
     [
@@ -159,7 +159,7 @@ class Plan(Plain):
     runs: Count
     seed: Seed
     trials: Count
-    readings: tuple[Line, ...] = ()
+    readings: tuple[Line, ...]
     """Readings of the paper that are not the default, as ``ties=right``."""
     tasks: dict[Line, TaskContent]
     methods: dict[Line, DeclaredMethod]
@@ -181,7 +181,7 @@ class PlanLimits(Plain):
 class Manifest(Plain):
     """``manifest.json``: what was asked for and with what it was made."""
 
-    format: Literal[6] = FORMAT
+    format: Literal[7] = FORMAT
     specification: Plan
     limits: PlanLimits
     environment: Environment

@@ -74,7 +74,8 @@ def main() -> None:
         try:
             app(prog_name="coartic")
         except SystemExit:
-            sys.stdout.flush()  # a full disk is noticed here, and said
+            if sys.stdout is not None:
+                sys.stdout.flush()  # a full disk is noticed here, and said
             raise
     except CoarticError as error:
         complain("error", str(error))

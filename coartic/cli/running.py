@@ -146,7 +146,10 @@ def list_(method_file: given.MethodFiles = None) -> None:
 
 
 def _method_row(entry: Entry, known: list[Task]) -> tuple[str, ...]:
+    from coartic.readings import readings
+
     declared = entry.declared
+    read = {each.field for each in readings()}  # `coartic readings` has these
     try:
         tasks = ", ".join(task.name for task in known if entry.why_not(task) is None)
     except CoarticError as error:
@@ -155,7 +158,7 @@ def _method_row(entry: Entry, known: list[Task]) -> tuple[str, ...]:
         declared.name,
         declared.title + ("" if entry.foreign is None else f" ({entry.origin})"),
         ", ".join(sorted(declared.told)),
-        ", ".join(f"{key}={value}" for key, value in declared.defaults.items()) or "–",
+        ", ".join(f"{k}={v}" for k, v in declared.defaults.items() if k not in read) or "–",
         tasks,
     )
 

@@ -43,7 +43,7 @@ def manifest_for(tasks, runs=None, *, trials=10_000):
     keys = ["task", "method", "variant"]
     rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
     plan = Plan(
-        suite="paper", runs=3, seed=0, trials=trials, methods={},
+        suite="paper", runs=3, seed=0, trials=trials, methods={}, readings=(),
         tasks={task.name: task.model_dump(mode="json") for task in tasks},
         cells=tuple(planned(**row) for row in rows),
     )  # fmt: skip
