@@ -228,7 +228,7 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     """
     jobs = "2" if word == signal.SIGINT else "1"  # a suite that ends has to end each of them
     # Many short lots: something is kept soon, and much is left to do.
-    many = ("--runs", "200", "--trials", "1000", "--jobs", jobs)
+    many = ("--runs", "2000", "--trials", "1000", "--jobs", jobs)
     suite = subprocess.Popen(
         [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, *many],
         stdout=subprocess.DEVNULL,
