@@ -11,6 +11,7 @@ from analysis.reconstruction.constraints import try_sequences
 from analysis.reconstruction.curve import specification_curve
 from analysis.reconstruction.reconstruct import search_for
 from analysis.reconstruction.specifications import (
+    PAPERS,
     judged_specifications,
     shares,
     specifications,
@@ -71,6 +72,12 @@ def test_figures_of_members_are_complete(ensemble):
     assert min(distances) > 0.0
 
 
+def _task(name):
+    """A task, or one that passes for a member of it."""
+    plain = name.partition("-m0")[0]
+    return load_task(plain).model_copy(update={"name": name})
+
+
 def _results(tmp_path, tasks, means, **plan):
     """Runs of EC3 and EC4 on tasks, the latter better by so many ticks."""
     rng = np.random.default_rng(0)
@@ -84,7 +91,7 @@ def _results(tmp_path, tasks, means, **plan):
                 for k, r in enumerate(rewards)
             ]  # fmt: skip
     frame = pd.DataFrame(rows)
-    manifest = manifest_for([load_task(task) for task in tasks], frame)
+    manifest = manifest_for(list(map(_task, tasks)), frame)
     method = DeclaredMethod(
         title="t", citation="", told=(), secondary=(), stochastic=True,
         defaults={"ties": "left", "trials": 10_000}, origin="", code="",
@@ -95,9 +102,15 @@ def _results(tmp_path, tasks, means, **plan):
     return Results(tmp_path, manifest, frame, sequences)
 
 
-def test_claims_are_judged_for_each_member(tmp_path):
+def test_claims_are_judged_for_each_member(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "analysis.reconstruction.specifications.task_of",
+        lambda name: "two-armed-1" if "-m0" in name else None,
+    )
     names = ["two-armed-1", "two-armed-2", "two-armed-1-m002", "two-armed-1-m003"]
-    found = judged_specifications([Study(_results(tmp_path, names, (20.0, 20.0, 20.0, -20.0)))])
+    study = Study(_results(tmp_path, names, (20.0, 20.0, 20.0, -20.0)))
+    claims = [claim for claim in PAPERS if claim.id == "ec4-beats-ec3"]
+    found = judged_specifications([study], claims=claims)
     own = found[found.claim == "ec4-beats-ec3"].set_index("member")
     assert set(own.index) == {"", *names[2:]}
     assert own.effect["two-armed-1-m002"] > 0 > own.effect["two-armed-1-m003"]

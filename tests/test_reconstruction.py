@@ -121,6 +121,9 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
         "t", (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
     )
     points = np.concatenate(list(layout.blocks(5)))
+    wide = np.concatenate(list(replace(layout, apart=0.6).blocks(5)))
+    assert (wide[:, 1] - wide[:, 2] == 1.0).all()
+    assert len(wide) == 3
     expected = [p for p in itertools.product((0, 0.5, 1), repeat=3) if p[2] + 0.5 <= p[1]]
     np.testing.assert_array_equal(points, expected)
     np.testing.assert_array_equal(layout.places(points)[:, 1], points[:, [0, 2]])

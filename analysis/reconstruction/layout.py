@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ class Layout:
     """Lowest, highest and step of each parameter, length unit."""
     less: tuple[tuple[str, str, float], ...]
     """a, b, gap: a + gap <= b."""
+    apart: float = 0.0
+    """Least distance of two goals' centres, length unit."""
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -63,6 +66,10 @@ class Layout:
         column = dict(zip(self.names, points.T, strict=True))
         for a, b, gap in self.less:
             inside &= column[a] + gap <= column[b] + 1e-9
+        places = self.places(points)
+        for first, second in itertools.combinations(range(len(self.goals)), 2):
+            distances = np.linalg.norm(places[:, first] - places[:, second], axis=1)
+            inside &= distances >= self.apart - 1e-9
         return np.asarray(inside)
 
 
@@ -75,6 +82,7 @@ def layouts() -> dict[str, Layout]:
             tuple(map(tuple, entry["goals"])),
             {name: tuple(values) for name, values in entry["grid"].items()},
             tuple(map(tuple, entry["less"])),
+            float(entry["apart"]),
         )
         for task, entry in content.items()
     }

@@ -16,7 +16,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.claims.catalogue import CLAIMS, judge
-from analysis.claims.register import Judged
+from analysis.claims.register import Claim, Judged
 from analysis.results.folder import Results
 from analysis.study import Study
 from coartic.members import task_of, with_members
@@ -24,6 +24,7 @@ from coartic.readings import condition_under, load_readings
 from coartic.tables import variant_of
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
+PAPERS = tuple(claim for claim in CLAIMS if claim.place)
 VERDICTS = ("supported", "not supported", "cannot tell")
 
 
@@ -93,7 +94,10 @@ def _seen_as(results: Results, names: Mapping[str, str]) -> Results:
 
 
 def judged_specifications(
-    studies: Iterable[Study], *, progress: Callable[[Specification], None] = lambda spec: None
+    studies: Iterable[Study],
+    *,
+    claims: Iterable[Claim] = PAPERS,
+    progress: Callable[[Specification], None] = lambda spec: None,
 ) -> pd.DataFrame:
     """A row a specification and claim of the paper that its runs can judge.
 
@@ -101,8 +105,7 @@ def judged_specifications(
     ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. A
     claim that only rests on tasks with default goals is judged once, not once a member.
     """
-    claims = [claim for claim in CLAIMS if claim.place]
-    rows = []
+    claims, rows = tuple(claims), []
     for study in studies:
         for spec, seen in specifications(study):
             rows += [
