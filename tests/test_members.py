@@ -107,6 +107,10 @@ def test_claims_are_judged_for_each_member(tmp_path, monkeypatch):
         "analysis.reconstruction.specifications.task_of",
         lambda name: "two-armed-1" if "-m0" in name else None,
     )
+    monkeypatch.setattr(
+        "analysis.reconstruction.specifications.with_members",
+        lambda: ("two-armed-1", "two-armed-2"),
+    )
     names = ["two-armed-1", "two-armed-2", "two-armed-1-m002", "two-armed-1-m003"]
     study = Study(_results(tmp_path, names, (20.0, 20.0, 20.0, -20.0)))
     claims = [claim for claim in PAPERS if claim.id == "ec4-beats-ec3"]
