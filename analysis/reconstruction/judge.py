@@ -64,18 +64,21 @@ def one_armed() -> tuple[Task, ...]:
 
 
 def combinations(pairs: bool) -> Iterator[tuple[str, ...]]:
-    """The default, each other choice alone, and each two of different readings together."""
+    """The default, each other choice alone, and two of different readings together.
+
+    Every two of what the text says at its word; with ``pairs`` every two.
+    """
     yield ()
-    choices = [
-        f"{reading.id}={choice.written}"
+    choices = {
+        f"{reading.id}={choice.written}": choice.printed
         for reading in readings()
         for choice in reading.alternatives
-    ]
+    }
     yield from ((choice,) for choice in choices)
-    if pairs:
-        for first, second in itertools.combinations(choices, 2):
-            if first.partition("=")[0] != second.partition("=")[0]:
-                yield first, second
+    for first, second in itertools.combinations(choices, 2):
+        different = first.partition("=")[0] != second.partition("=")[0]
+        if different and (pairs or (choices[first] and choices[second])):
+            yield first, second
 
 
 def judge(texts: Sequence[str], *, runs: int, trials: int = 10_000) -> Judged:
