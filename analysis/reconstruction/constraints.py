@@ -72,7 +72,8 @@ class Above:
     def holds(self, tried: Tried) -> Flags:
         """Where it does, ``(N,)``; a sequence that fails earns nothing."""
         others = np.stack([tried.reward(hands) for hands in self.than], axis=1)
-        return np.asarray((~(others >= tried.reward(self.hands)[:, None])).all(axis=1))
+        own = tried.reward(self.hands)
+        return np.asarray((~(others >= own[:, None])).all(axis=1) & np.isfinite(own))
 
     def __str__(self) -> str:
         than = self.than[0] if len(self.than) == 1 else f"all {len(self.than)} others"

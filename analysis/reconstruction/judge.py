@@ -50,6 +50,13 @@ class Judged:
         """All parts as one."""
         return together(self.parts)
 
+    def is_as(self, other: Judged) -> bool:
+        """Whether all runs are the same: one arm, or these figures, cannot tell the readings."""
+        return self.initial == other.initial and all(
+            cell.rewards.tolist() == other.cells[name].rewards.tolist()
+            for name, cell in self.cells.items()
+        )
+
     @property
     def refuted(self) -> bool:
         """By the rule."""
@@ -131,10 +138,12 @@ def judge_all(
 
 def judged_table(judgements: Iterable[Judged]) -> pd.DataFrame:
     """A row a combination: figures of its runs, likelihood and chance of what is printed."""
-    return pd.DataFrame([dict(_row(judged)) for judged in judgements])
+    known = list(judgements)
+    default = next((judged for judged in known if not judged.chosen), None)
+    return pd.DataFrame([dict(_row(judged, default)) for judged in known])
 
 
-def _row(judged: Judged) -> Iterator[tuple[str, object]]:
+def _row(judged: Judged, default: Judged | None) -> Iterator[tuple[str, object]]:
     yield "readings", " ".join(map(str, judged.chosen)) or "default"
     for task, reward in judged.initial.items():
         yield f"{task} initial", reward
@@ -148,4 +157,5 @@ def _row(judged: Judged) -> Iterator[tuple[str, object]]:
     whole = judged.whole
     yield "log likelihood", round(whole.log_density, 2)
     yield "p", float(f"{whole.p:.3g}")
-    yield "verdict", "refuted" if judged.refuted else "stands"
+    same = default is not None and judged.chosen and judged.is_as(default)
+    yield "verdict", "refuted" if judged.refuted else "as the default" if same else "stands"

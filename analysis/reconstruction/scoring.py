@@ -53,6 +53,8 @@ class Figure:
         """The same figure of our runs; NaN where too few runs learned the sequence."""
         chosen = np.array([self.hands in (None, hands) for hands in learned.hands], dtype=bool)
         rewards = learned.rewards[chosen]
+        if not len(chosen):
+            return math.nan
         if self.kind == "share":
             return len(rewards) / len(chosen)
         if self.kind == "mean":
@@ -65,6 +67,8 @@ class Figure:
         chosen = [self.hands in (None, hands) for hands in learned.hands]
         own = learned.rewards[np.array(chosen, dtype=bool)]
         rounding = 10.0**-self.digits / math.sqrt(12.0)
+        if not chosen:
+            return math.nan
         if self.kind == "share":
             pooled = (self.value * self.runs + sum(chosen) + 1.0) / (self.runs + len(chosen) + 2.0)
             variance = pooled * (1.0 - pooled) * (1.0 / self.runs + 1.0 / len(chosen))
@@ -136,6 +140,8 @@ def _compared(test: Test, cells: Mapping[str, Learned]) -> Compared:
         cell = cells[test.condition]
         return Compared(test, test.ours(cell), test.distance(cell))
     above, below = cells[test.condition].rewards, cells[test.than].rewards
+    if min(len(above), len(below)) < 2:
+        return Compared(test, math.nan, math.nan)
     difference = float(above.mean() - below.mean())
     error = math.sqrt(above.var(ddof=1) / len(above) + below.var(ddof=1) / len(below) + 1e-12)
     return Compared(test, difference, min(0.0, difference / error))

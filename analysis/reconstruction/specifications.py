@@ -102,19 +102,25 @@ def judged_specifications(
     """A row a specification and claim of the paper that its runs can judge.
 
     Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
-    ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. A
-    claim that only rests on tasks with default goals is judged once, not once a member.
+    ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. Of
+    a member are the claims that some member's runs can judge; where another's cannot, it *cannot
+    tell*. p-values are not corrected: how many claims a folder can judge depends on it.
     """
     claims, rows = tuple(claims), []
+    known: set[tuple[str, str]] = set()
     for study in studies:
         for spec, seen in specifications(study):
-            rows += [
-                dict(_row(spec, judged))
-                for judged in judge(seen, claims)
-                if judged.run_ids and judged.holds is not None
-            ]
+            own = set(
+                seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id
+            )
+            for judged in judge(seen, claims):
+                alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
+                if own.intersection(judged.run_ids):
+                    known.add((spec.task, judged.claim.id))
+                rows.append(dict(_row(spec, alone)))
             progress(spec)
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    kept = [row for row in rows if (row["task"], row["claim"]) in known]
+    return pd.DataFrame(kept, columns=list(COLUMNS))
 
 
 def _row(spec: Specification, judged: Judged) -> Iterator[tuple[str, Any]]:

@@ -11,6 +11,7 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.arguments import check_numbers
 from coartic.cli.terminal import say, show_table
+from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS, MOST_TRIALS
 
@@ -30,12 +31,15 @@ def readings(
 ) -> None:
     """List what the paper leaves open, or judge it by what is printed of one-armed tasks."""
     if judge is None:
+        if pairs:
+            raise CoarticError("--pairs says what is judged: name a folder with --judge")
         _list_readings()
         return
     from analysis.reconstruction.judge import combinations, judge_all, judged_table
 
     check_numbers(jobs, None)
     folder = folder_named(judge, "--judge")
+    folder.mkdir(parents=True, exist_ok=True)
     judged = judge_all(
         list(combinations(pairs)),
         runs=runs,
@@ -45,7 +49,6 @@ def readings(
                                   f"p = {each.whole.p:.2g}"),
     )  # fmt: skip
     table = judged_table(judged)
-    folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / "readings.csv", index=False, lineterminator="\n")
     shown = table[["readings", "log likelihood", "p", "verdict"]]
     show_table("Readings", tuple(shown.columns), [tuple(map(str, row)) for row in shown.values])
@@ -84,8 +87,11 @@ def reconstruct(
     from coartic.readings import load_readings, model_under
 
     check_numbers(jobs, None)
-    out = folder_named(folder, "--out")
-    search = search_for(task, model=model_under(load_readings(reading or ())), jobs=_threads(jobs))
+    out, chosen = folder_named(folder, "--out"), load_readings(reading or ())
+    if others := [str(each) for each in chosen if each.reading.part != "model"]:
+        raise CoarticError(f"a search knows readings of the model only, not {', '.join(others)}")
+    search = search_for(task, model=model_under(chosen), jobs=_threads(jobs))
+    out.mkdir(parents=True, exist_ok=True)
     found = perform(search, effort=Effort(members=members, runs=runs), report=say)
     paths = found.write(out)
     say("", f"The nearest is {found.nearest.distance:.2f} standard errors from what is printed.")
