@@ -52,9 +52,9 @@ def specification_curve(table: pd.DataFrame) -> Plot:
         "specification-curve",
         "Claims under every choice that the paper leaves open",
         f"Effect of the first test of each claim, positive as claimed, with its "
-        f"{style.CONFIDENCE} interval, sorted over {said}; below, what differs from the "
-        "default. Open bar: the default itself. Specifications are no sample: how many of them "
-        "agree is no probability.",
+        f"{style.CONFIDENCE} interval where that test has one, sorted over {said}; below, what "
+        "differs from the default, which the upright line marks. Specifications are no sample: "
+        "how many of them agree is no probability.",
         "Sorted effects: " + "; ".join(_spoken(data, claim) for claim in claims),
         figure,
         data,
