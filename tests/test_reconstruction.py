@@ -108,8 +108,8 @@ def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
     more = search.spread(found, 20, np.random.default_rng(0), 0.02)
     for points in (exact, found, more):
         assert search.layout.allowed(points).all()
-        for point in points[:5]:
-            task = search.task_at(point)
+        for goals in search.layout.places(points[:5]):
+            task = search.task_with(goals)
             assert corrective_trial(task, "RRRR").reward == -675
             assert corrective_trial(task, "LRLR").reward == -532
     assert search.tried["round sets of goals"] == sum(map(len, search.layout.blocks(99)))

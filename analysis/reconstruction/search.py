@@ -50,10 +50,6 @@ class Search:
         goals = self.layout.places(points)
         return try_sequences(self.task, sequences, goals, model=self.model, jobs=self.jobs)
 
-    def task_at(self, point: Array) -> Task:
-        """The task with the goals of a point."""
-        return self.task_with(self.layout.places(np.asarray(point)[None])[0])
-
     def task_with(self, goals: Array) -> Task:
         """The task with other goals, ``(G, 2)``."""
         return self.task.model_copy(update={"goals": tuple(map(tuple, goals.tolist()))})
