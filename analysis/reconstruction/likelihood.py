@@ -45,9 +45,9 @@ def likelihoods(figures: Sequence[Figure], learned: Learned) -> list[Likelihood]
     for mean in figures:
         if mean.kind != "mean":
             continue
-        chosen = np.array([mean.hands in (None, hands) for hands in learned.hands], dtype=bool)
-        if chosen.sum() >= FEWEST:
-            found.append(_of_group(mean, spreads.get(mean.hands), learned.rewards[chosen]))
+        rewards = learned.with_hands(mean.hands)
+        if len(rewards) >= FEWEST:
+            found.append(_of_group(mean, spreads.get(mean.hands), rewards))
     return found
 
 

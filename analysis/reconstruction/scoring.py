@@ -27,6 +27,11 @@ class Learned(NamedTuple):
     hands: tuple[str, ...]
     """The hand sequence of each."""
 
+    def with_hands(self, hands: str | None) -> NDArray[np.float64]:
+        """Rewards of the runs that learned a sequence; of all for None."""
+        chosen = np.array([hands in (None, own) for own in self.hands], dtype=bool)
+        return np.asarray(self.rewards[chosen])
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -51,27 +56,24 @@ class Figure:
 
     def ours(self, learned: Learned) -> float:
         """The same figure of our runs; NaN where too few runs learned the sequence."""
-        chosen = np.array([self.hands in (None, hands) for hands in learned.hands], dtype=bool)
-        rewards = learned.rewards[chosen]
-        if not len(chosen):
+        rewards = learned.with_hands(self.hands)
+        if not learned.hands:
             return math.nan
         if self.kind == "share":
-            return len(rewards) / len(chosen)
+            return len(rewards) / len(learned.hands)
         if self.kind == "mean":
             return float(rewards.mean()) if len(rewards) else math.nan
         return float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
 
     def distance(self, learned: Learned) -> float:
         """Difference in standard errors, positive where ours is the larger; NaN as above."""
-        ours = self.ours(learned)
-        chosen = [self.hands in (None, hands) for hands in learned.hands]
-        own = learned.rewards[np.array(chosen, dtype=bool)]
+        ours, own, runs = self.ours(learned), learned.with_hands(self.hands), len(learned.hands)
         rounding = 10.0**-self.digits / math.sqrt(12.0)
-        if not chosen:
+        if not runs:
             return math.nan
         if self.kind == "share":
-            pooled = (self.value * self.runs + sum(chosen) + 1.0) / (self.runs + len(chosen) + 2.0)
-            variance = pooled * (1.0 - pooled) * (1.0 / self.runs + 1.0 / len(chosen))
+            pooled = (self.value * self.runs + len(own) + 1.0) / (self.runs + runs + 2.0)
+            variance = pooled * (1.0 - pooled) * (1.0 / self.runs + 1.0 / runs)
             return (ours - self.value) / math.sqrt(variance)
         if len(own) < 2:
             return math.nan
