@@ -19,7 +19,7 @@ from analysis.reconstruction.ensemble import features, spread_out
 from analysis.reconstruction.layout import Layout, layouts
 from analysis.reconstruction.likelihood import likelihoods, together
 from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
-from analysis.reconstruction.scoring import ABSENT, Figure, Learned, Order, compared, distance
+from analysis.reconstruction.scoring import FARTHEST, Figure, Learned, Order, compared, distance
 from analysis.reconstruction.search import Search
 from analysis.reconstruction.waves import Wave, scored
 from coartic import (
@@ -72,7 +72,7 @@ def test_constraints() -> None:
     rewards = np.array([[-675.0, -700.0], [-675.0, -675.0], [-674.0, np.nan]])
     reached = np.zeros((3, 2, 4, 10))
     reached[:, 0, :, 0] = [[-1, 1, 0, 2], [-1, -2, 0, 2], [0.5, 1, 2, -1]]
-    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached))
+    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached), start_x=0.0)
     for constraint, expected in (
         (RewardIs("RRRR", -675.0), [True, True, False]),
         (Above("RRRR", ("LLLL",)), [True, False, True]),
@@ -129,10 +129,12 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
     np.testing.assert_array_equal(layout.places(points)[:, 1], points[:, [0, 2]])
 
 
-def test_members_are_spread() -> None:
+@pytest.mark.parametrize("first", [None, 7])
+def test_members_are_spread(first: int | None) -> None:
     rng = np.random.default_rng(0)
     points = rng.normal(size=(60, 3))
-    chosen = spread_out(points, 20)
+    chosen = spread_out(points, 20, first)
+    assert first in (None, chosen[0])
     assert len(set(chosen.tolist())) == 20
     for k in range(1, 20):
         gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
@@ -142,7 +144,8 @@ def test_members_are_spread() -> None:
 def test_features_weigh_rewards_and_postures_alike(search: Search) -> None:
     goals = NEAR_PRINTED + np.random.default_rng(0).normal(0, 0.05, (30, 4, 2))
     sequences = ("LRLR", "RRRR")
-    found = features(Tried(sequences, corrective_trials(TASK, sequences, goals)), ("RRRR",))
+    trials = corrective_trials(TASK, sequences, goals)
+    found = features(Tried(sequences, trials, start_x=0.0), ("RRRR",))
     assert found[:, :2].var(axis=0).sum() == pytest.approx(1.0)
     assert found[:, 2:].var(axis=0).sum() == pytest.approx(1.0)
 
@@ -157,6 +160,13 @@ def test_distances_are_in_standard_errors() -> None:
     sd = Figure("EC3", "sd", 3.0, 20, digits=1)
     assert abs(sd.distance(cell)) < 1.0
     assert Figure("EC3", "sd", 30.0, 20).distance(cell) < -10.0
+    # Of normal runs; one far outlier makes SDs less certain.
+    twice = Figure("EC3", "sd", float(rewards.std(ddof=1)) / 2, 20, digits=9)
+    tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)))
+    variance = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (20, 400))
+    assert twice.distance(cell) == pytest.approx(math.log(2) / math.sqrt(variance))
+    rare = np.where(np.arange(400) < 4, rewards - 40.0, rewards)
+    assert 0.0 < sd.distance(Learned(rare, cell.hands)) < 3.0
     share = Figure("EC3", "share", 0.75, 20, "LRLR")
     assert share.ours(cell) == 0.75
     assert share.distance(cell) == 0.0
@@ -166,7 +176,12 @@ def test_distances_are_in_standard_errors() -> None:
     cells = {"EC3": cell, "EC4": better}
     assert compared([Order("EC4", "EC3")], cells)[0].distance == 0.0
     assert compared([Order("EC3", "EC4")], cells)[0].distance < -10.0
-    assert distance(compared([absent, share], cells)) == pytest.approx(ABSENT / math.sqrt(2))
+    assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
+    # To lose a sequence is never better than to learn it with figures far off.
+    far = Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
+    assert distance(compared([far], cells)) == distance(compared([absent], cells)) == FARTHEST
+    failing = Learned(rewards, cell.hands, failed=400)
+    assert share.ours(failing) == 0.375
 
 
 def test_chance_of_printed_counts_is_multinomial() -> None:
@@ -174,7 +189,7 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
     printed = [Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
     (counts,) = likelihoods(printed, cell)
     model = stats.multinomial(4, np.array([10.5, 30.5, 0.5]) / 41.5)
-    assert counts.log_density == pytest.approx(float(model.logpmf([2, 2, 0])))
+    assert counts.log_chance == pytest.approx(float(model.logpmf([2, 2, 0])))
     every = [c for c in itertools.product(range(5), repeat=3) if sum(c) == 4]
     chances = np.array([model.pmf(c) for c in every])
     exact = chances[chances <= model.pmf([2, 2, 0]) + 1e-12].sum()
@@ -197,6 +212,28 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(40)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
     assert max(p(rng.normal(-305.0, 3.0, 20)) for _ in range(3)) < 0.01
+
+
+def test_a_chance_is_that_of_the_rounded_figures() -> None:
+    """As counted among many samples, and certain where all runs are equal."""
+    rng = np.random.default_rng(1)
+    rewards = np.round(rng.normal(-300.0, 3.0, 1000))
+    figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
+    (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
+    drawn = rng.choice(rewards, (200_000, 20))
+    alike = (np.round(drawn.mean(axis=1)) == -301) & (
+        np.round(drawn.std(axis=1, ddof=1), 1) == 2.9
+    )
+    assert math.exp(part.log_chance) == pytest.approx(alike.mean(), rel=0.2)
+    (part,) = likelihoods(figures[:1], Learned(np.full(100, -301.0), ("R",) * 100))
+    assert math.exp(part.log_chance) == pytest.approx(1.0, abs=0.1)
+
+
+def test_runs_that_fail_speak_against_a_reading() -> None:
+    cell = Learned(np.random.default_rng(0).normal(-300, 3, 500), ("R",) * 500, failed=500)
+    figures = [Figure("EC1", "mean", -300.0, 20, sd=3.0)]
+    assert together(likelihoods(figures, cell)).p < 1e-3
+    assert together(likelihoods(figures, cell._replace(failed=0))).p > 0.1
 
 
 def test_a_task_with_other_goals_is_another_task() -> None:

@@ -23,16 +23,23 @@ def readings(
         str | None, typer.Option("--judge", metavar="FOLDER", help="Judge them, into a folder.")
     ] = None,
     runs: Annotated[
-        int, typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task.")
-    ] = 1000,
-    trials: Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")] = 10_000,
+        int | None,
+        typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task, 1000 if not said."),
+    ] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option(min=1, max=MOST_TRIALS, help="Trials per run, 10 000 if not said."),
+    ] = None,
     pairs: Annotated[bool, typer.Option(help="Every two readings together as well.")] = False,
     jobs: given.Jobs = -1,
 ) -> None:
     """List what the paper leaves open, or judge it by what is printed of one-armed tasks."""
     if judge is None:
-        if pairs:
-            raise CoarticError("--pairs says what is judged: name a folder with --judge")
+        given_too = {"--pairs": pairs, "--runs": runs, "--trials": trials}
+        if without := [name for name, value in given_too.items() if value]:
+            raise CoarticError(
+                f"{', '.join(without)}: what is judged, and how; name a folder with --judge"
+            )
         _list_readings()
         return
     from analysis.reconstruction.judge import combinations, judge_all, judged_table
@@ -42,8 +49,8 @@ def readings(
     folder.mkdir(parents=True, exist_ok=True)
     judged = judge_all(
         list(combinations(pairs)),
-        runs=runs,
-        trials=trials,
+        runs=runs or 1000,
+        trials=trials or 10_000,
         jobs=_threads(jobs),
         progress=lambda each: say(f"{' '.join(map(str, each.chosen)) or 'default'}: "
                                   f"p = {each.whole.p:.2g}"),
@@ -84,13 +91,10 @@ def reconstruct(
     """Search for goals that give what is printed, and make an ensemble of them."""
     from analysis.reconstruction.reconstruct import Effort, search_for
     from analysis.reconstruction.reconstruct import reconstruct as perform
-    from coartic.readings import load_readings, model_under
 
     check_numbers(jobs, None)
-    out, chosen = folder_named(folder, "--out"), load_readings(reading or ())
-    if others := [str(each) for each in chosen if each.reading.part != "model"]:
-        raise CoarticError(f"a search knows readings of the model only, not {', '.join(others)}")
-    search = search_for(task, model=model_under(chosen), jobs=_threads(jobs))
+    out = folder_named(folder, "--out")
+    search = search_for(task, readings=tuple(reading or ()), jobs=_threads(jobs))
     out.mkdir(parents=True, exist_ok=True)
     found = perform(search, effort=Effort(members=members, runs=runs), report=say)
     paths = found.write(out)
