@@ -127,6 +127,7 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
     expected = [p for p in itertools.product((0, 0.5, 1), repeat=3) if p[2] + 0.5 <= p[1]]
     np.testing.assert_array_equal(points, expected)
     np.testing.assert_array_equal(layout.places(points)[:, 1], points[:, [0, 2]])
+    np.testing.assert_array_equal(layout.points(layout.places(points)), points)
 
 
 @pytest.mark.parametrize("first", [None, 7])
@@ -261,16 +262,16 @@ def test_a_task_with_other_goals_is_another_task() -> None:
 def test_a_reconstruction_is_found_scored_and_written(search: Search, tmp_path: Path) -> None:
     effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30)
     small = replace(search, tried=Counter())
-    found = reconstruct(small, effort=effort, named={"v0.1": TASK.goal_array})
+    found = reconstruct(small, effort=effort)
     members = pd.read_csv(found.write(tmp_path)[0])
-    assert list(members.member) == ["m001", "m002", "m003", "m004", "v0.1"]
+    assert list(members.member) == ["m001", "m002", "m003", "m004", *search.layout.known]
+    known = members.set_index("member").loc["F2", ["x3", "y3"]]
+    assert known.tolist() == [2.38, 2.96]
     for _, row in members[:4].iterrows():
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = reconstruct(
-        replace(search, tried=Counter(), jobs=2), effort=effort, named={"v0.1": TASK.goal_array}
-    )
+    again = reconstruct(replace(search, tried=Counter(), jobs=2), effort=effort)
     pd.testing.assert_frame_equal(again.members, found.members)
 
 

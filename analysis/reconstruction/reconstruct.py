@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,7 +53,7 @@ class Reconstruction:
     """The point that is nearest to what is printed, by seeds that selected nothing."""
     members: pd.DataFrame
     """A row a member: coordinates, figures and distances; the nearest one is the first, each of
-    the others as far as possible from those before it, named ones are the last."""
+    the others as far as possible from those before it; known sets of goals come last."""
     pool: int
     """Admissible points among which the members are spread."""
 
@@ -92,27 +92,31 @@ def reconstruct(
     search: Search,
     *,
     effort: Effort = FULL,
-    named: Mapping[str, Array] | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Reconstruction:
     """Search, choose and score: the admissible region, the point nearest to what is printed,
     and from there an ensemble spread over the region.
 
-    ``named`` sets of goals (G, 2) are scored beside it, admissible or not. The result depends
-    on the arguments and on nothing else.
+    The layout's known sets of goals compete with what is found where they meet every constraint,
+    and are scored beside it. The result depends on the arguments and on nothing else.
     """
     name = search.task.name
     tests, conditions = tests_of(name), conditions_of(name)
     pool = _pool(search, report)
-    begin = pool[_apart(search, pool, effort.plan[0].points)]
+    layout = search.layout
+    known = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
+    compete = layout.points(known)
+    compete = search.admitted(compete[layout.allowed(compete)], "known")
+    begin = pool[_apart(search, pool, effort.plan[0].points - len(compete))]
+    begin = np.concatenate([compete, begin])
     best = best_of_waves(
         search, begin, tests, conditions=conditions, plan=effort.plan, report=report,
         trials=effort.trials,
     )[:1]  # fmt: skip
     pool = np.concatenate([best, pool[~(pool == best).all(axis=1)]])
     members = pool[_apart(search, pool, effort.members, first=0)]
-    places = search.layout.places(members)
-    goals = {f"m{k:03d}": place for k, place in enumerate(places, 1)} | dict(named or {})
+    names = [*(f"m{k:03d}" for k in range(1, len(members) + 1)), *layout.known]
+    goals = dict(zip(names, [*layout.places(members), *known], strict=True))
     results = scored(
         search, goals.values(), tests, conditions=conditions, wave=REPORTED,
         runs=effort.runs, trials=effort.trials,
