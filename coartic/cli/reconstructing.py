@@ -111,7 +111,7 @@ def robustness(
     """Judge the paper's claims under each reading and with the goals of each member."""
     from analysis import load
     from analysis.figures.plot import rendered
-    from analysis.reconstruction.curve import specification_curve
+    from analysis.reconstruction.curve import specification_curve, verdicts
     from analysis.reconstruction.specifications import judged_specifications, shares
 
     folder = folder_named(out, "--out")
@@ -121,8 +121,11 @@ def robustness(
     folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / "specifications.csv", index=False, lineterminator="\n")
     found.to_csv(folder / "shares.csv", index=False, lineterminator="\n")
+    figures = [verdicts(table)]
     if table.effect.notna().any():
-        for name, content in rendered(specification_curve(table), (".svg", ".pdf")).items():
+        figures.append(specification_curve(table))
+    for figure in figures:
+        for name, content in rendered(figure, (".svg", ".pdf", ".png")).items():
             (folder / name).write_bytes(content)
     rows = [tuple(map(str, row)) for row in found.itertuples(index=False)]
     show_table("Claims", tuple(found.columns), rows)
