@@ -290,7 +290,7 @@ def test_lines_stand_beside_what_is_printed() -> None:
     assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
     row = table.loc["ascending", "EC1 mean"]
     seeds = range(800_000_000, 800_000_004)
-    own = [learn("ascending", "EC1", seed=seed, trials=60).reward for seed in seeds]
+    own = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
     assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(own))
     parts = np.array([np.var(own, ddof=1) / 4, 2.9**2 / 20])  # Welch's interval
     freedom = parts.sum() ** 2 / (parts**2 / [3, 19]).sum()
