@@ -122,10 +122,9 @@ def learn(
             if trial == 0:
                 hand = first_hands[number]
             else:
-                hand = _choose(task, condition, q, goal, state, values, rng)
-            explores = trial > 0 and condition.unknown_target == "explores"
-            known = (state, hand) in targets or explores
-            if known:
+                hand = _choose(task, condition, q, goal, state, previous, values, rng)
+            known = (state, hand) in targets
+            if known or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
                 target = _explore(task, condition, q, hand, goal, stored, rng)
                 biased += condition.bias > 0
@@ -174,6 +173,7 @@ def _choose(
     q: Array,
     goal: tuple[float, float],
     state: State,
+    previous: Hand | None,
     values: dict[tuple[State, Hand], float],
     rng: np.random.Generator,
 ) -> Hand:
@@ -192,7 +192,7 @@ def _choose(
             return equal[int(rng.random() * len(equal))]
         if condition.ties == "nearest":
             return equal[int(np.argmin(_distances(task, q, equal, goal)))]
-        if condition.ties == "right" or (condition.ties == "previous" and state[1] == "right"):
+        if condition.ties == "right" or (condition.ties == "previous" and previous == "right"):
             return equal[-1]
     return equal[0]
 
