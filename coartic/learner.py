@@ -3,7 +3,8 @@
 The paper's section *The Learning Process* and Figure 3. Per trial and goal: choose a
 hand, perturb the stored target configuration, move, and let the corrective process
 finish where the goal was missed. A trial better than any before it that passed
-through the same state and hand replaces what is stored there.
+through the same state and hand replaces what is stored there; better by its whole reward,
+or, in a variant, by the return from that goal on.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
 trial (:mod:`coartic.learning` makes it). Each draws from a NumPy generator of its own
@@ -55,6 +56,8 @@ class Rules(NamedTuple):
     explores_unknown: bool
     update_equal: bool
     goal_alone: bool
+    by_subtask: bool
+    discount: float
 
 
 class Tables(NamedTuple):
@@ -149,6 +152,8 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         explores_unknown=condition.unknown_target == "explores",
         update_equal=condition.update == "not-less",
         goal_alone=condition.state == "goal",
+        by_subtask=condition.credit == "subtask",
+        discount=float(condition.discount),
     )
 
 
@@ -443,14 +448,23 @@ def _trial(
 
 @inlined
 def _update(run: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
-    previous = NO_HAND
-    for number in range(log.hands.shape[1]):
+    """Credit what was visited with the reward of the trial, or each goal with its return."""
+    row = log.count[run]
+    later = 0.0
+    for number in range(log.hands.shape[1] - 1, -1, -1):
+        credit = reward
+        if rules.by_subtask:
+            ticks = 0
+            while row > 0 and log.goal[run, row - 1] == number:
+                row -= 1
+                ticks += log.ticks[run, row]
+            credit = later = rules.discount * later - ticks
         hand = log.hands[run, number]
-        value = tables.value[run, number, previous, hand]
-        if reward > value or (rules.update_equal and reward == value):
-            tables.value[run, number, previous, hand] = reward
-            fill_row(tables.target[run, number, previous, hand], log.reached[run, number])
-        previous = NO_HAND if rules.goal_alone else hand
+        before = log.hands[run, number - 1] if number > 0 and not rules.goal_alone else NO_HAND
+        value = tables.value[run, number, before, hand]
+        if credit > value or (rules.update_equal and credit == value):
+            tables.value[run, number, before, hand] = credit
+            fill_row(tables.target[run, number, before, hand], log.reached[run, number])
 
 
 @inlined

@@ -117,8 +117,10 @@ def learn(
         total = 0
         previous: Hand | None = None
         visited: list[tuple[State, Hand, Array]] = []
+        subtasks: list[float] = []
         for number, goal in enumerate(task.goals):
             state: State = (number, previous if condition.state == "previous-hand" else None)
+            spent_before = total
             if trial == 0:
                 hand = first_hands[number]
             else:
@@ -153,14 +155,20 @@ def learn(
                 if not result.hit:
                     break
             visited.append((state, hand, q))
+            subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
         completed[trial] = len(visited) == len(task.goals)
         if completed[trial] and (trial > 0 or condition.first_trial == "learns"):
-            for state, hand, reached in visited:
+            for number, (state, hand, reached) in enumerate(visited):
+                credit: float = total
+                if condition.credit == "subtask":
+                    credit = 0.0
+                    for own in reversed(subtasks[number:]):
+                        credit = own + condition.discount * credit
                 value = values.get((state, hand), -math.inf)
-                if total > value or (total == value and condition.update == "not-less"):
-                    values[state, hand] = total
+                if credit > value or (credit == value and condition.update == "not-less"):
+                    values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
         rewards, completed, values, targets, ticks, corrections, iterations, biased
