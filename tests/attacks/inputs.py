@@ -652,7 +652,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
     "--runs of nothing": (run("paper", "--runs", ""), "Invalid value for '--runs'"),
     "--runs of a whole comparison": (
         run("comparison", "--runs", "1000000"),
-        "runs are planned (162 cells, 1_000_000 runs of each",
+        "runs are planned (168 cells, 1_000_000 runs of each",
     ),
     "--trials 0": (run("paper", "--trials", "0"), "Invalid value for '--trials'"),
     "--trials many": (run("paper", "--trials", "many"), "Invalid value for '--trials'"),
