@@ -118,6 +118,8 @@ class _Block(BaseModel):
     tasks: _Names
     methods: _Names
     move: _Move | None = None
+    free_base: Annotated[bool, Field(strict=True)] = False
+    """Whether the base moves in both directions, whatever the task locks."""
     parameters: Annotated[dict[str, _Value], Field(max_length=MOST_PARAMETERS)] = {}
     grid: Annotated[
         dict[str, Annotated[tuple[_Value, ...], Field(min_length=1, max_length=MOST_CELLS)]],
@@ -442,7 +444,10 @@ def _block_cells(
     for name in block.tasks_among(own):
         if block.move is not None and ALL in block.tasks and name in own:
             continue
-        for task in _family(suite, own.get(name) or load_task(name), block.move):
+        plain = own.get(name) or load_task(name)
+        if block.free_base:
+            plain = _with_free_base(suite, plain)
+        for task in _family(suite, plain, block.move):
             cells += _cells_of(suite, block, known, task)
     return cells
 
@@ -493,6 +498,24 @@ def _family(suite: Suite, task: Task, move: _Move | None) -> list[Task]:
                 f"same place twice, by ({dx}, {dy}) again"
             )
     return list(variants.values())
+
+
+def _with_free_base(suite: Suite, task: Task) -> Task:
+    """The task without its lock, by a name of its own."""
+    if not task.locked_base:
+        raise CoarticError(
+            f"suite {suite.name!r}: free_base: the base of task {task.name!r} is free"
+        )
+    content = task.model_dump(mode="json")
+    why = {"status": "chosen", "source": f"not that of {task.name}, to see what its lock does"}
+    content |= {
+        "name": f"{task.name}.free-base",
+        "title": f"{task.title}, base free",
+        "description": f"{task.name} with a base that moves in both directions",
+        "locked_base": [],
+        "provenance": {**content["provenance"], "locked_base": why},
+    }
+    return parse_task(content, f"suite {suite.name!r}")
 
 
 def _exact(value: float) -> str:

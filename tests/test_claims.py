@@ -1,10 +1,12 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from analysis.claims import (
     CLAIMS,
@@ -14,13 +16,19 @@ from analysis.claims import (
     general,
     judge,
 )
+from analysis.claims.data import FREE
 from analysis.claims.general import shortest_reach
+from analysis.claims.power import powers, runs_needed
 from analysis.claims.presence import REPRESENTATIVES
+from analysis.claims.statements import MARGINS
+from analysis.published import published_cells
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
 from analysis.report.pages.claims import claims_document
 from analysis.results.folder import Results
+from analysis.signatures.context import context_dependence, dependence_below
 from analysis.signatures.rows import Place, SignatureRow
+from analysis.signatures.subtasks import served
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import Inference, mean
 from analysis.statistics.hypotheses import bootstrap_test
@@ -28,7 +36,7 @@ from analysis.study import Study
 from analysis.words import interval
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
-from tests.support.made_up import MadeUp, manifest_for, row
+from tests.support.made_up import MadeUp, manifest_for, replanned, row
 from tests.support.strategies import changed
 from tests.support.suites import KNOWN, run_and_write
 
@@ -39,13 +47,13 @@ def test(p):
     return Inference(1.0, (20,), "planted", p=p)
 
 
-def planted(holds, *p, place="here", ids=("r",), against=None):
+def planted(holds, *p, rule="tested", ids=("r",), against=None, **more):
     def decide(data):
         data.run_ids.extend(ids)
         contrary = None if against is None else tuple(map(test, against))
         return Finding(holds, "planted", tuple(map(test, p)), contrary)
 
-    return Claim("planted", "It is so.", "General", "planted", decide, place)
+    return Claim("planted", "It is so.", "General", rule, "planted", decide, place="here", **more)
 
 
 test.__test__ = False
@@ -71,7 +79,8 @@ test.__test__ = False
         (planted(False), "not supported"),
         (planted(None), "cannot tell"),
         (planted(True, 0.001, ids=()), "cannot tell"),
-        (planted(None, place=""), "measured"),
+        (planted(None, rule="measured"), "measured"),
+        (planted(True, 0.2, rule="measured"), "measured"),
     ],
 )
 def test_verdicts(claim, verdict):
@@ -85,14 +94,33 @@ def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
         planted(True, 0.03),
         planted(True, 0.001),
         planted(True, 0.02, 0.04),
-        planted(None, 0.9, place=""),  # measured: no part of the family
+        planted(None, 0.9, rule="measured"),  # no part of the family
+        planted(True, rule="counted"),  # neither
     ]
     judged = judge(Study(NOTHING), claims)
+    assert judged.pop().verdict == "supported"
     assert [entry.p for entry in judged[:3]] == [0.03, 0.001, 0.04]
     assert [entry.adjusted_p for entry in judged[:3]] == pytest.approx([0.06, 0.003, 0.06])
     assert np.isnan([judged[3].p, judged[3].adjusted_p]).all()
     verdicts = [entry.verdict for entry in judged]
     assert verdicts == ["cannot tell", "supported", "cannot tell", "measured"]
+
+
+def test_a_claim_that_is_not_judged_counts_in_its_family():
+    """As one with p = 1: what else was run changes no verdict."""
+    claims = [planted(True, 0.02), planted(True, 0.001), planted(True, 0.03, ids=())]
+
+    def missing(data):
+        raise MissingError("not run")
+
+    claims[2] = Claim("m", "It is so.", "General", "tested", "planted", missing, place="here")
+    judged = judge(Study(NOTHING), claims)
+    assert [entry.adjusted_p for entry in judged[:2]] == pytest.approx([0.04, 0.003])
+    # Claims on runs beside the paper's cells are a family of their own.
+    beside = [planted(True, 0.0001, beside=True) for _ in range(9)]
+    same = judge(Study(NOTHING), [*claims, *beside])
+    assert [entry.adjusted_p for entry in same[:2]] == [entry.adjusted_p for entry in judged[:2]]
+    assert same[-1].adjusted_p == pytest.approx(0.0009)
 
 
 def test_contraries_are_corrected_over_the_claims_too():
@@ -125,7 +153,10 @@ SEQUENCES = {
 
 def planted_results(rows, tmp_path, sequences=SEQUENCES, tasks=()):
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    known = {task.name: task for task in (*map(load_task, runs.task.unique()), *tasks)}
+    own = {task.name: task for task in tasks}
+    known = {
+        name: own[name] if name in own else load_task(name) for name in runs.task.unique()
+    } | own
     table = [
         {"task": task, "hands": hands, "reward": reward}
         for task, rewards in sequences.items()
@@ -177,17 +208,17 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(11)), "not supported"),
         (
             "ec4-beats-ec3",
-            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH) + second(WORSE, BETTER),
+            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH),
             "supported",
         ),
         (
             "ec4-beats-ec3",
-            learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE) + second(WORSE, BETTER),
+            learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE),
             "not supported",
         ),
         (
             "ec4-beats-ec3",
-            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH) + second(WORSE, WORSE[::-1]),
+            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", MIDDLE[::-1]),
             "cannot tell",
         ),
         (
@@ -204,22 +235,40 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
         ),
         (
             "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE) + second(WORSE, BETTER),
+            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+            + learner(T2, "EC3", WORSE, ["RRRR"] * 7 + ["RLRR"], -357),
             "supported",
+        ),
+        (  # no run of task 2 leaves the initial hands
+            "sequences-change",
+            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+            + learner(T2, "EC3", WORSE, "RRRR", -357),
+            "cannot tell",
         ),
         (
             "sequences-change",
             learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + second(WORSE, BETTER, hands4="RRRR"),
-            "cannot tell",
+            + learner(T2, "EC3", WORSE * 4, "RRRR", -357),
+            "not supported",
+        ),
+        (
+            "sequences-change",
+            learner(T1, "EC2", LOW * 4, "RRRR") + learner(T1, "EC3", MIDDLE * 4, "RRRR")
+            + learner(T2, "EC3", BETTER, "RLRR", -357),
+            "not supported",
         ),
         ("ec2-sequences", learner(T1, "EC2", LOW * 3, "RRRR"), "not supported"),
         ("ec2-sequences", learner(T1, "EC2", LOW, ["RRLR"] * 4 + ["RRRR"] * 4), "cannot tell"),
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, "RRRR", -357), "not supported"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR", "RRRR"] * 20, -357),
+        ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR", "RRRR"] * 4, -357),
          "cannot tell"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 100, ["RLRR", "RRRR"] * 400, -357),
+        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR", "RRRR"] * 20, -357),
          "supported"),
+        # A tenth: too few, but not told from 9 of 20 where there are so few runs.
+        ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR"] + ["RRRR"] * 7, -357),
+         "cannot tell"),
+        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36, -357),
+         "not supported"),
         ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
         ("ec2-rrlr-better", learner(T1, "EC2", LOW + MIDDLE, RRLR), "not supported"),
         ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "cannot tell"),
@@ -232,12 +281,17 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
             "ec3-better-than-ec2",
             learner(T1, "EC2", MIDDLE + LOW, RRLR) + learner(T1, "EC3", HIGH), "supported",
         ),
-        (  # better than all runs of EC2 together, but not than those with its best hands
+        (  # not what the paper compares: nothing learned RRLR
+            "ec3-better-than-ec2",
+            learner(T1, "EC2", LOW, "LLLR") + learner(T1, "EC3", HIGH), "cannot tell",
+        ),
+        (  # better than all runs of EC2 together, but not than those with RRLR
             "ec3-better-than-ec2",
             learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE), "not supported",
         ),
         ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3), "supported"),
         ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3, "RRLR"), "not supported"),
+        ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(10)), "not supported"),
         ("rlrr-better", learner(T2, "EC3", BETTER + WORSE, MIXED, -357), "supported"),
         ("rlrr-better", learner(T2, "EC3", WORSE + BETTER, MIXED, -357), "not supported"),
         ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "cannot tell"),  # a tie
@@ -301,7 +355,7 @@ def test_what_the_folder_lacks_is_said():
     def decide(data):
         raise MissingError("this folder has no runs of dual-process/EC1 on ascending")
 
-    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "General", "t", decide, "here")])
+    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "General", "tested", "t", decide)])
     assert judged.verdict == "cannot tell"
     assert (
         judged.evidence == "not judged: this folder has no runs of dual-process/EC1 on ascending"
@@ -390,9 +444,9 @@ def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
     two = verdict_of(claims[1], study)
     assert two.verdict == "not supported"
     assert "two-armed-2 +0.3%, +13.2%" in two.evidence
-    monkeypatch.setattr(general, "CLOSE", 0.14)
+    monkeypatch.setitem(MARGINS, "close", 0.14)
     assert verdict_of(claims[1], study).verdict == "supported"
-    monkeypatch.setattr(general, "CLOSE", 0.08)
+    monkeypatch.setitem(MARGINS, "close", 0.08)
     assert verdict_of(claims[0], study).verdict == "not supported"
 
 
@@ -401,7 +455,6 @@ PLANS = ("path-length", "squared-changes", "acceleration", "jerk")
 
 
 MORE = "goals, forward kinematics, Jacobian"
-FEW = "corrective process, reward by trial"
 SPREAD = (-1, 0, 1, 0, -1, 1)
 
 
@@ -426,17 +479,6 @@ def beside_plans(reward, plan, spent=1_000_000, *, spread=SPREAD, **more):
     return rows
 
 
-def cheap(spent):
-    """A closed-loop controller beside the plans."""
-    return [
-        row(
-            "nullspace-qp/next-goal", -310, task=task, trials=0, told=MORE,
-            forward_kinematics=spent, jacobians=0,
-        )
-        for task, _ in BEST
-    ]  # fmt: skip
-
-
 JUST = {"squared-changes": -302, "acceleration": -300, "jerk": -300}
 """One plan a little worse than the learner: p of its test is 0.049, too much times six."""
 
@@ -453,15 +495,8 @@ JUST = {"squared-changes": -302, "acceleration": -300, "jerk": -300}
             beside_plans(-300, JUST, spread=(-3, -2, 3, 2, -1, 2)),
             "cannot tell",
         ),
-        ("low-computation", beside_plans(-300, -300, 90_000), "supported"),
-        ("low-computation", beside_plans(-300, -300, 90_000) + cheap(1000), "cannot tell"),
-        ("low-computation", beside_plans(-300, -300, 2_000_000_000), "not supported"),
-        ("low-computation", beside_plans(-300, -300, 2_000_000), "cannot tell"),
-        ("less-experience", beside_plans(-300, -300), "supported"),
-        ("less-experience", beside_plans(-300, -310), "not supported"),
-        ("less-experience", beside_plans(-300, {"path-length": -310}), "not supported"),
-        ("less-experience", beside_plans(-300, -300, told=FEW), "not supported"),
-        ("less-experience", beside_plans(-300, -300, trials=5), "not supported"),
+        ("low-computation", beside_plans(-300, -300, 90_000), "measured"),
+        ("less-experience", beside_plans(-300, -310), "measured"),
     ],
 )
 def test_judges_beside_planted_plans(claim, rows, verdict, tmp_path):
@@ -655,7 +690,7 @@ def test_runs_of_other_hands_are_no_basis(tmp_path):
     study = Study(planted_results(learner(T1, "EC2", MIDDLE + LOW, RRLR), tmp_path))
     improves = verdict_of("ec2-improves", study)
     assert improves.run_ids == tuple(f"dual-process/EC2-{k}" for k in range(8, 16))
-    assert "RRLR 8, RRRR 8, neither 0 of 16 runs" in verdict_of("ec2-sequences", study).evidence
+    assert "RRLR in 8 of 16 runs (RRLR 8, RRRR 8)" in verdict_of("ec2-sequences", study).evidence
 
 
 def timed(task, first, others):
@@ -695,9 +730,10 @@ def test_the_first_movement_is_sacrificed(first, others, verdict, tmp_path):
 
 @pytest.mark.parametrize(
     ("apart", "p", "verdict"),
-    [(5.0, 0.001, "supported"), (5.0, 0.2, "cannot tell"), (0.9, 0.001, "cannot tell")],
+    [(5.0, 0.001, "supported"), (5.0, 0.2, "cannot tell"), (0.0, 0.6, "not supported")],
 )
 def test_context_is_more_than_the_spread_and_no_chance(apart, p, verdict, tmp_path):
+    """The contrary is seen in the postures themselves."""
     rows = [
         entry
         for task in ("ascending", "descending")
@@ -708,20 +744,44 @@ def test_context_is_more_than_the_spread_and_no_chance(apart, p, verdict, tmp_pa
         signature("ascending", "dual-process/EC1", name, 1, apart, p=p)
         for name in ("context distance", "context dependence", *parts)
     ]
-    study = MadeUp(planted_results(rows, tmp_path), signature_rows=planted)
+    rng = np.random.default_rng(0)
+    paths = {
+        (task, "dual-process/EC1"): [at(q) for q in rng.normal(size=(8, 3, 10)) + far]
+        for task, far in (("ascending", 0.0), ("descending", apart))
+    }
+    study = with_paths(planted_results(rows, tmp_path), paths, signature_rows=planted)
     assert verdict_of("context", study).verdict == verdict
 
 
+def test_little_dependence_on_context():
+    """Two samples of one distribution are less than a pooled SD apart; two SDs are not."""
+    rng = np.random.default_rng(2)
+    same, other = rng.normal(size=(2, 20, 10))
+    assert dependence_below(same, other, 1.0, np.random.default_rng(0)) < 0.001
+    shifted = other + 2.0
+    assert context_dependence(same, shifted) > 1
+    assert dependence_below(same, shifted, 1.0, np.random.default_rng(0)) > 0.9
+    assert np.isnan(dependence_below(same[:1], other, 1.0, rng))
+
+
 @pytest.mark.parametrize(
-    ("xs", "verdict"), [([1, 2, 3, 4], "supported"), ([1, 2, 1.5, 4], "not supported")]
+    ("xs", "runs", "verdict"),
+    [
+        ([1, 2, 3, 4], 16, "supported"),
+        ([1, 2, 3, 4], 8, "cannot tell"),
+        ([1, 2, 1.5, 4], 8, "not supported"),
+    ],
 )
-def test_the_base_goes_right_once_rrlr_is_learned(xs, verdict, tmp_path):
+def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict, tmp_path):
     q = np.zeros((4, 10))
     q[:, 0] = xs
     run = SimpleNamespace(execution=SimpleNamespace(configurations=q, hands="RRLR"))
-    rows = learner(T1, "EC2", MIDDLE, "RRLR")
-    study = with_paths(planted_results(rows, tmp_path), {(T1, "dual-process/EC2"): [run] * 8})
-    assert verdict_of("no-reversal", study).verdict == verdict
+    rows = learner(T1, "EC2", MIDDLE * 2, "RRLR")
+    paths = {(T1, "dual-process/EC2"): [run] * runs}
+    assert (
+        verdict_of("no-reversal", with_paths(planted_results(rows, tmp_path), paths)).verdict
+        == verdict
+    )
 
 
 def test_the_contrary_of_one_test_is_not_that_of_another():
@@ -733,7 +793,7 @@ def test_the_contrary_of_one_test_is_not_that_of_another():
             bootstrap_test([5.0, 5.0, 5.0], 0.0, seed=0), bootstrap_test([-9, 8, 0.9], 0, seed=0),
         ))  # fmt: skip
 
-    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "General", "t", decide, "here")])
+    (judged,) = judge(Study(NOTHING), [Claim("c", "s", "General", "tested", "t", decide)])
     assert judged.verdict == "cannot tell"
     assert any("no spread" in method for method in judged.methods)
 
@@ -835,6 +895,22 @@ def test_tables_of_evidence_are_recomputed_from_their_cells(study):
     assert (alone["sacrifice"], alone["first_change"], alone["total_change"]) == ("no", 0.0, 0.0)
 
 
+def test_what_else_was_run_changes_no_verdict_on_the_papers_cells(study):
+    """The same runs alone, and with other methods beside them, one of them tested against."""
+    own = study.runs[study.runs.method.str.startswith("dual-process/")]
+    manifest = study.results.manifest
+    cells = [c for c in manifest.specification.cells if c.method.startswith("dual-process/")]
+    alone = replace(study.results, runs=own, manifest=replanned(manifest, cells=tuple(cells)))
+    changed_ones = []
+    for one, other in zip(judge(Study(alone)), study.judged, strict=True):
+        if one.claim.beside or one.claim.rule == "measured":
+            changed_ones += [one.claim.id] * (one.evidence != other.evidence)
+            continue
+        for name in ("verdict", "p", "adjusted_p", "contrary_p", "adjusted_contrary_p"):
+            np.testing.assert_equal(getattr(one, name), getattr(other, name), one.claim.id)
+    assert "resembles-squared-changes" in changed_ones
+
+
 def test_evidence_says_what_it_rests_on(study):
     for entry in study.judged:
         if entry.table is None:
@@ -896,8 +972,104 @@ def test_page_and_table_hold_every_claim(study):
     paper = [entry for entry in study.judged if entry.claim.place]
     independent = [entry for entry in paper if not entry.claim.fitted]
     supported = sum(entry.verdict == "supported" for entry in independent)
-    counts = f"{len(independent)} claims of the paper, independent tests: {supported} supported"
-    assert counts in page
+    assert f"{len(independent)} claims of the paper, on what is printed" in page
+    assert f"rest on: {supported} supported" in page
     sections = [line[3:] for line in page.splitlines() if line.startswith("## ")]
     groups = ["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
     assert sections == ["Verdicts", *groups]
+
+
+def powers_at(runs):
+    """Chances of the register's claims with so many runs in each of the paper's cells."""
+    return powers(CLAIMS, {(task, f"dual-process/{c}"): runs for task, c in published_cells()})
+
+
+def test_power_is_that_of_the_rule_by_hand():
+    """Of one claim alone, from the binomial and the noncentral t distribution."""
+
+    def alone(claim, runs):
+        (wanted,) = [entry for entry in CLAIMS if entry.id == claim]
+        cells = {(task, f"dual-process/{c}"): runs for task, c in published_cells()}
+        return powers([wanted], cells)[claim]
+
+    # 11 of 20 leave RRRR; of 20 runs 11 must do so at most (p = 0.041).
+    found = alone("ec2-unreliable", 20)
+    assert found.supported == pytest.approx(stats.binom.cdf(11, 20, 0.55), abs=0.03)
+    assert found.refuted == pytest.approx(stats.binom.sf(18, 20, 0.95))
+    # All of all: three quarters are exceeded for certain, half of them seldom taken for less.
+    found = alone("ec3-alternates", 20)
+    assert found.supported == 1
+    assert found.refuted == pytest.approx(stats.binom.cdf(11, 20, 0.5))
+    # -303 and -319 with an SD of 2.9, -314 and -333 with 1.88.
+    assert alone("learning-improves-one-armed", 20) == (1, 1)
+    shift = 2.7 / np.sqrt(2.1**2 / 55 + 4.2**2 / 45)
+    assert alone("rlrr-better", 100).supported == pytest.approx(
+        stats.norm.sf(stats.norm.isf(0.05) - shift), abs=0.03
+    )
+
+
+def test_powers_of_the_register():
+    found = powers_at(20)
+    assert found == powers_at(20)
+    tested = [claim for claim in CLAIMS if claim.tested]
+    assert set(found) < {claim.id for claim in tested}
+    for name in ("half-choose-rlrr", "ec2-sequences"):  # about half: 20 runs cannot show it
+        assert found[name].supported < 0.01
+        assert min(powers_at(100)[name]) > 0.8
+        assert runs_needed(CLAIMS)[name] in (80, 100)
+    assert runs_needed(CLAIMS)["ec3-beats-exhaustive"] == 20
+    # Without printed numbers there is no chance to speak of.
+    assert not {"context", "other-arm-coarticulation", "multilevel-search"} & set(found)
+
+
+@pytest.mark.parametrize(
+    ("free", "verdict"),
+    [
+        (["LRLR"] * 12 + ["RRRR"] * 12, "supported"),
+        (["LRLR"] * 24, "not supported"),
+        (["LRLR"] * 18 + ["RRRR"] * 6, "cannot tell"),
+    ],
+)
+def test_the_rail_makes_the_sequence(free, verdict, tmp_path):
+    rows = [*learner(T1, "EC3", MIDDLE * 3), *learner(T1, "EC2", LOW, "RRRR")]
+    rows += [*learner(FREE, "EC3", MIDDLE * 3, free), *learner(FREE, "EC2", LOW, "RRRR")]
+    free_base = load_task(T1).model_copy(update={"name": FREE, "locked_base": ()})
+    results = planted_results(rows, tmp_path, tasks=[free_base])
+    judged = verdict_of("rail", Study(results))
+    assert judged.verdict == verdict, judged.evidence
+
+
+@pytest.mark.parametrize(
+    ("one", "verdict"),
+    [(LOW, "supported"), (HIGH, "not supported"), (MIDDLE, "cannot tell")],
+)
+def test_search_on_two_levels(one, verdict, tmp_path):
+    rows = [*learner(T1, "EC3", MIDDLE), *learner(T1, "EC1", one)]
+    rows += [*learner(T2, "EC3", BETTER, initial=-357), *learner(T2, "EC1", WORSE, initial=-357)]
+    assert (
+        verdict_of("multilevel-search", Study(planted_results(rows, tmp_path))).verdict == verdict
+    )
+
+
+def test_the_papers_own_p_values():
+    """RLRR above RRRR is printed with p < .01; Welch's test on what is printed gives 0.053."""
+    judged = verdict_of("printed-p-values", Study(NOTHING))
+    assert judged.verdict == "not supported"
+    a, b = (-350, 4.2, 9), (-352.7, 2.1, 11)
+    p = stats.ttest_ind_from_stats(*a, *b, equal_var=False, alternative="greater").pvalue
+    assert f"EC3-RLRR-above-RRRR p = {p:.2g} (" in judged.evidence
+    assert f"{p:.2g}" == "0.053"
+    assert not judged.claim.fitted
+
+
+def test_the_chosen_arm_serves_the_next_goal(tmp_path):
+    """A base that has gone some way towards the next goal when the hand hits serves that goal."""
+    rows, paths = [], {}
+    for task, hands in ((T1, "LRLR"), (T2, "RRRR")):
+        run = trajectory(load_task(task), corrective_trial(load_task(task), hands).movements)
+        assert served(run) == pytest.approx(0.0, abs=1.0)  # the corrective process itself
+        for condition in ("EC3", "EC4"):
+            rows += learner(task, condition, MIDDLE, hands, initial=-671 if task == T1 else -357)
+            paths[task, f"dual-process/{condition}"] = [run] * 8
+    study = with_paths(planted_results(rows, tmp_path), paths)
+    assert verdict_of("arm-coarticulation", study).verdict != "supported"

@@ -13,6 +13,8 @@ from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
 from analysis.report.pages.comparisons import comparisons_document, cost_table, pairwise_table
 from analysis.results.folder import Results
+from analysis.statistics.estimates import SEED, difference_of_means
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.statistics.power import power, runs_needed
 from analysis.study import Study
 from benchmarks.registry import registry
@@ -57,7 +59,7 @@ def page(of):
     return markdown(comparisons_document(of), tables="")
 
 
-def test_who_is_compared_with_whom_and_which_way(tmp_path):
+def test_who_is_compared_with_whom(tmp_path):
     """By kind and by what is told; all rewards are equal."""
     same = [-500] * 4
     found = study(
@@ -77,24 +79,24 @@ def test_who_is_compared_with_whom_and_which_way(tmp_path):
     )
     learner = "dual-process/"
     assert [
-        (p.first.task, p.kind, p.first.label.removeprefix(learner), p.second.label, p.expected)
+        (p.first.task, p.kind, p.first.label.removeprefix(learner), p.second.label)
         for p in pairs(found)
     ] == [
-        (T1, "conditions", "EC3", "dual-process/EC1", "greater"),
-        (T1, "conditions", "EC4", "dual-process/EC1", "greater"),
-        (T1, "conditions", "EC4", "dual-process/EC3", "greater"),
-        (T1, "variant", "EC4", "dual-process/EC4-nullspace", "less"),
-        (T1, "variant", "EC4", "dual-process/EC4 epsilon=0.5", "greater"),
-        (T1, "method", "EC4", "moving", "greater"),
-        (T1, "method", "EC4", "still", "greater"),
-        (T1, "method", "EC3", "still", "greater"),
-        (T1, "method", "EC4", "planner", "less"),
-        (T1, "method", "EC3", "planner", "less"),
-        ("ascending", "method", "EC1", "still", "greater"),
+        (T1, "conditions", "EC3", "dual-process/EC1"),
+        (T1, "conditions", "EC4", "dual-process/EC1"),
+        (T1, "conditions", "EC4", "dual-process/EC3"),
+        (T1, "variant", "EC4", "dual-process/EC4-nullspace"),
+        (T1, "variant", "EC4", "dual-process/EC4 epsilon=0.5"),
+        (T1, "method", "EC4", "moving"),
+        (T1, "method", "EC4", "still"),
+        (T1, "method", "EC3", "still"),
+        (T1, "method", "EC4", "planner"),
+        (T1, "method", "EC3", "planner"),
+        ("ascending", "method", "EC1", "still"),
     ]
     frame = found.pairs
     planned = frame[frame.second == "planner"].iloc[0]
-    assert (planned.told_more, planned.told_less, planned.expected) == ("GKR", "AT", "lower")
+    assert (planned.told_more, planned.told_less) == ("GKR", "AT")
 
 
 def test_a_planted_difference_and_what_pairing_does(tmp_path):
@@ -110,11 +112,9 @@ def test_a_planted_difference_and_what_pairing_does(tmp_path):
     assert made["pairs"] == made["n_first"] == made["n_second"] == 8
     assert made["correlation"] == pytest.approx(1)
     assert made["independent_low"] < 9 < 11 < made["independent_high"]
-    assert made["expected"] == "higher"
     assert made["improvement"] == made["delta"] == made["improvement_high"] == 1
     # 8 and 8 runs: all 12 870 assignments are more than are drawn.
-    assert made["p_bootstrap"] == 0.0001
-    assert made["p_permutation"] == 0.0002
+    assert made["p"] == made["p_holm"] == 0.0002
     sd = np.std(EC4, ddof=1)
     assert made["runs_2"] == runs_needed(9.3, sd, sd)
     assert power(made["smallest"], sd, sd, 8) == pytest.approx(0.8)
@@ -124,9 +124,8 @@ def test_a_planted_difference_and_what_pairing_does(tmp_path):
     assert shown(pairwise_table(found, T1)) == {
         "dual-process/EC4 - worse": {
             "first": "dual-process/EC4", "second": "worse", "n_first": 8, "n_second": 8,
-            "difference": Estimate(10, None, 10, 10), "expected": "higher",
-            **{name: made[name] for name in ("p_bootstrap", "p_bootstrap_holm")},
-            **{name: made[name] for name in ("p_permutation", "p_permutation_holm")},
+            "difference": Estimate(10, None, 10, 10),
+            **{name: made[name] for name in ("test", "p", "p_holm")},
             "delta": Estimate(1, None, made["delta_low"], 1),
             "improvement": Estimate(1, None, made["improvement_low"], 1),
         }
@@ -175,26 +174,32 @@ def test_effects_by_enumeration(tmp_path):
     apart = np.array(EC4) + 484
     flips = np.array(list(itertools.product([1, -1], repeat=8))) @ apart
     expected = min(1.0, 2 * min((flips >= apart.sum()).mean(), (flips <= apart.sum()).mean()))
-    assert planner["p_permutation"] == pytest.approx(expected)
+    assert planner["p"] == pytest.approx(expected)
     assert planner["interval"] == "against a known value"
     assert (planner["sd_second"], planner["pairs"]) == (0, 0)
     assert planner["runs_1"] == runs_needed(4.65, np.std(EC4, ddof=1), 0)
 
 
-def test_the_one_tailed_test_is_in_the_stated_direction(tmp_path):
-    """Both are 10 above the learner; only of the one that is told more was it expected."""
+def test_conditions_have_the_claims_test_and_the_others_two_tails(tmp_path):
+    """One p-value a pair: conditions as in the register, and whatever else was run beside."""
     better = [reward + 10 for reward in EC4[::-1]]
-    found = study(
-        tmp_path,
-        cell("dual-process/EC4", EC4, travel=1.0),
-        cell("same", better, travel=1.0),
-        cell("more", better, travel=1.0, told=PLANNER),
-    )
-    same, more = found.pairs.to_dict("records")
-    assert (same["expected"], more["expected"]) == ("higher", "lower")
-    assert same["p_bootstrap"] > 0.99
-    assert more["p_bootstrap"] < 0.01
-    assert same["p_permutation"] == more["p_permutation"] < 0.01
+    conditions = cell("dual-process/EC4", EC4, travel=1.0), cell("dual-process/EC3", EC3)
+    found = study(tmp_path, *conditions, cell("better", better, travel=1.0))
+    (pair,) = study(tmp_path, *conditions).pairs.to_dict("records")
+    first, second = found.pairs.to_dict("records")
+    assert pair["second"] == first["second"] == "dual-process/EC3"
+    for column in ("p", "p_holm", "difference", "low", "high", "test"):
+        assert first[column] == pair[column]
+    claimed = bootstrap_test(EC4, EC3, seed=SEED)
+    interval = difference_of_means(EC4, EC3, seed=SEED)
+    assert (pair["p"], pair["test"]) == (claimed.p, claimed.method)
+    assert (pair["low"], pair["high"]) == (interval.low, interval.high)
+    assert first["interval"] == "independent"
+    assert first["pairs"] == 8
+    # Lower by as much as is seen: two tails say so, one tail upwards would be near 1.
+    assert second["difference"] < 0
+    assert second["p"] < 0.01
+    assert second["test"].startswith("two-tailed")
 
 
 def test_holm_over_the_rows_of_a_task(tmp_path):
@@ -216,13 +221,10 @@ def test_holm_over_the_rows_of_a_task(tmp_path):
     frame = study(tmp_path, *task(T1), *task(T2)).pairs
     for _, rows in frame.groupby("task"):
         assert len(rows) == 4  # the family: not the eight of the page
-        for kind in ("p_bootstrap", "p_permutation"):
-            largest = 0.0
-            for place, (p, adjusted) in enumerate(
-                sorted(zip(rows[kind], rows[f"{kind}_holm"], strict=True))
-            ):
-                largest = max(largest, p * (4 - place))
-                assert adjusted == pytest.approx(min(1.0, largest))
+        largest = 0.0
+        for place, (p, adjusted) in enumerate(sorted(zip(rows.p, rows.p_holm, strict=True))):
+            largest = max(largest, p * (4 - place))
+            assert adjusted == pytest.approx(min(1.0, largest))
 
 
 def test_few_failed_and_missing_runs(tmp_path):
@@ -235,7 +237,7 @@ def test_few_failed_and_missing_runs(tmp_path):
     )
     frame = one.pairs
     assert frame.difference.tolist() == [10, -10, -20]
-    nothing = ["low", "high", "p_bootstrap", "p_permutation", "delta_low", "runs_1", "smallest"]
+    nothing = ["low", "high", "p", "delta_low", "runs_1", "smallest"]
     assert frame[nothing].isna().all(axis=None)
     assert (frame.interval != "against a known value").all()
     assert "not tested (too few runs) against dual-process/EC3" in page(one)
@@ -263,7 +265,7 @@ def test_few_failed_and_missing_runs(tmp_path):
 
 def test_without_the_learner_there_is_nothing_to_compare(tmp_path):
     alone = study(tmp_path, cell("m", EC4))
-    assert {"task", "first", "second", "p_permutation_holm", "note"} <= set(alone.pairs.columns)
+    assert {"task", "first", "second", "p_holm", "note"} <= set(alone.pairs.columns)
     assert alone.pairs.empty
     assert "no runs of the learner" in page(alone)
 
@@ -273,9 +275,9 @@ def test_few_runs_that_cannot_differ_are_said_to_be_few(tmp_path):
     few = study(
         tmp_path,
         cell("dual-process/EC4", EC4[:3], travel=1.0),
-        cell("dual-process/EC3", EC3[:3]),
+        cell("other", EC3[:3]),
     )
-    assert few.pairs.p_permutation.tolist() == [0.1]
+    assert few.pairs.p.tolist() == [0.1]
     assert "Too few runs to tell anything apart: 1 permutation tests" in page(few)
     enough = study(
         tmp_path, cell("dual-process/EC4", EC4, travel=1.0), cell("dual-process/EC3", EC3)

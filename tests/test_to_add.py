@@ -34,6 +34,7 @@ table = "main-signatures"
 CLAIM = """
 ["One-armed tasks".all-goals-hit]
 statement = "Every goal is hit."
+rule = "counted"
 test = "counted"
 place = "Method"
 """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -15,9 +17,11 @@ from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     general,
     one_armed,
     presence,
+    rules,
     two_armed,
 )
 from analysis.claims.data import Data, MissingError
+from analysis.claims.power import Chances, powers
 from analysis.claims.register import Claim, Judged
 from analysis.claims.statements import JUDGED, STATEMENTS
 from analysis.statistics.hypotheses import holm
@@ -29,21 +33,46 @@ if STATEMENTS.keys() - JUDGED.keys():
     without = ", ".join(STATEMENTS.keys() - JUDGED.keys())
     raise ValueError(f"claims of claims.toml without a judge that is imported here: {without}")
 CLAIMS: tuple[Claim, ...] = tuple(JUDGED[name] for name in STATEMENTS)
+_UNKNOWN = Chances(math.nan, math.nan)
 _COLUMNS = (
-    *("id", "section", "statement", "verdict", "fitted", "evidence", "test"),
-    *("p", "adjusted_p", "contrary_p", "adjusted_contrary_p"),
+    *("id", "section", "statement", "verdict", "fitted", "evidence", "rule", "test", "beside"),
+    *("p", "adjusted_p", "contrary_p", "adjusted_contrary_p", "power", "contrary_power"),
     *("place", "quote", "figure", "runs", "sources"),
 )
 
 
 def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
-    """Every claim with its verdict, p-values corrected over all of them (Holm)."""
+    """Every claim with its verdict, p-values corrected over its family of ``claims`` (Holm).
+
+    A family are the tested claims on the paper's cells, or those that take other runs as well,
+    whether the folder can judge them or not.
+    """
+    claims = tuple(claims)
+    sizes = family_sizes(claims)
+    runs = {key: len(cell.good) for key, cell in study.cells.items() if len(cell.good)}
+    chances = powers(claims, runs)
     found = [_seen(claim, Data(study)) for claim in claims]
-    adjusted = holm([entry.p for entry in found]), holm([entry.contrary_p for entry in found])
+    adjusted: dict[tuple[int, str], float] = {}
+    for beside, size in sizes.items():
+        own = [entry for entry in found if entry.claim.tested and entry.claim.beside == beside]
+        for name in ("p", "contrary_p"):
+            of_claims = holm([getattr(entry, name) for entry in own], size)
+            adjusted |= {(id(entry), name): p for entry, p in zip(own, of_claims, strict=True)}
     return [
-        replace(entry, adjusted_p=p, adjusted_contrary_p=contrary)
-        for entry, p, contrary in zip(found, *adjusted, strict=True)
+        replace(
+            entry,
+            adjusted_p=adjusted.get((id(entry), "p"), math.nan),
+            adjusted_contrary_p=adjusted.get((id(entry), "contrary_p"), math.nan),
+            power=chances.get(entry.claim.id, _UNKNOWN).supported,
+            contrary_power=chances.get(entry.claim.id, _UNKNOWN).refuted,
+        )
+        for entry in found
     ]
+
+
+def family_sizes(claims: Iterable[Claim] = CLAIMS) -> dict[bool, int]:
+    """Tested claims on the paper's cells alone (False), and on runs beside them (True)."""
+    return Counter(claim.beside for claim in claims if claim.tested)
 
 
 def _seen(claim: Claim, data: Data) -> Judged:

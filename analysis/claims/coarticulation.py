@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import ONE, Data, MissingError
+from analysis.claims.data import ONE, TWO, Data, MissingError
 from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
-from analysis.claims.statements import decides
+from analysis.claims.statements import MARGINS, decides
 from analysis.methods import LEARNER
 from analysis.signatures.other_arm import preshaping, preshaping_since_hit
-from analysis.signatures.subtasks import isolated_agreement
+from analysis.signatures.subtasks import isolated_agreement, served
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST
 from analysis.statistics.hypotheses import share_test
@@ -31,11 +31,30 @@ def _hand_coarticulation(data: Data) -> Finding:
         # The last goal has no successor to be prepared for.
         agrees = np.array([isolated_agreement(run)[:-1] for run in cell.runs])
         away, total = int((~agrees.all(axis=1)).sum()), len(agrees)
-        tests.append(share_test(away, total, 0.5, "greater"))
-        against.append(share_test(away, total, 0.5, "less"))
+        tests.append(share_test(away, total, MARGINS["majority"], "greater"))
+        against.append(share_test(away, total, MARGINS["majority"], "less"))
         goals = ", ".join(f"goal {k} {n}" for k, n in enumerate((~agrees).sum(axis=0), 1) if n)
         parts.append(f"{condition}: {away} of {total} runs ({goals or 'no goal'})")
     return replace(all_hold(tests, parts), against=tuple(against))
+
+
+@decides("arm-coarticulation")
+def _arm_prepares(data: Data) -> Finding:
+    tests, parts = [], []
+    for task in (ONE, TWO):
+        for condition in ("EC3", "EC4"):
+            runs = data.cell(task, LEARNER + condition).runs
+            gains = np.array([served(run) for run in runs])
+            if not np.isfinite(gains).all():
+                raise MissingError(f"the corrective process alone misses a goal of {task}")
+            own, following = gains.mean(axis=1).T
+            tests.append(exceeds(following, 0.0))
+            parts.append(f"{task} {condition} {shown(following)} ticks, {shown(own)} ticks")
+    before = (
+        "gained on the way to the next goal, and spent more on the way to this one, against the "
+        "posture in which the corrective process would have hit it, mean over goals: "
+    )
+    return all_hold(tests, parts, before)
 
 
 def prepared_by_waiting(cell: Trajectories) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 from analysis.claims.data import BEST, UNINFORMED, Data, MissingError
 from analysis.claims.evidence import by_optimum, layout, measured
 from analysis.claims.register import Finding
-from analysis.claims.statements import decides
+from analysis.claims.statements import MARGINS, decides
 from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.methods import LEARNER
 from analysis.report.document import Row, Value
@@ -19,8 +19,7 @@ from coartic.method import Information
 from coartic.record import SEARCH
 
 _TASKS = tuple(task for task, _ in BEST)
-NEAR = 0.05
-"""Share of the optimum within which a run has come near it."""
+NEAR = MARGINS["near"]
 
 
 def _labels(data: Data, wanted: Callable[[str], bool]) -> list[str]:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 ASCENDING, DESCENDING = "ascending", "descending"
 ONE, TWO = "two-armed-1", "two-armed-2"
+FREE = f"{ONE}.free-base"
+"""Two-armed task 1 with a base that moves in both directions (suite ``ablations``)."""
 
 Cells = tuple[tuple[str, str], ...]
 """Tasks with a condition each."""
@@ -111,7 +113,12 @@ class Data:
 
     def rewards(self, task: str, condition: str, hands: str | None = None) -> Array:
         """Learned rewards of runs (that learned ``hands``), shape ``(runs,)``."""
-        found = rewards_of(self.learned(task, condition, hands))
+        return self._enough(
+            rewards_of(self.learned(task, condition, hands)), task, condition, hands
+        )
+
+    @staticmethod
+    def _enough(found: Array, task: str, condition: str, hands: str | None) -> Array:
         if len(found) < FEWEST:
             raise MissingError(
                 f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
@@ -127,7 +134,7 @@ class Data:
         replays = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         if not np.isfinite(replays).all():
             raise MissingError(f"a run of {condition} on {task} has no replay")
-        return replays
+        return self._enough(replays, task, condition, hands)
 
     def hands(self, task: str, condition: str) -> Counter[str]:
         """Runs of the paper's learner by learned hand sequence."""

@@ -10,17 +10,18 @@ import numpy as np
 from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
 from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
-from analysis.claims.statements import decides
+from analysis.claims.statements import MARGINS, decides
 from analysis.methods import LEARNER
+from analysis.signatures.context import dependence_below
 from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
+from analysis.signatures.trajectories import postures
 from analysis.statistics.estimates import SEED, Inference
 from coartic.robot import Array
 
 CONTROLS = ("posture-based/one-goal", "corrective-alone/given")
 """Methods that do not look beyond the current goal."""
 _EC1 = f"{LEARNER}EC1"
-SHARE = 0.5
-"""Of the initial solution's distance to the plan; ``claims.toml`` says half."""
+SHARE = MARGINS["halfway"]
 RATIO_TEST = (
     "one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to the "
     f"plan, learned over initial, is below {SHARE:g}; BCa interval of the ratio"
@@ -76,8 +77,11 @@ def _context_matters(data: Data) -> Finding:
     for method in CONTROLS:
         with suppress(MissingError):
             parts.append(f"{method}: {context_distance(data, method):.2f} apart")
-    # A permutation test has no contrary side: too small a difference leaves it open.
-    return Finding(True if row.value > 1 else None, "; ".join(parts), (test,), ())
+    first, second = (postures(data.cell(t, _EC1).runs, 1) for t in (ASCENDING, DESCENDING))
+    spread = MARGINS["spread"]
+    p = dependence_below(first, second, spread, np.random.default_rng(SEED))
+    contrary = replace(test, estimate=spread - row.value, method="bootstrap over runs", p=p)
+    return Finding(row.value > spread, "; ".join(parts), (test,), (contrary,))
 
 
 def context_distance(data: Data, method: str) -> float:

@@ -12,7 +12,7 @@ from analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError
 from analysis.claims.evidence import measured
 from analysis.claims.one_armed import context_distance, sacrifice
 from analysis.claims.register import Finding
-from analysis.claims.statements import decides
+from analysis.claims.statements import MARGINS, decides
 from analysis.methods import LEARNER
 from analysis.report.document import CellKey, Row, Value
 from analysis.statistics.estimates import LEVEL
@@ -31,10 +31,7 @@ REPRESENTATIVES = (
     ("corrective alone", "corrective-alone/given", "corrective-alone/every"),
 )
 """Name, label on the one-armed tasks, label on the two-armed ones."""
-STEP_APART = 0.1
-"""Ten steps of movement: postures (length unit, rad) or shares of a way this far apart count."""
-TURN_APART = 0.05
-"""Turning angles this far apart count, rad."""
+STEP_APART, TURN_APART = MARGINS["steps"], MARGINS["turn"]
 _INITIAL = "corrective-alone/given"
 """Whose solution of the one-armed tasks is the initial one."""
 

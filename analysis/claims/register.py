@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 from analysis.claims.data import Data
@@ -13,6 +13,8 @@ from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
 
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
 Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
+Rule = Literal["higher", "most", "few", "about", "differ", "tested", "counted", "measured"]
+"""How a claim is decided; ``claims.toml`` says what each is."""
 
 RULES = (
     "*Supported*: what the claim says is seen, and the largest p-value of the tests it rests on "
@@ -21,8 +23,11 @@ RULES = (
     "smallest p-value of the contrary times their number, below 5 % after Holm's correction). "
     "What is counted exactly, or shows no spread over runs, needs no test and is supported or not "
     "as it is. *Cannot tell*: neither, or the folder lacks the runs. Each of the two corrections "
-    "is over all of the paper's claims that the folder can test. Comparisons that the paper does "
-    "not make are *measured*, not judged."
+    "is over a family that the register fixes: its claims with a test on the paper's own seven "
+    "cells, or those that take other runs beside them. A claim that a folder cannot test counts "
+    "in its family all the same, with a p-value of 1, so that what is decided stays decided "
+    "whatever is run beside. Where no rule could come out both ways, and where the paper compares "
+    "nothing, things are *measured*, without a verdict."
 )
 """How verdicts are reached, in inline markup."""
 FITTED = (
@@ -30,6 +35,14 @@ FITTED = (
     "rewards and hand sequences come out (docs/model.md): a reproduction, no independent test."
 )
 """What the mark of a fitted claim means."""
+CHOSEN = (
+    "On the one-armed tasks the arrival threshold, the tick that detects arrival, the height of "
+    "the shoulders and the best noisy trial as the learned reward were chosen because the numbers "
+    "printed there (−303, −314; −319 and −333, which follow from them and the printed gains) come "
+    "out so (docs/model.md). Claims on these tasks are independent tests of what they say, not of "
+    "those numbers."
+)
+"""What independent claims do not test."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +67,16 @@ class Claim:
     id: str
     statement: str
     section: Section
+    rule: Rule
     test: str
     """In inline markup."""
     judge: Callable[[Data], Finding]
+    beside: bool = False
+    """Whether it takes runs beside the paper's cells."""
+    pairs: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Comparisons by task, of the rule that names them."""
+    runs: Mapping[str, str] = field(default_factory=dict)
+    """Condition and hands by task, of a rule that counts runs."""
     place: str = ""
     """Section of the paper that makes it; empty for comparisons of our own."""
     quote: str = ""
@@ -65,6 +85,11 @@ class Claim:
     """Figure of the paper that shows it, where one does."""
     fitted: bool = False
     """Whether it rests on a task whose goals were chosen for results like it."""
+
+    @property
+    def tested(self) -> bool:
+        """Whether its rule gives p-values, so that it is one of its family."""
+        return self.rule not in ("counted", "measured")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,14 +101,19 @@ class Judged(Finding):
     sources: tuple[str, ...] = ()
     """What it rests on beside runs."""
     adjusted_p: float = math.nan
-    """:attr:`p`, adjusted over the paper's claims (Holm)."""
+    """:attr:`p`, adjusted over its family (Holm)."""
     adjusted_contrary_p: float = math.nan
+    power: float = math.nan
+    """Chance of *supported* with so many runs if the paper's numbers are exactly right; NaN
+    where the paper prints none that the rule takes."""
+    contrary_power: float = math.nan
+    """Chance of *not supported* if the contrary holds: :mod:`analysis.claims.power`."""
 
     @property
     def p(self) -> float:
         """Largest of its tests, which must all hold; NaN where nothing is tested or judged."""
         known = [t.p for t in self.tests if not math.isnan(t.p)]
-        return max(known) if known and self.claim.place else math.nan
+        return max(known) if known and self.claim.tested else math.nan
 
     @property
     def contrary_p(self) -> float:
@@ -93,14 +123,14 @@ class Judged(Finding):
             for t in (self.tests if self.against is None else self.against)
             if not math.isnan(t.p)
         ]
-        return min(1.0, min(p) * len(p)) if p and self.claim.place else math.nan
+        return min(1.0, min(p) * len(p)) if p and self.claim.tested else math.nan
 
     @property
     def verdict(self) -> Verdict:
         """By :data:`RULES`."""
         if not self.run_ids and not self.sources:
             return "cannot tell"
-        if not self.claim.place:
+        if self.claim.rule == "measured":
             return "measured"
         if self.holds is None:
             return "cannot tell"

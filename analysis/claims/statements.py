@@ -13,22 +13,29 @@ from analysis.claims.data import Cells
 from analysis.claims.register import Claim, Finding
 
 _APART = ("one-armed", "two-armed")
+_REGISTER = tomllib.loads((Path(__file__).parent / "claims.toml").read_text(encoding="utf-8"))
+REASONS: dict[str, dict[str, Any]] = _REGISTER.pop("margins")
+"""Every margin with its value and the reason for it, by name."""
+MARGINS: dict[str, float] = {name: float(said["value"]) for name, said in REASONS.items()}
 
 
 def _read() -> dict[str, dict[str, Any]]:
     """Fields of every claim by its id."""
-    text = (Path(__file__).parent / "claims.toml").read_text(encoding="utf-8")
     found = {}
-    for section, rows in tomllib.loads(text).items():
+    for section, rows in _REGISTER.items():
         for name, row in rows.items():
             apart = "{which}" in row["statement"]
             for which in _APART if apart else ("",):
-                own = {k: v[which] if isinstance(v, dict) else v for k, v in row.items()}
+                own = {k: _of(v, which) for k, v in row.items()}
                 own["statement"] = row["statement"].replace("{which}", which)
                 fitted = section == "Two-armed tasks" or which == "two-armed"
                 key = f"{name}-{which}" if apart else name
                 found[key] = {**own, "section": section, "fitted": fitted}
     return found
+
+
+def _of(said: Any, which: str) -> Any:
+    return said[which] if isinstance(said, dict) and which in said else said
 
 
 STATEMENTS = _read()
@@ -41,13 +48,13 @@ def decides(name: str, **given: Any) -> Callable[[Judging], Judging]:
     """The function judges the claim with this id.
 
     It is called with what judges read, and with ``given``: one function may judge claims that
-    differ in those. The claim's ``test`` may name constants of the judge's module and what the
-    judge is given, so that a threshold is said as it is tested.
+    differ in those. The claim's ``test`` may name margins, constants of the judge's module and
+    what the judge is given, so that a threshold is said as it is tested.
     """
 
     def enter(judge: Judging) -> Judging:
         said = STATEMENTS[name]
-        test = said["test"].format(**vars(sys.modules[judge.__module__]) | given)
+        test = said["test"].format(**vars(sys.modules[judge.__module__]) | MARGINS | given)
         JUDGED[name] = Claim(id=name, judge=partial(judge, **given), **said | {"test": test})
         return judge
 

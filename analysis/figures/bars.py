@@ -32,8 +32,9 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
 
     By default the paper's conditions on the tasks where the folder has more than one of
     them. Each method is tested against the one to its left, the first against the initial
-    solution: one-tailed bootstrap tests, adjusted over the figure by Holm. Raises
-    CoarticError where there is no such task.
+    solution: one-tailed bootstrap tests. Conditions have the adjusted p of their pair
+    (:func:`analysis.comparisons.pairs.compared`); the others are adjusted over the figure (Holm).
+    Raises CoarticError where there is no such task.
     """
     least = 2 if methods is None else 1
     labels = {}
@@ -45,8 +46,9 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         asked = ", ".join(methods or CONDITIONS)
         raise missing(study, f"no solved runs of {asked} on one task, more than one of them")
     data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
-    adjusted = holm(data.p.tolist())
-    data = data.assign(p_holm=adjusted).reset_index(drop=True)
+    of_pair = data.p_holm.notna()
+    others = holm(data.p.mask(of_pair).tolist())
+    data = data.assign(p_holm=data.p_holm.where(of_pair, others)).reset_index(drop=True)
     # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
     width = style.column_width(0.5 + 0.58 * sum(counts))
@@ -83,7 +85,13 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     rows: list[dict[str, Any]] = [
         {"task": task, "method": "initial", "reward": initial, "published": published}
     ]
+    adjusted = {
+        (row.first, row.second): row.p_holm
+        for row in study.pair_rows
+        if (row.task, row.kind) == (task, "conditions")
+    }
     before: Any = initial
+    left = ""
     for label in labels:
         cell = solved(study, task, label)
         rewards, paper = cell.rewards, published_of(cell)
@@ -102,10 +110,11 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
                 "published_low": centre - half,
                 "published_high": centre + half,
                 "p": bootstrap_test(rewards, before, seed=SEED).p,
+                "p_holm": adjusted.get((label, left), math.nan),
             }
         )
-        before = rewards
-    columns = "task method runs reward low high published published_low published_high p"
+        before, left = rewards, label
+    columns = "task method runs reward low high published published_low published_high p p_holm"
     return pd.DataFrame(rows, columns=columns.split())
 
 

@@ -22,7 +22,7 @@ from coartic.text import counted
 
 _CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
 _VARIANT = re.compile(r"=|\bEC\d-")
-_VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell")
+_VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell", "measured")
 
 
 def best_condition(study: Study, task: str) -> str | None:
@@ -71,7 +71,7 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
     paper = [entry for entry in judged if entry.claim.place]
     items = []
     for fitted, name in (
-        (False, "independent tests"),
+        (False, "on what is printed: independent tests, but of no number that choices rest on"),
         (True, "no independent tests, as they rest on reconstructed tasks †"),
     ):
         found = Counter(entry.verdict for entry in paper if entry.claim.fitted == fitted)

@@ -64,6 +64,33 @@ def context_dependence(first: Array, second: Array) -> float:
     return distance(first, second) / spread if spread else math.nan
 
 
+def dependence_below(
+    first: Array,
+    second: Array,
+    bound: float,
+    rng: np.random.Generator,
+    *,
+    resamples: int = RESAMPLES,
+) -> float:
+    """Probability of so little context dependence if it were ``bound`` (pooled SDs) or more.
+
+    The share of bootstrap samples, whole runs drawn within each context, whose
+    :func:`context_dependence` is at least the bound, the observed one counted. Noise adds to a
+    distance and never takes from it, so that the share is rather too large. NaN where a context
+    has one run.
+    """
+    if min(len(first), len(second)) < 2:
+        return math.nan
+    means, squares = [], np.zeros(resamples)
+    for group in (first, second):
+        drawn = group[rng.integers(len(group), size=(resamples, len(group)))]
+        means.append(mean(drawn, 1))
+        squares += ((drawn - means[-1][:, None]) ** 2).sum(axis=(1, 2))
+    pooled = np.sqrt(squares / (len(first) + len(second) - 2))
+    reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
+    return float(1 + reached.sum()) / (resamples + 1)
+
+
 def permutation_p(
     first: Array,
     second: Array,

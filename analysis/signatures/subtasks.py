@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -22,18 +23,48 @@ def isolated_reaches(task: Task, q: Array, goal: int) -> dict[Hand, int]:
     ``goal`` counts from 1. Hands that the corrective process brings to no hit are left out;
     0 where the hand is there.
     """
-    found: dict[Hand, int] = {}
+    reaches = ((hand, isolated_reach(task, q, goal, hand)) for hand in task.hands)
+    return {hand: reach[0] for hand, reach in reaches if reach is not None}
+
+
+def isolated_reach(task: Task, q: Array, goal: int, hand: Hand) -> tuple[int, Array] | None:
+    """Ticks in which a hand reaches a goal from ``q`` by the corrective process alone, and where.
+
+    ``goal`` counts from 1; 0 ticks and ``q`` where the hand is there. None where the corrective
+    process brings it to no hit.
+    """
     centre, robot = task.goals[goal - 1], task.robot
-    for hand in task.hands:
-        miss = robot.forward_kinematics(q, hand) - centre
-        if np.hypot(*miss) <= task.radius:
-            found[hand] = 0
+    if np.hypot(*(robot.forward_kinematics(q, hand) - centre)) <= task.radius:
+        return 0, q
+    target = correct(robot, q, hand, centre, locked_base=task.locked_base)
+    if not target.converged:
+        return None
+    reached = move(robot, q, target.q, hand, centre, task.radius, stop_on_arrival=False)
+    return (reached.ticks, reached.q) if reached.hit else None
+
+
+def served(path: Trajectory) -> Array:
+    """What the way each goal is hit costs there and gains at the next, shape ``(G − 1, 2)``.
+
+    In ticks, with the hands of the path, for each goal that another follows, against the
+    corrective process from the same posture before. First: how much longer the path's own way to
+    the goal is. Second: how much sooner the corrective process reaches the next goal from where
+    base and chosen arm of the path hit this one than from where it would have hit it itself;
+    what the other arm does meanwhile is left out. NaN where the corrective process does not hit.
+    """
+    task, execution = path.task, path.execution
+    befores, ticks = postures_before(execution, task), execution.ticks_by_goal()
+    found = np.full((len(task.goals) - 1, 2), np.nan)
+    for k, (now, after) in enumerate(itertools.pairwise(path.hands)):
+        alone = isolated_reach(task, befores[k], k + 1, now)
+        if alone is None:
             continue
-        target = correct(robot, q, hand, centre, locked_base=task.locked_base)
-        if target.converged:
-            reached = move(robot, q, target.q, hand, centre, task.radius, stop_on_arrival=False)
-            if reached.hit:
-                found[hand] = reached.ticks
+        hit = np.array(execution.configurations[k])
+        waiting = task.robot.joints("left" if now == "right" else "right")
+        hit[waiting] = alone[1][waiting]
+        nexts = [isolated_reach(task, q, k + 2, after) for q in (alone[1], hit)]
+        if nexts[0] is not None and nexts[1] is not None:
+            found[k] = ticks[k] - alone[0], nexts[0][0] - nexts[1][0]
     return found
 
 

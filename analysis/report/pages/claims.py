@@ -7,7 +7,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from analysis.claims.register import FITTED, RULES, Judged
+from analysis.claims.catalogue import family_sizes
+from analysis.claims.register import CHOSEN, FITTED, RULES, Judged
 from analysis.markup import code, escaped
 from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from analysis.report.summary import verdicts
@@ -30,14 +31,17 @@ def claims_table(study: Study) -> DataTable | None:
             verdict=entry.marked,
             place=", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
         )
-        family = entry.claim.id if math.isnan(entry.p) else "tested"
+        tested = "beside" if entry.claim.beside else "paper"
+        family = entry.claim.id if math.isnan(entry.p) else tested
         rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
     return layout.table(
         rows,
         rules=RULES,
+        paper=family_sizes()[False],
+        beside=family_sizes()[True],
         tested=sum(not math.isnan(entry.p) for entry in study.judged),
-        contraries=sum(not math.isnan(entry.contrary_p) for entry in study.judged),
         fitted=FITTED,
+        chosen=CHOSEN,
     )
 
 
@@ -76,11 +80,17 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
     ours = (figures or {}).get(claim.figure)
     see = f" Ours: [figure {ours}](#{ours})." if ours else ""
     items = [f"Seen: {escaped(entry.evidence)}.", f"Test: {claim.test}."]
-    if claim.place and entry.methods:
+    if claim.tested and entry.methods:
         items.append(
             f"p = {_p(entry.p)}, adjusted {_p(entry.adjusted_p)}; of the contrary "
             f"{_p(entry.contrary_p)}, adjusted {_p(entry.adjusted_contrary_p)}; "
             f"{escaped('; '.join(entry.methods))}."
+        )
+    if not math.isnan(entry.power):
+        items.append(
+            f"With so many runs it is supported with a chance of {entry.power:.0%} if the paper's "
+            f"numbers are exactly right, refuted with {entry.contrary_power:.0%} if the contrary "
+            "holds."
         )
     items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
     blocks: list[Block] = [Prose((escaped(claim.statement),)), Bullets(tuple(items))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,8 +44,8 @@ def comparisons_document(study: Study) -> Document:
 
 
 def outcome(rows: Sequence[PairRow]) -> Iterator[str]:
-    """What the two-tailed tests of one task tell apart at 5 %, adjusted, for each condition."""
-    tested = [row for row in rows if not math.isnan(row.p_permutation)]
+    """What the tests of one task tell apart at 5 %, adjusted, for each condition."""
+    tested = [row for row in rows if not math.isnan(row.p) and row.kind != "conditions"]
     least = min(map(_least_p, tested), default=0.0) * len(tested)
     if least > LEVEL:
         yield (
@@ -69,9 +70,9 @@ _VERDICTS = _HIGHER, _LOWER, _NOT_APART, _UNTESTED = (
 
 
 def _verdict(row: PairRow) -> str:
-    if math.isnan(row.p_permutation_holm):
+    if math.isnan(row.p_holm):
         return _UNTESTED
-    if row.p_permutation_holm >= LEVEL:
+    if row.p_holm >= LEVEL:
         return _NOT_APART
     return _HIGHER if row.difference > 0 else _LOWER
 
@@ -161,12 +162,12 @@ def _pairs(study: Study, task: str, layout: Layout, **facts: str) -> DataTable |
         return list(_OTHERS).index(row.kind), row.first, -mean
 
     pairs = sorted((row for row in study.pair_rows if row.task == task), key=place)
-    rows = [
-        layout.row(
-            f"{pair.first} - {pair.second}", pair, ((task, pair.first), (task, pair.second))
-        )
-        for pair in pairs
-    ]
+    rows = []
+    for pair in pairs:
+        cells = (task, pair.first), (task, pair.second)
+        row = layout.row(f"{pair.first} - {pair.second}", pair, cells)
+        family = "conditions" if pair.kind == "conditions" else "others"  # of Holm's correction
+        rows.append(replace(row, family=family))
     failed = escaped(", ".join(_failed(pairs)))
     notes = (f"Runs without a solution are left out: {failed}.",) if failed else ()
     return layout.table(rows, table_ids(study)[task], notes=notes, task=escaped(task), **facts)

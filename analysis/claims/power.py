@@ -1,0 +1,273 @@
+"""What the rules can find: chances of their verdicts if the paper's numbers are exactly right.
+
+Runs are drawn as the paper prints them: hand sequences by their counts, rewards as normal with the
+printed mean and SD (of replays too, of which none are printed). Where only p < 0.01 is printed,
+the difference is taken to be the least that gives it. Tests of means are Welch's here, which agree
+with the bootstrap's in such samples and take no time; tests of counts are the exact ones.
+
+*If the paper is right*, all claims of a family are drawn together and corrected together, those
+without printed numbers with p = 1. *If the contrary holds*, one claim's numbers lie as far on the
+other side of its bound as the printed ones lie on theirs, and nothing else is contrary.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+
+from analysis.claims.register import Claim
+from analysis.claims.rules import (
+    FEW,
+    MOST,
+    Side,
+    counted_hands,
+    half_p,
+    printed_count,
+    printed_known,
+    sides,
+    unlike_p,
+)
+from analysis.methods import LEARNER
+from analysis.printed import ENTRIES, Order
+from analysis.published import RUNS, published_cell
+from analysis.statistics.estimates import FEWEST, LEVEL, SEED
+from analysis.statistics.hypotheses import Alternative, exact_independence_test, share_test
+from coartic.robot import Array
+
+SIMULATIONS = 2_000
+"""Of the paper's experiments; a chance is known within ± 2 % or better."""
+TRIED = (20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400)
+"""Numbers of runs a cell that :func:`runs_needed` tries."""
+ENOUGH = 0.8
+
+Sizes = Mapping[tuple[str, str], int]
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Runs of one cell, as many times as there are simulations."""
+
+    names: tuple[str, ...]
+    """Hand sequences; one nameless where none is printed."""
+    which: NDArray[np.int64]
+    """Index of each run's sequence, shape ``(simulations, runs)``."""
+    rewards: Array
+
+
+class Chances(NamedTuple):
+    """Of the verdicts of one claim."""
+
+    supported: float
+    """If the paper is exactly right."""
+    refuted: float
+    """Of *not supported*, if the contrary holds."""
+
+
+def powers(claims: Iterable[Claim], runs: Sizes) -> dict[str, Chances]:
+    """Chances of the claims whose rule takes what the paper prints, by id.
+
+    ``claims`` make up the families; ``runs`` are those of each task and label. A cell that is not
+    there is taken with the paper's 20 runs.
+    """
+    claims = tuple(claims)
+    sizes = {(task, label.removeprefix(LEARNER)): n for (task, label), n in runs.items()}
+    found: dict[str, Chances] = {}
+    for beside in (False, True):
+        family = [claim for claim in claims if claim.tested and claim.beside == beside]
+        drawn = {claim.id: _drawn_p(claim, sizes) for claim in family}
+        known = {name: p for name, p in drawn.items() if p is not None}
+        if not known:
+            continue
+        passed = _holm(np.column_stack([p[0] for p in known.values()]), len(family)) < LEVEL
+        for place, (name, (_, contrary)) in enumerate(known.items()):
+            p, weights = contrary
+            refuted = min(1.0, float(weights[p * len(family) < LEVEL].sum()))
+            found[name] = Chances(float(passed[:, place].mean()), refuted)
+    return found
+
+
+def runs_needed(claims: Sequence[Claim]) -> dict[str, int | None]:
+    """Fewest of :data:`TRIED` runs a cell for which both chances are :data:`ENOUGH`, by claim.
+
+    None: more than the most that are tried.
+    """
+    needed: dict[str, int | None] = {}
+    for n in TRIED:
+        every = {(task, LEARNER + name): n for task, name in _cells(claims)}
+        for name, chances in powers(claims, every).items():
+            if needed.get(name) is None:
+                needed[name] = n if min(chances) >= ENOUGH else None
+    return needed
+
+
+def _cells(claims: Iterable[Claim]) -> Iterable[tuple[str, str]]:
+    for claim in claims:
+        for task, pairs in claim.pairs.items():
+            for side in (side for pair in pairs for side in sides(pair)):
+                yield task, side.name
+        for task, text in claim.runs.items():
+            yield task, counted_hands(text)[0]
+
+
+Drawn = tuple[Array, tuple[Array, Array]]
+"""p-values (simulations,) if the paper is right; p-values of the contrary and their weights."""
+
+
+def _drawn_p(claim: Claim, sizes: Sizes) -> Drawn | None:
+    if claim.rule == "higher":
+        parts = [
+            _mean_p(task, *sides(pair), sizes)
+            for task, pairs in claim.pairs.items()
+            for pair in pairs
+        ]
+        known = [p for p in parts if p is not None]
+        if len(known) < len(parts):
+            return None
+        p = np.array(known)
+        # Mirrored about 0, the contrary's p-values are distributed as these are.
+        contrary = np.minimum(1.0, p.min(axis=0) * len(p))
+        return p.max(axis=0), (contrary, np.full(SIMULATIONS, 1 / SIMULATIONS))
+    if claim.rule in ("most", "few", "about"):
+        return _share_p(claim, sizes)
+    return _differ_p(claim, sizes) if claim.rule == "differ" else None
+
+
+def _differ_p(claim: Claim, sizes: Sizes) -> Drawn | None:
+    ((task, text),) = claim.runs.items()
+    cells = [_draw(task, name, sizes.get((task, name), RUNS)) for name in text.split()]
+    if None in cells:
+        return None
+    names = sorted({name for cell in cells if cell for name in cell.names})
+    counts = [_counts(cell, names) for cell in cells if cell]
+    tables, of_table = np.unique(np.stack(counts, 1), axis=0, return_inverse=True)
+    p = np.array([exact_independence_test(*table.tolist()).p for table in tables])
+    # The contrary: both keep one sequence in all runs, one of the two things that refute it.
+    kept = max(share_test(n, n, MOST, "greater").p for n in tables[0].sum(axis=1).tolist())
+    return p[of_table.ravel()], (np.array([2 * kept]), np.ones(1))
+
+
+def _counts(cell: _Drawn, names: list[str]) -> NDArray[np.int64]:
+    """Runs by sequence, shape ``(simulations, names)``."""
+    own = [cell.names.index(name) if name in cell.names else -1 for name in names]
+    return np.stack([(cell.which == index).sum(axis=1) for index in own], axis=1)
+
+
+def _share_p(claim: Claim, sizes: Sizes) -> Drawn | None:
+    ((task, text),) = claim.runs.items()
+    condition, hands, inverse = counted_hands(text)
+    n = sizes.get((task, condition), RUNS)
+    drawn = _draw(task, condition, n)
+    if drawn is None or hands not in drawn.names:
+        return None
+    seen = drawn.which == drawn.names.index(hands)
+    counts = (~seen if inverse else seen).sum(axis=1)
+    (count, total) = printed_count(task, condition, hands)
+    share = 1 - count / total if inverse else count / total
+    every = range(n + 1)
+    at = np.array(every)
+    if claim.rule == "about":
+        bound = FEW if share - FEW < MOST - share else MOST
+        table = np.array([half_p(k, n) for k in every])
+        outside = (at <= FEW * n) | (at >= MOST * n)
+        unlike = np.array([unlike_p((k, n), (count, total)) for k in every])
+        contrary = np.where(outside, unlike, 1.0)
+    else:
+        bound, greater = MOST, claim.rule == "most"
+        ways: list[Alternative] = ["greater", "less"] if greater else ["less", "greater"]
+        table, contrary = (np.array([share_test(k, n, MOST, w).p for k in every]) for w in ways)
+    mirrored = min(1.0, max(0.0, 2 * bound - share))
+    return table[counts], (contrary, stats.binom.pmf(at, n, mirrored))
+
+
+def _mean_p(task: str, first: Side, second: Side, sizes: Sizes) -> Array | None:
+    """One-tailed p-values that the first is higher; None where nothing is printed."""
+    a = _moments(task, first, sizes)
+    if second.known:
+        number = printed_known(task, second)
+        if a is None or number is None:
+            return None
+        n, mean, variance = a
+        p = special.stdtr(n - 1, -(mean - number) / np.sqrt(variance / n))
+        return np.where(n < FEWEST, 1.0, p)
+    b = _moments(task, second, sizes)
+    if a is not None and b is not None:
+        return np.where(np.minimum(a[0], b[0]) < FEWEST, 1.0, welch_p(*a, *b))
+    bound = _printed_bound(task, first, second)
+    if bound is None:
+        return None
+    runs = min(sizes.get((task, side.name), RUNS) for side in (first, second))
+    shift = stats.t.isf(bound, 2 * RUNS - 2) * np.sqrt(runs / RUNS)
+    rng = _rng(task, first, second)
+    scale = np.sqrt(rng.chisquare(2 * runs - 2, SIMULATIONS) / (2 * runs - 2))
+    return np.asarray(special.stdtr(2 * runs - 2, -(rng.normal(shift, 1, SIMULATIONS) / scale)))
+
+
+def welch_p(
+    n: Array, mean: Array, variance: Array, m: Array, other: Array, spread: Array
+) -> Array:
+    """One-tailed p of Welch's t-test that ``mean`` of n values is above ``other`` of m."""
+    one, two = variance / n, spread / m
+    freedom = (one + two) ** 2 / (one**2 / (n - 1) + two**2 / (m - 1))
+    return np.asarray(special.stdtr(freedom, (other - mean) / np.sqrt(one + two)))
+
+
+def _moments(task: str, side: Side, sizes: Sizes) -> tuple[Array, Array, Array] | None:
+    """Number, mean and variance of the runs on one side, each of shape ``(simulations,)``."""
+    drawn = _draw(task, side.name, sizes.get((task, side.name), RUNS))
+    if drawn is None or (side.hands and side.hands not in drawn.names):
+        return None
+    own = np.ones_like(drawn.which, dtype=bool)
+    if side.hands:
+        own = drawn.which == drawn.names.index(side.hands)
+    n = np.maximum(own.sum(axis=1), 2)  # fewer are not tested
+    mean = np.where(own, drawn.rewards, 0.0).sum(axis=1) / n
+    variance = np.where(own, (drawn.rewards - mean[:, None]) ** 2, 0.0).sum(axis=1) / (n - 1)
+    return n, mean, np.maximum(variance, 1e-12)
+
+
+@lru_cache(maxsize=64)
+def _draw(task: str, condition: str, runs: int) -> _Drawn | None:
+    """Runs of a cell as printed; None where no mean and SD are."""
+    cell = published_cell(task, condition)
+    if cell is None or cell.summary is None:
+        return None
+    parts = [(s.hands, s.summary) for s in cell.sequences] or [("", cell.summary)]
+    names, summaries = zip(*parts, strict=True)
+    if any(s.sd is None for s in summaries):
+        return None
+    shares = np.array([s.runs for s in summaries], dtype=np.float64)
+    rng = _rng(task, condition, runs)
+    which = rng.choice(len(names), size=(SIMULATIONS, runs), p=shares / shares.sum())
+    means, sds = (np.array([getattr(s, of) for s in summaries]) for of in ("mean", "sd"))
+    rewards = means[which] + sds[which] * rng.normal(size=which.shape)
+    return _Drawn(names, which, rewards)
+
+
+def _printed_bound(task: str, first: Side, second: Side) -> float | None:
+    """Printed bound of the p-value of a comparison, where there is one."""
+    for entry in ENTRIES.values():
+        if isinstance(entry, Order) and entry.task == task and entry.p_below is not None:
+            named = ((entry.condition, entry.hands), (entry.than.condition, entry.than.hands))
+            if named == tuple((side.name, side.hands or None) for side in (first, second)):
+                return float(entry.p_below)
+    return None
+
+
+def _rng(*of: object) -> np.random.Generator:
+    return np.random.default_rng([SEED, zlib.crc32(" ".join(map(str, of)).encode())])
+
+
+def _holm(p: Array, size: int) -> Array:
+    """Adjusted p-values of every row of ``p``, (simulations, claims), in a family of ``size``."""
+    order = np.argsort(p, axis=1, kind="stable")
+    steps = np.take_along_axis(p, order, axis=1) * (size - np.arange(p.shape[1]))
+    adjusted = np.empty_like(p)
+    np.put_along_axis(adjusted, order, np.maximum.accumulate(steps, axis=1), axis=1)
+    return adjusted
