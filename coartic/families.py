@@ -405,6 +405,10 @@ def drawn(address: Address) -> Drawn:
 def _named(address: Address, family: Family, candidate: Candidate, hands: str) -> Task:
     name = str(address)
     short = name.rpartition("/")[2]
+    source = f"drawn: family {family.name}, instance {short}"
+    chosen = ["goals", "start", "initial_hands"]
+    chosen += ["locked_base"] * bool(LOCKED[candidate.base])
+    chosen += ["robot"] * (candidate.task().robot != Robot())
     base = {"free": "a free base", "rail": "the base on a rail", "locked": "the base locked"}
     content = candidate.content() | {
         "name": name,
@@ -412,10 +416,7 @@ def _named(address: Address, family: Family, candidate: Candidate, hands: str) -
         "description": f"{counted(len(candidate.goals), 'goal')}, {candidate.links} links an arm, "
         f"{base[candidate.base]}: drawn from family {family.name}.",
         "initial_hands": hands,
-        "provenance": {
-            key: {"status": "chosen", "source": f"drawn: family {family.name}, instance {short}"}
-            for key in ("goals", "start", "locked_base", "robot")
-        },
+        "provenance": {key: {"status": "chosen", "source": source} for key in chosen},
     }
     return parse_task(content, name)
 
