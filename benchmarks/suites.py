@@ -44,7 +44,6 @@ from coartic.inputs import (
 )
 from coartic.learning import METHOD_PREFIX
 from coartic.members import members
-from coartic.model import MotionModel, checked_model
 from coartic.readings import ChosenReading, condition_under, model_under, task_under
 from coartic.record import run_seeds
 from coartic.robot import Finite
@@ -58,7 +57,7 @@ from coartic.tables import (
     trials_in,
     variant_of,
 )
-from coartic.task import LONGEST_NAME, NAME_PATTERN, address_of
+from coartic.task import LONGEST_NAME, NAME_PATTERN, address_of, checked_task
 from coartic.text import Line, plain
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -424,7 +423,7 @@ def cell_plans(
     model, read = model_under(chosen), condition_under(chosen)
     for cell in cells:
         cell = replace(cell, task=task_under(chosen, cell.task))
-        _check_model(cell.task, model)
+        checked_task(cell.task, model)
         parameters = {k: v for k, v in read.items() if k in cell.defaults} | dict(cell.parameters)
         cell = replace(cell, parameters=tuple(parameters.items()))
         if trials is not None and "trials" in cell.defaults:
@@ -446,13 +445,6 @@ def cell_plans(
             )
         plans.append(plan)
     return plans
-
-
-def _check_model(task: Task, model: MotionModel) -> None:
-    try:
-        checked_model(model, radius=task.radius)
-    except ValueError as error:
-        raise CoarticError(f"task {task.name!r}: {error}") from None
 
 
 def _block_cells(

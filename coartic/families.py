@@ -189,9 +189,14 @@ class Family(_Data):
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
     @model_validator(mode="after")
-    def _keeps_goals_apart(self) -> Family:
-        if self.apart < 2 * self.radius:
-            raise PydanticCustomError("apart", "apart lets goals overlap", {})
+    def _has_fit_goals(self) -> Family:
+        text = None
+        if self.radius <= PAPER.correction_tolerance * _PARTS:
+            text = "radius is not larger than the accuracy of the corrective process"
+        elif self.apart < 2 * self.radius:
+            text = "apart lets goals overlap"
+        if text is not None:
+            raise PydanticCustomError("goals", "{text}", {"text": text})
         return self
 
     def key(self, stream: str) -> tuple[int, int]:

@@ -27,7 +27,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import TaskError
 from coartic.inputs import brief_value, key_of, problems, read_toml
-from coartic.model import PAPER
+from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import HANDS, LARGEST, MOST_LINKS, Array, Finite, Hand, Length, Robot
 from coartic.text import Line, did_you_mean
 
@@ -186,7 +186,6 @@ class Task(_Frozen):
             self._check_hands,
             self._check_start,
             self._check_initial_hands,
-            self._check_radius,
             self._check_reach,
             self._check_provenance,
         ):
@@ -232,19 +231,19 @@ class Task(_Frozen):
             return key, f"{text!r} uses the {absent[0]} hand, which is not among hands"
         return None
 
-    def _check_radius(self) -> tuple[str, str] | None:
-        tolerance = PAPER.correction_tolerance
-        if self.radius <= tolerance:
-            return "radius", (
-                f"is {self.radius:g}; it must exceed {tolerance:g}, the accuracy "
-                "of the corrective process"
-            )
-        return None
-
     def _check_reach(self) -> tuple[str, str] | None:
+        # No model's corrective process ends farther from a goal than its rim (checked_task).
+        return self.out_of_reach(self.radius)
+
+    def out_of_reach(self, tolerance: float) -> tuple[str, str] | None:
+        """Key and words of the first goal that no hand, or not the initial one, can hit.
+
+        ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
+        length unit. None where all goals are within reach.
+        """
         named = None if self.initial_is_policy else hands_of(self.initial_hands)
         for index, goal in enumerate(self.goals):
-            excess = {hand: self.beyond_reach(hand, goal) for hand in self.hands}
+            excess = {hand: self.beyond_reach(hand, goal, tolerance) for hand in self.hands}
             locked = " and ".join(self.locked_base)
             where = f"({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked in {locked}"
             if all(value > 0 for value in excess.values()):
@@ -256,8 +255,9 @@ class Task(_Frozen):
                 )
         return None
 
-    def beyond_reach(self, hand: Hand, goal: Point) -> float:
-        """How far the corrective process must end short of a goal, at least."""
+    def beyond_reach(self, hand: Hand, goal: Point, tolerance: float) -> float:
+        """How far short of where it would end, ``tolerance`` from the centre of a goal, the
+        corrective process must stay at least, length unit; not positive within reach."""
         arm = self.robot.arm(hand)
         near, far = self.robot.reach(hand)
         dx = goal[0] - self.start.base[0] - arm.shoulder_x if "x" in self.locked_base else 0.0
@@ -265,13 +265,28 @@ class Task(_Frozen):
         distance = math.hypot(dx, dy)
         # A base that is free in one coordinate can always back away.
         inside = near - distance if len(self.locked_base) == 2 else 0.0
-        return max(distance - far, inside) - PAPER.correction_tolerance
+        return max(distance - far, inside) - tolerance
 
     def _check_provenance(self) -> tuple[str, str] | None:
         for key in self.provenance:
             if key not in type(self).model_fields:
                 return f"provenance.{key}", f"is not a key of a task{did_you_mean(key, _keys())}"
         return None
+
+
+def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
+    """The task itself; TaskError where a model's corrective process cannot do it.
+
+    Goals that are not larger than its accuracy, and goals farther out of reach than that.
+    """
+    try:
+        checked_model(model, radius=task.radius)
+    except ValueError as error:
+        raise TaskError(f"task {task.name!r}: {error}") from None
+    problem = task.out_of_reach(model.correction_tolerance)
+    if problem is not None:
+        raise TaskError(f"task {task.name!r}: {' '.join(problem)}")
+    return task
 
 
 def builtin_tasks() -> tuple[str, ...]:

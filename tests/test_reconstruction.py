@@ -18,6 +18,7 @@ from analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Trie
 from analysis.reconstruction.ensemble import features, spread_out
 from analysis.reconstruction.layout import Layout, layouts
 from analysis.reconstruction.likelihood import likelihoods, together
+from analysis.reconstruction.lines import lines
 from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
 from analysis.reconstruction.scoring import FARTHEST, Figure, Learned, Order, compared, distance
 from analysis.reconstruction.search import Search
@@ -282,3 +283,20 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
     assert len(set(labels)) == len(labels) == 9
     with pytest.raises(CoarticError, match="nothing to reconstruct of task 'ascending'"):
         search_for("ascending")
+
+
+def test_lines_stand_beside_what_is_printed() -> None:
+    table = lines(["two-armed-1-F2", "ascending"], runs=4, trials=60).set_index(["task", "figure"])
+    assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
+    row = table.loc["ascending", "EC1 mean"]
+    seeds = range(800_000_000, 800_000_004)
+    own = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
+    assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(own))
+    parts = np.array([np.var(own, ddof=1) / 4, 2.9**2 / 20])  # Welch's interval
+    freedom = parts.sum() ** 2 / (parts**2 / [3, 19]).sum()
+    half = stats.t.ppf(0.975, freedom) * math.sqrt(parts.sum())
+    assert row.low == pytest.approx(np.mean(own) + 303 - half)
+    assert row.verdict == "different"
+    assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
+    with pytest.raises(CoarticError, match="unknown task 'nope'"):
+        lines(["nope"], runs=3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated
@@ -102,6 +103,32 @@ def reconstruct(
     say(f"Results in {paths[0]} and {paths[1]}.")
 
 
+def printed(
+    tasks: Annotated[list[str], typer.Argument(help="Tasks, or members of an ensemble.")],
+    runs: Annotated[int, typer.Option(min=3, max=MOST_RUNS, help="Runs a condition.")] = 100,
+    trials: Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")] = 10_000,
+    out: Annotated[str | None, typer.Option(help="Folder for a table of it.")] = None,
+    reading: given.Readings = None,
+    jobs: given.Jobs = -1,
+) -> None:
+    """Show what the paper prints of tasks, line by line, beside fresh runs."""
+    from analysis.reconstruction.lines import lines
+
+    check_numbers(jobs, None)
+    folder = None if out is None else folder_named(out, "--out")
+    table = lines(
+        tasks, readings=tuple(reading or ()), runs=runs, trials=trials, jobs=_threads(jobs),
+        progress=say,
+    )  # fmt: skip
+    shown = table[["figure", "task", "printed", "sd", "ours", "our_sd", "runs", "verdict"]]
+    rows = [tuple(map(_short, row)) for row in shown.itertuples(index=False)]
+    show_table("What is printed", tuple(shown.columns), rows)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        table.to_csv(folder / "printed.csv", index=False, lineterminator="\n")
+        say("", f"Results in {folder / 'printed.csv'}.")
+
+
 def robustness(
     folders: Annotated[
         list[Path], typer.Argument(parser=folder_named, help="Results folders, one a reading.")
@@ -132,8 +159,14 @@ def robustness(
     say("", f"Results in {folder}.")
 
 
+def _short(value: object) -> str:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{round(value, 3):g}"
+    return str(value)
+
+
 def _threads(jobs: int) -> int:
     return (os.cpu_count() or 1) if jobs == -1 else max(jobs, 1)
 
 
-COMMANDS = (readings, reconstruct, robustness)
+COMMANDS = (readings, printed, reconstruct, robustness)
