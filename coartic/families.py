@@ -36,7 +36,7 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
 from coartic.inputs import MOST_CELLS, problems, read_toml
@@ -526,10 +526,14 @@ def read_family(path: Path) -> Family:
         family = Family(**content, name=name)
     except ValidationError as error:
         keys = [*Family.model_fields, *Region.model_fields, *Alignment.model_fields]
-        raise TaskError(problems(str(path), error, keys)) from None
+        raise TaskError(problems(str(path), error, keys, _explain)) from None
     if address_of(f"{name}/i000") is None:
         raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")
     return family
+
+
+def _explain(detail: ErrorDetails) -> str | None:
+    return detail["msg"] if detail["type"] == "goals" else None
 
 
 def task_text(task: Task) -> str:

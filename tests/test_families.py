@@ -35,7 +35,7 @@ from coartic.inputs import MOST_CELLS
 from coartic.tables import RUNS
 from coartic.task import Address, address_of
 from tests.support.commands import call
-from tests.support.suites import KNOWN, suite_of
+from tests.support.suites import KNOWN, ROOT, suite_of
 
 # What the shipped families draw, by the hash of the task's file. A family is never changed: what
 # makes these fail makes results under these names incomparable, and needs a new version.
@@ -350,7 +350,7 @@ def test_a_family_of_ones_own(tmp_path):
         ({"goals": "[1, 3]"}, "goals[0] is 1; it must be at least 2"),
         ({"goals": "[3, 2]"}, "goals: goes from more to less"),
         ({"links": "[3, 9]"}, "links[1] is 9; it must be at most 8"),
-        ({"apart": "0.1"}, "apart lets goals overlap"),
+        ({"apart": "0.1"}, "toml: apart lets goals overlap"),
         ({"radius": "0.01"}, "radius is not larger than the accuracy of the corrective process"),
         ({"reach": "4.0001"}, "reach: has more than three decimals"),
         ({"reach": "-1"}, "reach: should be greater than 0"),
@@ -507,6 +507,14 @@ def test_command_draws_ranges(monkeypatch, capsys, tmp_path):
     )
     assert code == 0
     assert "one-armed/v1/d000, one-armed/v1/d001 drawn in" in text
+
+
+def test_the_picture_is_of_instances_as_they_are(monkeypatch, capsys, tmp_path):
+    two = [f"{name}/v1/i000..i001" for name in ("one-armed", "two-armed", "aligned", "redundancy")]
+    names = ",".join([*two, "long/v1/i001..i002"])
+    call(monkeypatch, capsys, "draw", "--tasks", names, "--out", tmp_path / "families.svg")
+    drawn_now = (tmp_path / "families.svg").read_bytes()
+    assert drawn_now == (ROOT / "docs" / "families.svg").read_bytes()
 
 
 def test_learners_apply_to_instances():
