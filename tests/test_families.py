@@ -228,6 +228,17 @@ def test_restrictions_are_asked_for_as_well():
     assert broken_rule(replace(free, family=locked)) == CORRECTIVE
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_both_hands_reach_every_goal(side):
+    """With a locked base, a goal at 4.2 is 3.7 from one shoulder and 4.7 from the other."""
+    goals = ((side * 1000, 2000), (side * 4200, 100))
+    found = replace(good(), base="locked", goals=goals)
+    assert broken_rule(found) == "reach"
+    one = {1: "right", -1: "left"}[side]
+    alone = found.family.model_copy(update={"hands": (one,)})
+    assert broken_rule(replace(found, family=alone)) is None
+
+
 def test_rejection_leaves_the_structure_alone():
     for name in names_in("aligned/v1/i000..i059"):
         address = address_of(name)
@@ -444,6 +455,15 @@ def test_blocks_name_ranges(tmp_path):
     )
     cells = suite_of(tmp_path, block)
     assert [cell.task.name for cell in cells] == names_in("one-armed/v1/d000..d002")
+
+
+def test_a_goal_of_an_instance_moves(tmp_path):
+    block = 'tasks = ["two-armed/v1/i003"]\nmethods = ["dual-process/EC4"]\n'
+    cells = suite_of(tmp_path, block + "move = { goal = 2, by = [[0, 0.5]] }")
+    (task,) = (cell.task for cell in cells)
+    assert task.name == "two-armed/v1/i003.goal2_0_0.5"
+    assert task.family is task.split is None
+    assert task.goals[1] == pytest.approx(np.add(instance("two-armed/v1/i003").goals[1], (0, 0.5)))
 
 
 def test_an_instance_beside_a_suites_tasks():
