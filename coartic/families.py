@@ -36,7 +36,7 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
 from coartic.inputs import MOST_CELLS, problems, read_toml
@@ -189,9 +189,14 @@ class Family(_Data):
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
     @model_validator(mode="after")
-    def _keeps_goals_apart(self) -> Family:
-        if self.apart < 2 * self.radius:
-            raise PydanticCustomError("apart", "apart lets goals overlap", {})
+    def _has_fit_goals(self) -> Family:
+        text = None
+        if self.radius <= PAPER.correction_tolerance * _PARTS:
+            text = "radius is not larger than the accuracy of the corrective process"
+        elif self.apart < 2 * self.radius:
+            text = "apart lets goals overlap"
+        if text is not None:
+            raise PydanticCustomError("goals", "{text}", {"text": text})
         return self
 
     def key(self, stream: str) -> tuple[int, int]:
@@ -521,10 +526,14 @@ def read_family(path: Path) -> Family:
         family = Family(**content, name=name)
     except ValidationError as error:
         keys = [*Family.model_fields, *Region.model_fields, *Alignment.model_fields]
-        raise TaskError(problems(str(path), error, keys)) from None
+        raise TaskError(problems(str(path), error, keys, _explain)) from None
     if address_of(f"{name}/i000") is None:
         raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")
     return family
+
+
+def _explain(detail: ErrorDetails) -> str | None:
+    return detail["msg"] if detail["type"] == "goals" else None
 
 
 def task_text(task: Task) -> str:

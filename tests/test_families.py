@@ -35,7 +35,7 @@ from coartic.inputs import MOST_CELLS
 from coartic.tables import RUNS
 from coartic.task import Address, address_of
 from tests.support.commands import call
-from tests.support.suites import KNOWN, suite_of
+from tests.support.suites import KNOWN, ROOT, suite_of
 
 # What the shipped families draw, by the hash of the task's file. A family is never changed: what
 # makes these fail makes results under these names incomparable, and needs a new version.
@@ -144,7 +144,7 @@ def test_every_instance_is_valid(address):
         position = task.robot.forward_kinematics(task.q0, hand)
         for goal in task.goals:
             assert math.dist(position, goal) > task.radius + 0.19
-            assert task.beyond_reach(hand, goal) < 0
+            assert task.beyond_reach(hand, goal, 0.01) < 0
         jacobian = task.robot.jacobian(task.q0, hand)[:, task.robot.joints(hand)]
         singular = np.linalg.svd(jacobian, compute_uv=False)[1] < 1e-3
         assert not singular or not family.bent
@@ -226,6 +226,17 @@ def test_restrictions_are_asked_for_as_well():
     assert broken_rule(free) is None
     locked = free.family.model_copy(update={"restrictions": ("locked",)})
     assert broken_rule(replace(free, family=locked)) == CORRECTIVE
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_both_hands_reach_every_goal(side):
+    """With a locked base, a goal at 4.2 is 3.7 from one shoulder and 4.7 from the other."""
+    goals = ((side * 1000, 2000), (side * 4200, 100))
+    found = replace(good(), base="locked", goals=goals)
+    assert broken_rule(found) == "reach"
+    one = {1: "right", -1: "left"}[side]
+    alone = found.family.model_copy(update={"hands": (one,)})
+    assert broken_rule(replace(found, family=alone)) is None
 
 
 def test_rejection_leaves_the_structure_alone():
@@ -350,7 +361,8 @@ def test_a_family_of_ones_own(tmp_path):
         ({"goals": "[1, 3]"}, "goals[0] is 1; it must be at least 2"),
         ({"goals": "[3, 2]"}, "goals: goes from more to less"),
         ({"links": "[3, 9]"}, "links[1] is 9; it must be at most 8"),
-        ({"apart": "0.1"}, "apart lets goals overlap"),
+        ({"apart": "0.1"}, "toml: apart lets goals overlap"),
+        ({"radius": "0.01"}, "radius is not larger than the accuracy of the corrective process"),
         ({"reach": "4.0001"}, "reach: has more than three decimals"),
         ({"reach": "-1"}, "reach: should be greater than 0"),
         ({"within": "1.5"}, "within: should be above 0, at most 1"),
@@ -445,6 +457,15 @@ def test_blocks_name_ranges(tmp_path):
     assert [cell.task.name for cell in cells] == names_in("one-armed/v1/d000..d002")
 
 
+def test_a_goal_of_an_instance_moves(tmp_path):
+    block = 'tasks = ["two-armed/v1/i003"]\nmethods = ["dual-process/EC4"]\n'
+    cells = suite_of(tmp_path, block + "move = { goal = 2, by = [[0, 0.5]] }")
+    (task,) = (cell.task for cell in cells)
+    assert task.name == "two-armed/v1/i003.goal2_0_0.5"
+    assert task.family is task.split is None
+    assert task.goals[1] == pytest.approx(np.add(instance("two-armed/v1/i003").goals[1], (0, 0.5)))
+
+
 def test_an_instance_beside_a_suites_tasks():
     select = Selection(tasks=["two-armed/v1/i003..i004", "two-armed-1"], methods=["EC4"])
     plan = plan_suite("paper", runs=1, select=select)
@@ -506,6 +527,14 @@ def test_command_draws_ranges(monkeypatch, capsys, tmp_path):
     )
     assert code == 0
     assert "one-armed/v1/d000, one-armed/v1/d001 drawn in" in text
+
+
+def test_the_picture_is_of_instances_as_they_are(monkeypatch, capsys, tmp_path):
+    two = [f"{name}/v1/i000..i001" for name in ("one-armed", "two-armed", "aligned", "redundancy")]
+    names = ",".join([*two, "long/v1/i001..i002"])
+    call(monkeypatch, capsys, "draw", "--tasks", names, "--out", tmp_path / "families.svg")
+    drawn_now = (tmp_path / "families.svg").read_bytes()
+    assert drawn_now == (ROOT / "docs" / "families.svg").read_bytes()
 
 
 def test_learners_apply_to_instances():
