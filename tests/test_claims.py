@@ -18,10 +18,11 @@ from analysis.claims import (
 )
 from analysis.claims.data import FREE
 from analysis.claims.general import shortest_reach
+from analysis.claims.page import SENTENCES, page
 from analysis.claims.power import powers, runs_needed
 from analysis.claims.presence import REPRESENTATIVES
 from analysis.claims.reconstructions import held_by
-from analysis.claims.statements import MARGINS
+from analysis.claims.statements import MARGINS, REASONS
 from analysis.published import published_cells
 from analysis.report.document import Estimate
 from analysis.report.formats.markdown import markdown
@@ -39,7 +40,7 @@ from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
 from tests.support.made_up import MadeUp, manifest_for, replanned, row
 from tests.support.strategies import changed
-from tests.support.suites import KNOWN, run_and_write
+from tests.support.suites import KNOWN, ROOT, run_and_write
 
 NOTHING = Results(None, manifest_for([]), pd.DataFrame(), pd.DataFrame())
 
@@ -1091,3 +1092,26 @@ def test_the_chosen_arm_serves_the_next_goal(tmp_path):
             paths[task, f"dual-process/{condition}"] = [run] * 8
     study = with_paths(planted_results(rows, tmp_path), paths)
     assert verdict_of("arm-coarticulation", study).verdict != "supported"
+
+
+def test_the_page_of_the_register_is_current():
+    text = (ROOT / "docs" / "register.md").read_text(encoding="utf-8")
+    assert text == page(), "python -m analysis.claims.page > docs/register.md"
+
+
+def test_every_sentence_is_accounted_for():
+    names = {claim.id for claim in CLAIMS}
+    for said in SENTENCES:
+        assert len({"claims", "held", "open"} & set(said)) == 1, said["quote"]
+        assert set(said.get("claims", ())) <= names
+    accounted = {name for said in SENTENCES for name in said.get("claims", ())}
+    assert {claim.id for claim in CLAIMS if claim.place} <= accounted
+
+
+def test_margins_are_set_once_with_a_reason():
+    assert all(said["reason"] for said in REASONS.values())
+    assert MARGINS["few"] == 1 - MARGINS["most"]
+    for claim in CLAIMS:
+        assert "{" not in claim.test
+        assert claim.rule == "measured" or claim.place
+        assert not (claim.pairs and claim.runs)

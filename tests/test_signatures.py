@@ -26,8 +26,8 @@ from analysis.signatures.locus import families, locus_slopes, slope_norm, varian
 from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
 from analysis.signatures.other_arm import (
     preshaping,
-    preshaping_from_base,
-    preshaping_since_hit,
+    readiness,
+    readiness_from_base,
     travel,
 )
 from analysis.signatures.paths import (
@@ -366,7 +366,7 @@ def test_best_corrective_sequences():
 # The other arm
 
 
-def test_preshaping_and_travel():
+def test_readiness_and_travel():
     """While the right hand works, the left one comes half the way to its goal."""
     task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
     initial = execute(task, planned(posture(1.0), posture(4.0), hands="RL"))
@@ -376,17 +376,17 @@ def test_preshaping_and_travel():
         task.robot.forward_kinematics(execution.configurations[0], "left") - [7.5, 0.1]
         for execution in (path.execution, initial)
     ]
-    found = preshaping(path, initial)
+    found = readiness(path, initial)
     assert found[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
     assert found[0] < 0  # bent away
     assert math.isnan(found[1])
     same = trajectory(task, planned(posture(1.0), posture(4.0), hands="RL"))
-    assert preshaping(same, initial)[0] == 0.0
+    assert readiness(same, initial)[0] == 0.0
     assert travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
     assert travel(path)[1] == 0.0  # the right arm, when the left hand works
 
 
-def test_preshaping_by_the_base_alone():
+def test_readiness_by_the_base_alone():
     """The left arm keeps its joints, the base brings it half a length nearer."""
     task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
     initial = execute(task, planned(posture(1.0), posture(4.0), hands="RL"))
@@ -395,8 +395,8 @@ def test_preshaping_by_the_base_alone():
     near = tiny_task(goals=[hand.tolist(), [7.5, 0.1]], initial_hands="RL")
     path = trajectory(near, planned(bent, posture(4.0), hands="RL"))
     assert path.execution.configurations[0, 0] > initial.configurations[0, 0] + 0.1
-    assert preshaping(path, initial)[0] > 0.05
-    for arm_alone in (preshaping_from_base, preshaping_since_hit):
+    assert readiness(path, initial)[0] > 0.05
+    for arm_alone in (readiness_from_base, preshaping):
         assert arm_alone(path, initial)[0] == 0.0
         assert math.isnan(arm_alone(path, initial)[1])
 
@@ -413,10 +413,10 @@ def test_preshaping_by_the_arm_alone():
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, planned(swung, end, hands="RL"))
     path = trajectory(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
-    whole = preshaping(path, initial)
+    whole = readiness(path, initial)
     assert 0.2 < whole[0] < 0.8
-    np.testing.assert_array_equal(preshaping_from_base(path, initial), whole)
-    np.testing.assert_array_equal(preshaping_since_hit(path, initial), whole)
+    np.testing.assert_array_equal(readiness_from_base(path, initial), whole)
+    np.testing.assert_array_equal(preshaping(path, initial), whole)
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -424,8 +424,8 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     task = load_task("two-armed-1")
     initial = corrective_trial(task, "RRRR")
     path = trajectory(task, corrective_trial(task, "LRLR").movements)
-    assert abs(preshaping_from_base(path, initial)[1]) > 0.1
-    np.testing.assert_array_equal(preshaping_since_hit(path, initial)[:3], [0, 0, 0])
+    assert abs(readiness_from_base(path, initial)[1]) > 0.1
+    np.testing.assert_array_equal(preshaping(path, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
     robot = task.robot
     goals = [robot.forward_kinematics(q, hand).tolist()
@@ -444,7 +444,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
         np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
         for q in (configurations[1], held, still.configurations[1])
     )
-    assert preshaping_since_hit(path, still)[1] == pytest.approx((without - now) / before)
+    assert preshaping(path, still)[1] == pytest.approx((without - now) / before)
     assert abs(without - now) > 0.05
 
 
@@ -452,7 +452,7 @@ def test_waiting_arms_keep_still_under_condition_3_only():
     for condition, moves in (("EC3", False), ("EC4", True)):
         run = learn(load_task("two-armed-1"), condition, seed=1, trials=400)
         path = trajectory(run.task, run.solution)
-        own = preshaping_since_hit(path, corrective_trial(run.task, "RRRR"))
+        own = preshaping(path, corrective_trial(run.task, "RRRR"))
         assert (np.nan_to_num(own) != 0).any() == moves
 
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections import Counter
 
 import numpy as np
 import pandas as pd
@@ -377,3 +378,36 @@ def test_share_test():
     assert found.p == pytest.approx(0.75**20)
     assert hypotheses.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
     assert hypotheses.share_test(15, 20, 0.75, "greater").p > 0.5
+
+
+def test_fishers_test_of_two_rows(monkeypatch):
+    """As scipy's where that is exact, and by enumeration of all ways to label the runs."""
+    for table in ([[15, 5], [6, 14]], [[0, 20], [11, 9]], [[3, 0], [0, 3]]):
+        ours = hypotheses.independence_test(*table, seed=0)
+        assert ours.p == pytest.approx(stats.fisher_exact(table).pvalue)
+    first, second = [2, 1, 2], [0, 3, 0]
+    runs = [kind for kind, n in enumerate(np.add(first, second)) for _ in range(n)]
+    seen, total = Counter(), 0
+    for chosen in itertools.combinations(range(len(runs)), sum(first)):
+        counts = Counter(runs[k] for k in chosen)
+        seen[tuple(counts[k] for k in range(3))] += 1
+        total += 1
+    expected = sum(n for n in seen.values() if n <= seen[tuple(first)]) / total
+    found = hypotheses.independence_test(first, second, seed=0)
+    assert found.p == pytest.approx(expected)
+    assert found.estimate == pytest.approx(0.8)
+    monkeypatch.setattr(hypotheses, "MOST_TABLES", 1)
+    drawn = hypotheses.independence_test(first, second, seed=0)
+    assert drawn.p == pytest.approx(expected, abs=0.02)
+    assert "Monte Carlo" in drawn.method
+    with pytest.raises(ValueError, match="no counts"):
+        hypotheses.independence_test([0, 0], [1, 2], seed=0)
+
+
+def test_holm_over_a_family_that_is_not_all_there():
+    """Those that are missing count as p = 1."""
+    p = [0.01, math.nan, 0.02]
+    missing = hypotheses.holm([0.01, 1.0, 0.02, 1.0])
+    found = hypotheses.holm(p, 4)
+    assert [found[0], found[2]] == [missing[0], missing[2]] == [0.04, 0.06]
+    assert math.isnan(found[1])

@@ -12,7 +12,7 @@ from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
 from analysis.claims.statements import MARGINS, decides
 from analysis.methods import LEARNER
-from analysis.signatures.other_arm import preshaping, preshaping_since_hit
+from analysis.signatures.other_arm import preshaping, readiness
 from analysis.signatures.subtasks import isolated_agreement, served
 from analysis.signatures.trajectories import Trajectories
 from analysis.statistics.estimates import FEWEST
@@ -60,7 +60,7 @@ def _arm_prepares(data: Data) -> Finding:
 def prepared_by_waiting(cell: Trajectories) -> Array:
     """How much nearer the waiting arm has brought its hand to its next goal, mean over goals.
 
-    :func:`analysis.signatures.other_arm.preshaping_since_hit` of each run, shape ``(runs,)``:
+    :func:`analysis.signatures.other_arm.preshaping` of each run, shape ``(runs,)``:
     0 where the arm keeps still. Runs that use one hand only are left out. Raises MissingError
     where the corrective process alone does not complete the task.
     """
@@ -74,7 +74,7 @@ def _by_goal(cell: Trajectories, *, since_hit: bool) -> Array:
     initial = cell.initial
     if initial is None:
         raise MissingError(f"the corrective process alone does not complete {cell.task.name}")
-    measure = preshaping_since_hit if since_hit else preshaping
+    measure = preshaping if since_hit else readiness
     return np.array([measure(run, initial) for run in cell.runs])
 
 

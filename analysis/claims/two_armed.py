@@ -13,8 +13,8 @@ from analysis.claims.rules import nearly_all
 from analysis.claims.statements import decides
 from analysis.methods import LEARNER
 from analysis.published import published_exhaustive, published_initial
-from analysis.statistics.estimates import Inference
-from analysis.statistics.hypotheses import exact_independence_test
+from analysis.statistics.estimates import SEED, Inference
+from analysis.statistics.hypotheses import independence_test
 from analysis.words import tally
 from coartic.robot import Array
 
@@ -106,7 +106,7 @@ def _sequences_change(data: Data) -> Finding:
     initial = data.task(TWO).initial_hands
     names = sorted(set(before) | set(after))
     table = [[count[name] for name in names] for count in (before, after)]
-    test = exact_independence_test(table[0], table[1])
+    test = independence_test(*table, seed=SEED)
     left = second.total() - second[initial]
     against = [_both_keep(name, before, after) for name in names]
     against.append(nearly_all("", second[initial], second.total()).tests[0])

@@ -137,7 +137,8 @@ class PairRow:
     """Whose p-value follows, in words."""
     p: float = math.nan
     p_holm: float = math.nan
-    """Adjusted over the task's pairs of conditions, or over its other pairs."""
+    """Adjusted over the task's pairs that are not of conditions, whose one adjusted p-value is
+    that of the claims (:mod:`analysis.claims`)."""
     delta: float = math.nan
     """Cliff's."""
     delta_low: float = math.nan
@@ -172,16 +173,12 @@ class PairRow:
 
 
 def compared(study: Study) -> tuple[PairRow, ...]:
-    """One row a pair of :func:`pairs`, its p-value adjusted within its family.
-
-    That is the pairs of conditions of a task, so that what the paper compares does not depend on
-    what else was run, or the task's other pairs.
-    """
+    """One row a pair of :func:`pairs`, p-values adjusted over a task's pairs but conditions."""
     rows = [_row(study, pair) for pair in pairs(study)]
     adjusted = []
-    for _, family in itertools.groupby(rows, lambda row: (row.task, row.kind == "conditions")):
-        own = list(family)
-        found = holm([row.p for row in own])
+    for _, of_task in itertools.groupby(rows, lambda row: row.task):
+        own = list(of_task)
+        found = holm([math.nan if row.kind == "conditions" else row.p for row in own])
         adjusted += [replace(row, p_holm=p) for row, p in zip(own, found, strict=True)]
     return tuple(adjusted)
 

@@ -20,7 +20,7 @@ from analysis.figures.selection import CONDITIONS, has, missing, solved
 from analysis.methods import LEARNER, short_name
 from analysis.published import Summary, published_cell, published_initial
 from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
-from analysis.statistics.hypotheses import bootstrap_test, holm
+from analysis.statistics.hypotheses import bootstrap_test
 from analysis.study import Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
@@ -32,9 +32,9 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
 
     By default the paper's conditions on the tasks where the folder has more than one of
     them. Each method is tested against the one to its left, the first against the initial
-    solution: one-tailed bootstrap tests. Conditions have the adjusted p of their pair
-    (:func:`analysis.comparisons.pairs.compared`); the others are adjusted over the figure (Holm).
-    Raises CoarticError where there is no such task.
+    solution: one-tailed bootstrap tests, of conditions those of the comparisons and of the claims
+    register, which corrects them for their number. Raises CoarticError where there is no such
+    task.
     """
     least = 2 if methods is None else 1
     labels = {}
@@ -45,10 +45,7 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     if not labels:
         asked = ", ".join(methods or CONDITIONS)
         raise missing(study, f"no solved runs of {asked} on one task, more than one of them")
-    data = pd.concat([_rows(study, name, own) for name, own in labels.items()])
-    of_pair = data.p_holm.notna()
-    others = holm(data.p.mask(of_pair).tolist())
-    data = data.assign(p_holm=data.p_holm.where(of_pair, others)).reset_index(drop=True)
+    data = pd.concat([_rows(study, name, own) for name, own in labels.items()], ignore_index=True)
     # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
     width = style.column_width(0.5 + 0.58 * sum(counts))
@@ -85,13 +82,7 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     rows: list[dict[str, Any]] = [
         {"task": task, "method": "initial", "reward": initial, "published": published}
     ]
-    adjusted = {
-        (row.first, row.second): row.p_holm
-        for row in study.pair_rows
-        if (row.task, row.kind) == (task, "conditions")
-    }
     before: Any = initial
-    left = ""
     for label in labels:
         cell = solved(study, task, label)
         rewards, paper = cell.rewards, published_of(cell)
@@ -110,11 +101,10 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
                 "published_low": centre - half,
                 "published_high": centre + half,
                 "p": bootstrap_test(rewards, before, seed=SEED).p,
-                "p_holm": adjusted.get((label, left), math.nan),
             }
         )
-        before, left = rewards, label
-    columns = "task method runs reward low high published published_low published_high p p_holm"
+        before = rewards
+    columns = "task method runs reward low high published published_low published_high p"
     return pd.DataFrame(rows, columns=columns.split())
 
 
@@ -173,7 +163,7 @@ def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     bottom = min(rows[["reward", "published"]].min().min(), *(min(r) for r in runs.values()))
     step = 0.055 * max(max(tops) - bottom, 1.0)  # tick; nothing learned by anyone
     level = -math.inf
-    for place, p in enumerate(rows.p_holm.tolist()[1:], 1):
+    for place, p in enumerate(rows.p.tolist()[1:], 1):
         level = max(tops[place - 1], tops[place], level) + 1.6 * step
         left, right, foot = place - 0.95, place - 0.05, level - 0.4 * step
         ends = [left, left, right, right], [foot, level, level, foot]

@@ -24,7 +24,7 @@ from coartic.readings import condition_under, load_readings
 from coartic.tables import variant_of
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
-PAPERS = tuple(claim for claim in CLAIMS if claim.place)
+PAPERS = tuple(claim for claim in CLAIMS if claim.rule != "measured")
 VERDICTS = ("supported", "not supported", "cannot tell")
 
 
@@ -104,7 +104,7 @@ def judged_specifications(
     Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
     ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. Of
     a member are the claims that some member's runs can judge; where another's cannot, it *cannot
-    tell*. p-values are not corrected: how many claims a folder can judge depends on it.
+    tell*. Verdicts are the register's, corrected over its families; ``p`` is not corrected.
     """
     claims, rows = tuple(claims), []
     known: set[tuple[str, str]] = set()
@@ -114,10 +114,9 @@ def judged_specifications(
                 seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id
             )
             for judged in judge(seen, claims):
-                alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
                 if own.intersection(judged.run_ids):
                     known.add((spec.task, judged.claim.id))
-                rows.append(dict(_row(spec, alone)))
+                rows.append(dict(_row(spec, judged)))
             progress(spec)
     kept = [row for row in rows if (row["task"], row["claim"]) in known]
     return pd.DataFrame(kept, columns=list(COLUMNS))

@@ -14,7 +14,7 @@ def other(hand: Hand) -> Hand:
     return "right" if hand == "left" else "left"
 
 
-def preshaping(path: Trajectory, initial: Execution) -> Array:
+def readiness(path: Trajectory, initial: Execution) -> Array:
     """How much nearer the other hand is to its next goal than in the initial solution.
 
     1 - d/d_initial, shape ``(G,)``: d is the distance of the hand that is not chosen to the
@@ -27,15 +27,15 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
     return _nearer(path, initial, path.execution.configurations)
 
 
-def preshaping_from_base(path: Trajectory, initial: Execution) -> Array:
-    """The part of :func:`preshaping` that lies in the arm's joints, shape ``(G,)``.
+def readiness_from_base(path: Trajectory, initial: Execution) -> Array:
+    """The part of :func:`readiness` that lies in the arm's joints, shape ``(G,)``.
 
     1 - d/d_initial, where d is the distance of the waiting hand to its next goal if the base
     were where it is in ``initial`` at that moment, with the joint angles of the arm as they
     are. -∞ to 1: 0 where the arm's joints are as in the initial solution, whatever the base
-    does; all of the preshaping where the base is as in the initial solution; 1: the arm alone
+    does; all of the readiness where the base is as in the initial solution; 1: the arm alone
     would be there already. The rest takes a base that moved otherwise. A posture that the
-    arm's own last hit left counts as well; :func:`preshaping_since_hit` leaves it out. NaN
+    arm's own last hit left counts as well; :func:`preshaping` leaves it out. NaN
     where the other hand hits no later goal.
     """
     moved = np.array(path.execution.configurations)
@@ -43,13 +43,13 @@ def preshaping_from_base(path: Trajectory, initial: Execution) -> Array:
     return _nearer(path, initial, moved)
 
 
-def preshaping_since_hit(path: Trajectory, initial: Execution) -> Array:
-    """The part of :func:`preshaping` that the arm does while it waits, shape ``(G,)``.
+def preshaping(path: Trajectory, initial: Execution) -> Array:
+    """The part of :func:`readiness` that the arm does while it waits, shape ``(G,)``.
 
     (d_held - d)/d_initial, where d_held is the distance if the arm had kept its joints since
     its own last hit (since the start, before any), with the base where it is. Length per
     length, -∞ to ∞: 0 where the arm keeps still, whatever the base does (always under the
-    exploration conditions 1 to 3); all of the preshaping where only the arm's waiting differs
+    exploration conditions 1 to 3); all of the readiness where only the arm's waiting differs
     from the initial solution. NaN where the other hand hits no later goal.
     """
     held = np.array(path.execution.configurations)
@@ -58,7 +58,7 @@ def preshaping_since_hit(path: Trajectory, initial: Execution) -> Array:
         own_last[hand] = row.copy()
         joints = path.task.robot.joints(other(hand))
         row[joints] = own_last[other(hand)][joints]
-    return preshaping(path, initial) - _nearer(path, initial, held)
+    return readiness(path, initial) - _nearer(path, initial, held)
 
 
 def _nearer(path: Trajectory, initial: Execution, configurations: Array) -> Array:

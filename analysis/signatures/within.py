@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.signatures.manifold import jacobian_of, synergy
 from analysis.signatures.other_arm import (
     preshaping,
-    preshaping_from_base,
-    preshaping_since_hit,
+    readiness,
+    readiness_from_base,
     travel,
 )
 from analysis.signatures.paths import reversals_of, smoothness, turning_angles
@@ -121,9 +121,9 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
 
 
 @of_two_hands
-def preshapings(cell: Trajectories, *signatures: Signature) -> Rows:
-    """All preshaping, that seen from the base, that since the last hit; but at the last goal."""
-    measures = (preshaping, preshaping_from_base, preshaping_since_hit)
+def readiness_of_the_other_hand(cell: Trajectories, *signatures: Signature) -> Rows:
+    """Readiness, that seen from the base, and preshaping; but at the last goal."""
+    measures = (readiness, readiness_from_base, preshaping)
     if (initial := cell.initial) is None:
         yield from without(signatures, NO_INITIAL)
         return

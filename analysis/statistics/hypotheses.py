@@ -36,6 +36,8 @@ _TAILS = {
     "two-sided": "two-tailed",
 }
 _IN_MEMORY = 1 << 22  # values that are drawn at once
+MOST_TABLES = 1_000_000
+"""Tables of counts up to which Fisher's test enumerates them."""
 
 
 def bootstrap_test(
@@ -153,42 +155,41 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     )
 
 
-def exact_independence_test(first: Sequence[int], second: Sequence[int]) -> Inference:
+def independence_test(first: Sequence[int], second: Sequence[int], *, seed: int) -> Inference:
     """Fisher's exact test that two rows of counts share one distribution over categories.
 
     Freeman & Halton (1951), Biometrika 38, 141: p is the probability, given the margins, of all
-    tables that are no likelier than the one seen, by enumeration; two rows of 20 take no time.
-    The estimate is the total variation distance of the two shares, 0 to 1. Raises ValueError for
-    rows of different length, or one without counts.
+    tables that are no likelier than the one seen, by enumeration in integers where there are no
+    more than :data:`MOST_TABLES`, else of those that are drawn. The estimate is the total
+    variation distance of the two shares, 0 to 1. Raises ValueError for rows of different length,
+    or one without counts.
     """
     rows = np.array([first, second])
-    (n, m), columns = rows.sum(axis=1).tolist(), rows.sum(axis=0).tolist()
+    n, m = rows.sum(axis=1).tolist()
     if min(n, m) < 1:
         raise ValueError("a row has no counts")
-    # Ways to fill a row with n of the columns' counts, each table's own: products of binomials.
-    tables = {0: [0.0]}
-    seen = 0.0
-    for count, own in zip(columns, rows[0].tolist(), strict=True):
-        ways = [_log_choose(count, k) for k in range(count + 1)]
-        seen += ways[own]
-        filled: dict[int, list[float]] = {}
-        for used, logs in tables.items():
-            for k in range(min(count, n - used) + 1):
-                filled.setdefault(used + k, []).extend(log + ways[k] for log in logs)
-        tables = filled
-    likely = np.array(tables[n])
-    extreme = likely[likely <= seen + 1e-7]
-    shares = rows / rows.sum(axis=1, keepdims=True)
-    return Inference(
-        float(np.abs(shares[0] - shares[1]).sum() / 2),
-        (n, m),
-        "Fisher's exact test",
-        p=min(1.0, float(np.exp(extreme - _log_choose(n + m, n)).sum())),
+    found = Inference(
+        float(np.abs(rows[0] / n - rows[1] / m).sum() / 2), (n, m), "Fisher's exact test"
     )
-
-
-def _log_choose(n: int, k: int) -> float:
-    return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
+    *columns, (last, own) = sorted(zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True))
+    if math.prod(count + 1 for count, _ in columns) > MOST_TABLES:
+        method = stats.MonteCarloMethod(rng=np.random.default_rng(seed))
+        p = float(stats.fisher_exact(rows, method=method).pvalue)
+        return replace(found, method=f"{found.method}, Monte Carlo", p=p, seed=seed)
+    # Ways to choose the first row's runs, by how many it has of the columns so far.
+    ways, seen = {0: [1]}, math.comb(last, own)
+    for count, mine in columns:
+        seen *= math.comb(count, mine)
+        so_far, ways = ways, {}
+        for used, products in so_far.items():
+            for k in range(min(count, n - used) + 1):
+                factor = math.comb(count, k)
+                ways.setdefault(used + k, []).extend(factor * product for product in products)
+    extreme = 0
+    for used, products in ways.items():
+        factor = math.comb(last, n - used)
+        extreme += sum(w for w in (factor * product for product in products) if w <= seen)
+    return replace(found, p=extreme / math.comb(n + m, n))
 
 
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:

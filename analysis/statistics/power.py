@@ -18,10 +18,12 @@ from analysis.statistics.estimates import LEVEL
 POWER = 0.8
 
 
-def power(difference: float, first_sd: float, second_sd: float, runs: int) -> float:
+def power(
+    difference: float, first_sd: float, second_sd: float, runs: int, level: float = LEVEL
+) -> float:
     """P(a t-test with ``runs`` runs of each sample finds a true difference of means).
 
-    One-tailed at :data:`~analysis.statistics.estimates.LEVEL`, as the paper tests: the sign of
+    One-tailed at ``level``, as the paper tests: the sign of
     ``difference`` is the one expected. For pairs, or one sample against a known value, the SD of
     the differences is ``first_sd`` and ``second_sd`` is 0. Without any spread every difference
     but 0 is found. Raises ValueError for a negative SD or fewer than 2 runs.
@@ -34,7 +36,7 @@ def power(difference: float, first_sd: float, second_sd: float, runs: int) -> fl
         return float(difference != 0)
     freedom = (runs - 1) * total**2 / sum(variance**2 for variance in variances)
     shift = abs(difference) * math.sqrt(runs / total)
-    return float(stats.nct.sf(special.stdtrit(freedom, 1 - LEVEL), freedom, shift))
+    return float(stats.nct.sf(special.stdtrit(freedom, 1 - level), freedom, shift))
 
 
 def runs_needed(difference: float, first_sd: float, second_sd: float) -> int:
@@ -54,7 +56,9 @@ def runs_needed(difference: float, first_sd: float, second_sd: float) -> int:
     return bisect_left(range(most), True, lo=max(2, most // 2), key=enough)
 
 
-def smallest_difference(first_sd: float, second_sd: float, runs: int) -> float:
+def smallest_difference(
+    first_sd: float, second_sd: float, runs: int, level: float = LEVEL
+) -> float:
     """Smallest true difference of means that is found with a power of :data:`POWER`, > 0.
 
     In the unit of the SDs; 0 without any spread, where every difference is found. Raises
@@ -65,7 +69,7 @@ def smallest_difference(first_sd: float, second_sd: float, runs: int) -> float:
         return 0.0
 
     def excess(difference: float) -> float:
-        return power(difference, first_sd, second_sd, runs) - POWER
+        return power(difference, first_sd, second_sd, runs, level) - POWER
 
     most = scale
     while excess(most) < 0:

@@ -44,7 +44,7 @@ def comparisons_document(study: Study) -> Document:
 
 
 def outcome(rows: Sequence[PairRow]) -> Iterator[str]:
-    """What the tests of one task tell apart at 5 %, adjusted, for each condition."""
+    """What the tests of one task tell apart at 5 %, for each condition."""
     tested = [row for row in rows if not math.isnan(row.p) and row.kind != "conditions"]
     least = min(map(_least_p, tested), default=0.0) * len(tested)
     if least > LEVEL:
@@ -70,9 +70,10 @@ _VERDICTS = _HIGHER, _LOWER, _NOT_APART, _UNTESTED = (
 
 
 def _verdict(row: PairRow) -> str:
-    if math.isnan(row.p_holm):
+    p = row.p if row.kind == "conditions" else row.p_holm
+    if math.isnan(p):
         return _UNTESTED
-    if row.p_holm >= LEVEL:
+    if p >= LEVEL:
         return _NOT_APART
     return _HIGHER if row.difference > 0 else _LOWER
 
@@ -166,8 +167,7 @@ def _pairs(study: Study, task: str, layout: Layout, **facts: str) -> DataTable |
     for pair in pairs:
         cells = (task, pair.first), (task, pair.second)
         row = layout.row(f"{pair.first} - {pair.second}", pair, cells)
-        family = "conditions" if pair.kind == "conditions" else "others"  # of Holm's correction
-        rows.append(replace(row, family=family))
+        rows.append(replace(row, family="conditions" * (pair.kind == "conditions")))
     failed = escaped(", ".join(_failed(pairs)))
     notes = (f"Runs without a solution are left out: {failed}.",) if failed else ()
     return layout.table(rows, table_ids(study)[task], notes=notes, task=escaped(task), **facts)
