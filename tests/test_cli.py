@@ -45,7 +45,7 @@ def test_run_paper(monkeypatch, capsys, tmp_path):
         "methods.csv",
     }
     page = (out / "comparison.md").read_text(encoding="utf-8")
-    for words in ("| −303 | 2.9 | 20 |", "| −319 | −319 |", "*Reconstructed.*", "LRLR −533"):
+    for words in ("| −303 | 2.9 | 20 |", "| −319 | −319 |", "*Reconstructed.*", "LRLR −532"):
         assert words in page
     assert "*Trials.* The paper's runs have 10000 trials" in page  # here 60
     assert "−303 ± 2.9" in text

@@ -381,13 +381,13 @@ def test_corrective_alone_as_a_method(tmp_path):
     cells = paper_cells(methods=["corrective-alone/given", "corrective-alone/every"])
     found = run_and_write(tmp_path, cells).runs
     by_cell = found.set_index(["task", "method"]).reward
-    assert by_cell["two-armed-1", "corrective-alone/given"] == -671
-    assert by_cell["two-armed-1", "corrective-alone/every"] == -533
+    assert by_cell["two-armed-1", "corrective-alone/given"] == -675
+    assert by_cell["two-armed-1", "corrective-alone/every"] == -532
     assert by_cell["ascending", "corrective-alone/every"] == -319
     spent = found.set_index(["task", "method"])
     assert spent.trials["two-armed-1", "corrective-alone/every"] == 16
     assert spent.trials["two-armed-1", "corrective-alone/given"] == 1
-    assert spent.movement_ticks["two-armed-1", "corrective-alone/given"] == 671
+    assert spent.movement_ticks["two-armed-1", "corrective-alone/given"] == 675
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):

@@ -166,7 +166,7 @@ def test_initial_hand_policies():
     task = parse_task(content, "x")
     assert initial_hands(task) == "LRLR"
     assert initial_hands(task, ("right",)) == "RRRR"
-    assert corrective_trial(task, "LRLR").reward == -533
+    assert corrective_trial(task, "LRLR").reward == -532
 
 
 def test_policies_with_many_goals():
