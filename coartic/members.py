@@ -2,8 +2,8 @@
 
 ``tasks/members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
 (made by ``coartic reconstruct``; docs/reconstruction.md). A member is a task by the name
-``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one nearest to what is printed, v0.1
-the task as it is shipped.
+``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one nearest to what is printed, and the
+task itself; v0.1 is what the task was in the first release.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from analysis.figures.robot import MARKERS, box
+from analysis.figures.robot import MARKERS, box, numbered_below
 from coartic import CoarticError, Trajectory
 from coartic.files import check_outputs, write_outputs
 
@@ -185,10 +185,15 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        above: Any = {"textcoords": "offset points", "ha": "center", "va": "bottom"}
-        for number, (x, y) in enumerate(panel.trajectory.task.goals, 1):
-            end = x, y + panel.trajectory.task.radius
-            axes.annotate(str(number), end, (0, 3), fontsize=9, **above)
+        task = panel.trajectory.task
+        for number, ((x, y), below) in enumerate(
+            zip(task.goals, numbered_below(task), strict=True), 1
+        ):
+            side = -1 if below else 1
+            axes.annotate(
+                str(number), (x, y + side * task.radius), (0, 3 * side), fontsize=9,
+                textcoords="offset points", ha="center", va="top" if below else "bottom",
+            )  # fmt: skip
         axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
         axes.tick_params(labelsize=8)
         axes.spines[["top", "right"]].set_visible(False)

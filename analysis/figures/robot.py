@@ -41,19 +41,32 @@ def draw_robot(
         axes.plot(*joints, color=color, linewidth=0.9, markeredgewidth=0.7, **style)
 
 
+_CROWDED = 0.6  # length unit: a goal that near above another has its number
+
+
+def numbered_below(task: Task) -> list[bool]:
+    """Whether a goal's number goes below it, since another goal is close above."""
+    goals = task.goal_array
+    right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
+    close = (np.abs(right) < _CROWDED / 2) & (up > 0) & (up < _CROWDED)
+    return [bool(near) for near in close.any(axis=1)]
+
+
 def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
-    """Draw every goal as an open circle of its radius with its number above.
+    """Draw every goal as an open circle of its radius with its number above, or below.
 
     With ``current``, a goal's number from 1, the others are grey.
     """
     for index, (x, y) in enumerate(task.goals, 1):
+        side = -1 if numbered_below(task)[index - 1] else 1
         color = INK if current in (None, index) else GREY
         axes.add_patch(
             Circle((x, y), task.radius, fill=False, edgecolor=color, linewidth=0.7, zorder=3)
         )
         axes.annotate(
-            str(index), (x, y + task.radius), (0, 1.5), textcoords="offset points",
-            ha="center", va="bottom", color=color, zorder=4,
+            str(index), (x, y + side * task.radius), (0, 1.5 * side),
+            textcoords="offset points", ha="center", va="bottom" if side > 0 else "top",
+            color=color, zorder=4,
             bbox={"boxstyle": "square,pad=0", "facecolor": PAPER, "alpha": 0.8, "linewidth": 0},
         )  # fmt: skip
 

@@ -135,7 +135,7 @@ class Panel {
   }
 
   draw() {
-    const { box, goals, radius, hands } = this.task;
+    const { box, goals, radius, below, hands } = this.task;
     const [left, bottom, right, top] = box;
     const size = Math.max(right - left, top - bottom);
     this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
@@ -157,7 +157,8 @@ class Panel {
     });
     this.half = size / 92;
     goals.forEach(([x, y], k) => element("svg:text", {
-      x, y: -y - radius - size / 90, class: "number", "font-size": size / 26, text: k + 1,
+      x, y: -y + (below[k] ? radius + size / 90 + size / 36 : -radius - size / 90),
+      class: "number", "font-size": size / 26, text: k + 1,
     }, this.svg));
   }
 

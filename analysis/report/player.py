@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.figures.robot import numbered_below
 from analysis.report.document import CellKey
 from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
@@ -121,6 +122,7 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
         "label": task.label,
         "goals": task.goal_array.tolist(),
         "radius": task.radius,
+        "below": numbered_below(task),
         "hands": list(task.hands),
         "robot": {
             "base": list(task.robot.base_size),
