@@ -6,6 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from analysis.claims.data import Data
@@ -19,7 +21,7 @@ from analysis.statistics.estimates import (
     difference_of_means,
     probability_of_improvement,
 )
-from analysis.statistics.hypotheses import share_test
+from analysis.statistics.hypotheses import Alternative, share_p, share_test
 from analysis.words import interval, tally
 from coartic.robot import Array
 
@@ -158,11 +160,10 @@ def _share(data: Data, claim: Claim) -> Finding:
     return nearly_all(f"{words} ({tally(found)})", count, found.total(), rule)
 
 
-def half_p(count: int, total: int) -> float:
+def half_p(count: ArrayLike, total: int) -> Array:
     """p that a share lies between :data:`FEW` and :data:`MOST`: the larger of two exact tests."""
-    return max(
-        share_test(count, total, FEW, "greater").p, share_test(count, total, MOST, "less").p
-    )
+    bounds: tuple[tuple[float, Alternative], ...] = (FEW, "greater"), (MOST, "less")
+    return np.maximum(*(share_p(count, total, bound, side) for bound, side in bounds))
 
 
 def unlike_p(ours: tuple[int, int], printed: tuple[int, int]) -> float:
@@ -194,7 +195,7 @@ def _about(data: Data, claim: Claim) -> Finding:
                 min(share - FEW, MOST - share),
                 (total,),
                 f"two one-tailed exact binomial tests, {FEW:.0%} and {MOST:.0%}",
-                p=half_p(count, total),
+                p=float(half_p(count, total)),
             ),
         ),
         (
