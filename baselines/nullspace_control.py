@@ -90,7 +90,8 @@ class Controller:
 
         Raises StuckError where it does not get there, CascadeError where a solver fails.
         """
-        short = self.task.beyond_reach(hand, self.task.goals[goal])
+        accuracy = self.session.model.correction_tolerance
+        short = self.task.beyond_reach(hand, self.task.goals[goal], accuracy)
         if short > self.task.radius:
             raise StuckError(
                 f"goal {goal + 1}: the {hand} hand ends {short:.3g} short of it with the base "

@@ -273,7 +273,8 @@ def path_movements(
         made.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
         steps = np.diff(np.vstack([here, ahead]), axis=0)
         ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
-        here, rest = found.q, ahead[ends > (found.ticks - 1) * session.model.step]
+        steps_made = found.ticks - session.model.arrival_tick
+        here, rest = found.q, ahead[ends > steps_made * session.model.step]
     return made
 
 

@@ -34,6 +34,7 @@ from coartic import (
 )
 from coartic.method import METERED
 from coartic.record import Record
+from coartic.task import checked_task
 from coartic.text import counted, plain
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
@@ -308,8 +309,8 @@ class _TaskChecks:
 
     def solvable(self) -> str:
         try:
-            hands = initial_hands(self.task)
-        except NotApplicableError as error:
+            hands = initial_hands(checked_task(self.task))
+        except (NotApplicableError, TaskError) as error:
             raise _BrokenError(str(error)) from None
         execution = corrective_trial(self.task, hands)
         if not execution.completed:

@@ -31,6 +31,7 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.families import named_by
 from coartic.inputs import (
     MOST_CELLS,
     MOST_PLANNED,
@@ -43,7 +44,6 @@ from coartic.inputs import (
 )
 from coartic.learning import METHOD_PREFIX
 from coartic.members import members
-from coartic.model import MotionModel, checked_model
 from coartic.readings import ChosenReading, condition_under, model_under, task_under
 from coartic.record import run_seeds
 from coartic.robot import Finite
@@ -57,7 +57,7 @@ from coartic.tables import (
     trials_in,
     variant_of,
 )
-from coartic.task import LONGEST_NAME, NAME_PATTERN
+from coartic.task import LONGEST_NAME, NAME_PATTERN, address_of, checked_task
 from coartic.text import Line, plain
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -147,15 +147,22 @@ class _Block(BaseModel):
     def tasks_among(self, own: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
 
-        ``TASK-*`` are the members of a task (:mod:`coartic.members`).
+        ``TASK-*`` are the members of a task (:mod:`coartic.members`), ``FAMILY/v1/i000..i039``
+        instances of a family (:mod:`coartic.families`).
         """
         every = [*builtin_tasks(), *own]
-        names = [every if name == ALL else _members_or(name) for name in self.tasks]
-        return list(dict.fromkeys(itertools.chain(*names)))
+        names: dict[str, None] = {}
+        for name in dict.fromkeys(self.tasks):
+            names |= dict.fromkeys(every if name == ALL else _each_of(name))
+            if len(names) > MOST_CELLS:  # which is said where all blocks are counted
+                break
+        return list(names)
 
 
-def _members_or(name: str) -> list[str]:
-    return list(members(name.removesuffix(_MEMBERS))) if name.endswith(_MEMBERS) else [name]
+def _each_of(name: str) -> list[str]:
+    if name.endswith(_MEMBERS):
+        return list(members(name.removesuffix(_MEMBERS)))
+    return named_by(name)
 
 
 class Suite(BaseModel):
@@ -254,13 +261,21 @@ def select_cells(
 
     A method of ``methods`` that the suite does not have runs on all of the suite's
     tasks that it applies to. A task from a file runs under every applicable method of
-    ``methods``, or of all methods of the suite where none are named. Raises CoarticError
+    ``methods``, or of all methods of the suite where none are named; so does an instance of a
+    family that ``tasks`` names, alone or in a range, and the suite does not. Raises CoarticError
     for unknown names, for a task file whose name is taken, for parameters that a method
     does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
     by one name, and where nothing is left to run.
     """
     methods = [_full_name(name, known) for name in methods]
+    tasks = list(itertools.chain(*map(named_by, tasks)))
     own = _own_tasks(task_files)
+    there = {name for block in suite.cells for name in block.tasks_among(own)}
+    own |= {
+        name: load_task(name)
+        for name in tasks
+        if address_of(name) and name not in there | set(own)
+    }
     _check_size(suite, known, own)
     cells = [cell for block in suite.cells for cell in _block_cells(suite, block, known, own)]
     added, refused = _added_cells(cells, known, methods, own)
@@ -410,7 +425,7 @@ def cell_plans(
     model, read = model_under(chosen), condition_under(chosen)
     for cell in cells:
         cell = replace(cell, task=task_under(chosen, cell.task))
-        _check_model(cell.task, model)
+        checked_task(cell.task, model)
         parameters = {k: v for k, v in read.items() if k in cell.defaults} | dict(cell.parameters)
         cell = replace(cell, parameters=tuple(parameters.items()))
         if trials is not None and "trials" in cell.defaults:
@@ -432,13 +447,6 @@ def cell_plans(
             )
         plans.append(plan)
     return plans
-
-
-def _check_model(task: Task, model: MotionModel) -> None:
-    try:
-        checked_model(model, radius=task.radius)
-    except ValueError as error:
-        raise CoarticError(f"task {task.name!r}: {error}") from None
 
 
 def _block_cells(

@@ -37,14 +37,17 @@ PACKAGE = Path(__file__).parent
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-# Modules that no result passes through: they say or show it, or repeat it slowly.
+# Modules that no result passes through: they say or show it, repeat it slowly, or make tasks,
+# which a run's specification holds whole.
 _PRESENTATION = {
     "__init__.py",
     "__main__.py",
+    "families.py",
     "files.py",
     "rows.py",
     "inputs.py",
     "packs.py",
+    "philox.py",
     "codec.py",
     "record.py",
     "scores.py",

@@ -69,6 +69,13 @@ class BiasedParameters(DualProcessParameters):
     """Mean of η along the suggested direction, in SDs of η."""
 
 
+class SubtaskParameters(DualProcessParameters):
+    """Of the variants that learn from the reward of each subtask."""
+
+    discount: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """γ of the return from a goal on; 0 is the reward of its own subtask alone."""
+
+
 class DualProcess(Method):
     """Trial and error over the corrective process (paper, Figure 3)."""
 
@@ -152,6 +159,8 @@ def _told(condition: ExplorationCondition) -> frozenset[Information]:
         told |= {Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN}
     if condition.nullspace_gain:
         told |= {Information.SECONDARY_OBJECTIVES}
+    if condition.credit == "subtask":
+        told |= {Information.REWARD_BY_SUBTASK}
     return frozenset(told)
 
 
@@ -170,6 +179,13 @@ def _method(condition: ExplorationCondition) -> type[DualProcess]:
         citation += (
             " Bias, after J. C. Spall (2003). Introduction to Stochastic Search and "
             "Optimization. Wiley."
+        )
+    elif condition.credit == "subtask":
+        parameters = SubtaskParameters
+        citation += (
+            " Reward of subtasks, after T. G. Dietterich (2000). Hierarchical reinforcement "
+            "learning with the MAXQ value function decomposition. Journal of Artificial "
+            "Intelligence Research."
         )
     number, _, variant = condition.id[2:].partition("-")
     return type(

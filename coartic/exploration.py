@@ -7,7 +7,8 @@ The learner reads these fields; it has no code of its own for any condition.
 Variants go beyond the paper. Two integrate informed search as its Discussion proposes:
 a secondary objective in the nullspace of the corrective process, and noise whose mean
 lies in the direction that the corrective process suggests. One takes the corrective
-process away. What each does to learning is measured in docs/model.md.
+process away, one learns from the reward of each subtask in place of the overall one, which
+the paper calls crucial. What each does to learning is measured in docs/model.md.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ FirstTrial = Literal["learns", "forgotten"]
 UnknownTarget = Literal["corrects", "explores"]
 Update = Literal["greater", "not-less"]
 Learned = Literal["best", "replay"]
+Credit = Literal["overall", "subtask"]
 State = Literal["previous-hand", "goal"]
 
 
@@ -66,6 +68,13 @@ class ExplorationCondition:
     learned: Learned = "best"
     """What is learned in the end: the best trial, or the noiseless replay after the last."""
 
+    credit: Credit = "overall"
+    """What Q(s, a) of a goal stands for: the reward R of the whole trial, or the return from
+    that goal on, the reward of its own subtask first."""
+    discount: float = 0.0
+    """γ, 0 to 1: the return is r_g + γ r_{g+1} + γ² r_{g+2} + …, with r_g the reward of the
+    movements to goal g. 0 is the reward of the subtask alone. With credit "subtask" only."""
+
     def __post_init__(self) -> None:
         if not self.hands or any(hand not in HANDS for hand in self.hands):
             raise ValueError(f"hands {self.hands!r}: name 'left', 'right' or both")
@@ -77,12 +86,19 @@ class ExplorationCondition:
             raise ValueError(f"nullspace_gain {self.nullspace_gain} is not within 0 to 1")
         if not 0.0 <= self.bias < float("inf"):
             raise ValueError(f"bias {self.bias} is not a finite number >= 0")
+        if not 0.0 <= self.discount <= 1.0:
+            raise ValueError(f"discount {self.discount} is not within 0 to 1")
         for name, options in _CHOICES.items():
             if getattr(self, name) not in options:
                 *others, last = map(repr, options)
                 raise ValueError(
                     f"{name} {getattr(self, name)!r}: it is {', '.join(others)} or {last}"
                 )
+        if self.discount and self.credit == "overall":
+            raise ValueError(
+                f"discount {self.discount}: the overall reward is not discounted; it takes "
+                "credit 'subtask'"
+            )
 
     def why_not(self, task: Task) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
@@ -129,6 +145,7 @@ def _variants(base: str) -> tuple[ExplorationCondition, ...]:
         replace(plain, id=f"{base}-nullspace", nullspace_gain=NULLSPACE_GAIN),
         replace(plain, id=f"{base}-biased", bias=BIAS),
         replace(plain, id=f"{base}-uncorrected", corrects=False),
+        replace(plain, id=f"{base}-subtask", credit="subtask"),
     )
 
 

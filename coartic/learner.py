@@ -3,7 +3,8 @@
 The paper's section *The Learning Process* and Figure 3. Per trial and goal: choose a
 hand, perturb the stored target configuration, move, and let the corrective process
 finish where the goal was missed. A trial better than any before it that passed
-through the same state and hand replaces what is stored there.
+through the same state and hand replaces what is stored there; better by its whole reward,
+or, in a variant, by the return from that goal on.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
 trial (:mod:`coartic.learning` makes it). Each draws from a NumPy generator of its own
@@ -55,6 +56,8 @@ class Rules(NamedTuple):
     explores_unknown: bool
     update_equal: bool
     goal_alone: bool
+    by_subtask: bool
+    discount: float
 
 
 class Tables(NamedTuple):
@@ -111,7 +114,8 @@ class Work(NamedTuple):
     target: Any  # (N, dof) where it is to go
     hand: Any  # (N,) chosen for this goal
     previous: Any  # (N,) hand of the goal before
-    known: Any  # (N,) whether the hand has a learned target
+    stored: Any  # (N,) whether the hand has a stored target
+    aimed: Any  # (N,) whether it moves to a target of its own before A acts
     going: Any  # (N,) whether the trial has not failed
     acting: Any  # (N,) whether the run is among those that are moved or corrected next
     total: Any  # (N,) ticks of the trial
@@ -148,6 +152,8 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         explores_unknown=condition.unknown_target == "explores",
         update_equal=condition.update == "not-less",
         goal_alone=condition.state == "goal",
+        by_subtask=condition.credit == "subtask",
+        discount=float(condition.discount),
     )
 
 
@@ -178,13 +184,14 @@ def work_for(runs: int, task: Task) -> Work:
         raise ValueError(f"{runs} runs at once; there are {LANES} lanes")
     q, target = np.zeros((2, runs, task.robot.dof))
     hand, previous, total = np.zeros((3, runs), dtype=np.int64)
-    known, going, acting = np.zeros((3, runs), dtype=np.bool_)
+    stored, aimed, going, acting = np.zeros((4, runs), dtype=np.bool_)
     return Work(
         q=q,
         target=target,
         hand=hand,
         previous=previous,
-        known=known,
+        stored=stored,
+        aimed=aimed,
         going=going,
         acting=acting,
         total=total,
@@ -256,6 +263,12 @@ def _untied(run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any
 
 
 @inlined
+def _before(run: int, rules: Any, work: Any) -> int:
+    """What the tables know of the goal before: its hand, or nothing."""
+    return NO_HAND if rules.goal_alone else int(work.previous[run])
+
+
+@inlined
 def _choose_hands(
     number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
@@ -272,7 +285,7 @@ def _choose_hands(
                 else:
                     hand = _closest_hand(run, number, problem, rules, rng, work)
         if hand < 0:
-            values = tables.value[run, number, work.previous[run]]
+            values = tables.value[run, number, _before(run, rules, work)]
             hand = _greedy(values, rules.hands)
             if rules.ties != 0 and _equal(values, rules.hands):
                 hand = _untied(run, number, problem, rules, generator_at(rngs, run), work)
@@ -307,13 +320,13 @@ def _aim(
         work.acting[run] = False
         if not work.going[run]:
             continue
-        hand, previous = work.hand[run], work.previous[run]
-        stored = tables.target[run, number, previous, hand]
-        work.known[run] = tables.value[run, number, previous, hand] > -math.inf
-        if not work.known[run] and rules.explores_unknown and explore and not first:
-            work.known[run] = True
+        hand, before = work.hand[run], _before(run, rules, work)
+        stored = tables.target[run, number, before, hand]
+        work.stored[run] = work.aimed[run] = tables.value[run, number, before, hand] > -math.inf
+        if not work.stored[run] and rules.explores_unknown and explore and not first:
+            work.aimed[run] = True
             stored = work.q[run]
-        if not work.known[run]:
+        if not work.aimed[run]:
             distance = _goal_distance(run, number, hand, problem, work)
             work.ends.hit[run] = distance <= problem.radius
             continue
@@ -374,9 +387,9 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
         if not work.going[run]:
             continue
         if ends.hit[run]:
-            if not work.known[run]:
+            if not work.aimed[run]:
                 _record(log, run, number, work.hand[run], CORRECTIVE, 0, work.q[run])
-        elif work.known[run] and not rules.corrects:
+        elif work.stored[run] and not rules.corrects:
             work.counts[run, COUNT.failed] += 1
             work.going[run] = False
         else:
@@ -428,21 +441,30 @@ def _trial(
             if work.going[run]:
                 log.hands[run, number] = work.hand[run]
                 fill_row(log.reached[run, number], work.q[run])
-                work.previous[run] = NO_HAND if rules.goal_alone else work.hand[run]
+                work.previous[run] = work.hand[run]
     for run in range(len(work.q)):
         work.counts[run, COUNT.evaluations] += work.ends.evaluations[run]
 
 
 @inlined
 def _update(run: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
-    previous = NO_HAND
-    for number in range(log.hands.shape[1]):
+    """Credit what was visited with the reward of the trial, or each goal with its return."""
+    row = log.count[run]
+    later = 0.0
+    for number in range(log.hands.shape[1] - 1, -1, -1):
+        credit = reward
+        if rules.by_subtask:
+            ticks = 0
+            while row > 0 and log.goal[run, row - 1] == number:
+                row -= 1
+                ticks += log.ticks[run, row]
+            credit = later = rules.discount * later - ticks
         hand = log.hands[run, number]
-        value = tables.value[run, number, previous, hand]
-        if reward > value or (rules.update_equal and reward == value):
-            tables.value[run, number, previous, hand] = reward
-            fill_row(tables.target[run, number, previous, hand], log.reached[run, number])
-        previous = NO_HAND if rules.goal_alone else hand
+        before = log.hands[run, number - 1] if number > 0 and not rules.goal_alone else NO_HAND
+        value = tables.value[run, number, before, hand]
+        if credit > value or (rules.update_equal and credit == value):
+            tables.value[run, number, before, hand] = credit
+            fill_row(tables.target[run, number, before, hand], log.reached[run, number])
 
 
 @inlined

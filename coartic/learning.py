@@ -84,7 +84,8 @@ class LearningRun:
     """Movements of one noiseless greedy trial with the final tables."""
     replay_completed: bool
     values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand."""
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Ticks: total
+    rewards, or returns from that goal on where the condition credits subtasks."""
     targets: Array
     """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
     counters: Counters
@@ -134,8 +135,10 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Learned reward: the highest total reward of any trial, max Q of state 1; that of
-        the replay where the condition says so."""
+        """Learned reward: the highest total reward of any trial, which is max Q of state 1 if
+        trial 0 learns and the overall reward is credited; that of the replay where the condition
+        says so. Where subtasks are credited, what the tables lead to is the replay
+        (:attr:`replay_reward`): the best trial is one that noise made good."""
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])

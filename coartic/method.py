@@ -41,6 +41,8 @@ class Information(StrEnum):
     """A configuration that hits a goal, found by **A**; **A** knows goal and Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
     """The total reward of a trial, after making it."""
+    REWARD_BY_SUBTASK = "reward by subtask"
+    """What each goal of a trial added to its total reward, after making it."""
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
     REWARD_FORMULA = "reward as a formula"

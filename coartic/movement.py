@@ -285,13 +285,16 @@ def follow(
     The k-th point lies at arc length ``k m`` of the polyline from ``q`` through the
     waypoints, the last point at its end. The movement stops at the first point with
     the hand within ``radius`` of the goal, or at the end; k steps take k + 1 ticks, as
-    for :func:`move`. Raises ValueError for a wrong shape.
+    for :func:`move`, whose readings of the first and the last step hold here too
+    (:class:`coartic.model.MotionModel`). Raises ValueError for a wrong shape.
     """
     checked_goal(goal, radius), checked_model(model)
     points = path_points(robot, q, waypoints, model)
     last = len(points) - 1
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
     inside = np.flatnonzero(np.hypot(*misses.T) <= radius)
+    if model.first_step and last:
+        inside = inside[inside > 0]
     k = int(inside[0]) if inside.size else last
     return MoveResult(np.array(points[k]), k + model.arrival_tick, bool(inside.size), k + 1)
 
@@ -300,7 +303,8 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
     """The points of a path, ``(n + 1, dof)``: its steps of length m and its end.
 
     Point k lies at arc length ``k m`` of the polyline from ``q`` through ``waypoints``
-    (k, dof). Raises ValueError for a wrong shape.
+    (k, dof). A whole last step goes beyond the end, straight on. Raises ValueError for a
+    wrong shape.
     """
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
@@ -308,6 +312,10 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
     at = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
     points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
     points[-1] = corners[-1]
+    if model.whole_last_step and len(points) > 1:
+        final = np.flatnonzero(lengths)[-1]  # repeated waypoints have no direction
+        missing = (len(points) - 1) * model.step - ends[-1]
+        points[-1] += missing / lengths[final] * (corners[final + 1] - corners[final])
     return points
 
 

@@ -122,7 +122,8 @@ def load_reading(text: str) -> ChosenReading:
     Raises CoarticError for what is not written so, an unknown reading, and a value that is not
     among its choices.
     """
-    name, sign, value = (part.strip() for part in text.partition("="))
+    written = text if isinstance(text, str) else ""
+    name, sign, value = (part.strip() for part in written.partition("="))
     known = {reading.id: reading for reading in readings()}
     if not sign:
         raise CoarticError(
@@ -147,8 +148,11 @@ def load_reading(text: str) -> ChosenReading:
 def load_readings(texts: Iterable[str]) -> tuple[ChosenReading, ...]:
     """Several readings, in the order of the table, without those that are the default.
 
-    Raises CoarticError as :func:`load_reading`, and for two choices of one reading.
+    Raises CoarticError as :func:`load_reading`, for two choices of one reading, and for what
+    is no list.
     """
+    if isinstance(texts, str) or not isinstance(texts, Iterable):
+        raise CoarticError(f"readings {brief_value(texts)}: they are given as a list of texts")
     chosen: dict[str, ChosenReading] = {}
     for text in texts:
         new = load_reading(text)

@@ -117,15 +117,16 @@ def learn(
         total = 0
         previous: Hand | None = None
         visited: list[tuple[State, Hand, Array]] = []
+        subtasks: list[float] = []
         for number, goal in enumerate(task.goals):
             state: State = (number, previous if condition.state == "previous-hand" else None)
+            spent_before = total
             if trial == 0:
                 hand = first_hands[number]
             else:
-                hand = _choose(task, condition, q, goal, state, values, rng)
-            explores = trial > 0 and condition.unknown_target == "explores"
-            known = (state, hand) in targets or explores
-            if known:
+                hand = _choose(task, condition, q, goal, state, previous, values, rng)
+            known = (state, hand) in targets
+            if known or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
                 target = _explore(task, condition, q, hand, goal, stored, rng)
                 biased += condition.bias > 0
@@ -154,14 +155,20 @@ def learn(
                 if not result.hit:
                     break
             visited.append((state, hand, q))
+            subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
         completed[trial] = len(visited) == len(task.goals)
         if completed[trial] and (trial > 0 or condition.first_trial == "learns"):
-            for state, hand, reached in visited:
+            for number, (state, hand, reached) in enumerate(visited):
+                credit: float = total
+                if condition.credit == "subtask":
+                    credit = 0.0
+                    for own in reversed(subtasks[number:]):
+                        credit = own + condition.discount * credit
                 value = values.get((state, hand), -math.inf)
-                if total > value or (total == value and condition.update == "not-less"):
-                    values[state, hand] = total
+                if credit > value or (credit == value and condition.update == "not-less"):
+                    values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
         rewards, completed, values, targets, ticks, corrections, iterations, biased
@@ -174,6 +181,7 @@ def _choose(
     q: Array,
     goal: tuple[float, float],
     state: State,
+    previous: Hand | None,
     values: dict[tuple[State, Hand], float],
     rng: np.random.Generator,
 ) -> Hand:
@@ -192,7 +200,7 @@ def _choose(
             return equal[int(rng.random() * len(equal))]
         if condition.ties == "nearest":
             return equal[int(np.argmin(_distances(task, q, equal, goal)))]
-        if condition.ties == "right" or (condition.ties == "previous" and state[1] == "right"):
+        if condition.ties == "right" or (condition.ties == "previous" and previous == "right"):
             return equal[-1]
     return equal[0]
 

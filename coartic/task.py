@@ -8,10 +8,11 @@ the key and what would be right.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import (
@@ -26,7 +27,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import TaskError
 from coartic.inputs import brief_value, key_of, problems, read_toml
-from coartic.model import PAPER
+from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import HANDS, LARGEST, MOST_LINKS, Array, Finite, Hand, Length, Robot
 from coartic.text import Line, did_you_mean
 
@@ -39,6 +40,10 @@ MOST_GOALS = 100
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Of names of tasks and suites, which become names of files and parts of commands."""
+_IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
+TASK_PATTERN = _IN_FAMILY + NAME_PATTERN.removeprefix("^")
+"""Of names of tasks, those among them that are drawn from a family."""
+_ADDRESS = re.compile(_IN_FAMILY.removesuffix("?") + r"([di]|[0-9]{4}-)([0-9]{3,6})")
 WITHOUT_REACH = "without reach"
 
 Point = tuple[Finite, Finite]
@@ -52,6 +57,37 @@ def hands_of(letters: str) -> tuple[Hand, ...]:
 def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
     """``("right", "left")`` as ``"RL"``, the paper's way of naming a hand sequence."""
     return "".join(hand[0].upper() for hand in hands)
+
+
+Split = Literal["development", "test", "fresh"]
+_SPLITS: dict[str, Split] = {"d": "development", "i": "test"}
+
+
+class Address(NamedTuple):
+    """Which instance of a family of random tasks (:mod:`coartic.families`) a task is."""
+
+    family: str
+    """With its version, as ``two-armed/v1``."""
+    stream: str
+    """``d``, ``i``, or a year as ``2027-``: what the number in the name follows."""
+    number: int
+
+    @property
+    def split(self) -> Split:
+        """What the instance is for: to tune on, to report on, or drawn after both were done."""
+        return _SPLITS.get(self.stream, "fresh")
+
+    def __str__(self) -> str:
+        return f"{self.family}/{self.stream}{self.number:03d}"
+
+
+def address_of(name: str) -> Address | None:
+    """The address that a task's name is, ``two-armed/v1/i017`` say; None for other names."""
+    found = _ADDRESS.fullmatch(name)
+    if found is None:
+        return None
+    address = Address(found[1].removesuffix("/"), found[2], int(found[3]))
+    return address if str(address) == name else None  # i0017 would be i017 again
 
 
 class _Frozen(BaseModel):
@@ -77,7 +113,7 @@ class Start(_Frozen):
 class Task(_Frozen):
     """A sequence of spatial goals to be hit, each with one of the robot's hands."""
 
-    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
+    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)]
     title: Line = ""
     description: Line = ""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
@@ -128,6 +164,18 @@ class Task(_Frozen):
         return self.title or self.name
 
     @property
+    def family(self) -> str | None:
+        """The family that it is an instance of, with its version; None where of none."""
+        address = address_of(self.name)
+        return None if address is None else address.family
+
+    @property
+    def split(self) -> Split | None:
+        """What an instance of a family is for; None for other tasks."""
+        address = address_of(self.name)
+        return None if address is None else address.split
+
+    @property
     def reconstructed(self) -> tuple[str, ...]:
         """Keys whose figures were inferred, not printed."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
@@ -138,7 +186,6 @@ class Task(_Frozen):
             self._check_hands,
             self._check_start,
             self._check_initial_hands,
-            self._check_radius,
             self._check_reach,
             self._check_provenance,
         ):
@@ -184,19 +231,19 @@ class Task(_Frozen):
             return key, f"{text!r} uses the {absent[0]} hand, which is not among hands"
         return None
 
-    def _check_radius(self) -> tuple[str, str] | None:
-        tolerance = PAPER.correction_tolerance
-        if self.radius <= tolerance:
-            return "radius", (
-                f"is {self.radius:g}; it must exceed {tolerance:g}, the accuracy "
-                "of the corrective process"
-            )
-        return None
-
     def _check_reach(self) -> tuple[str, str] | None:
+        # No model's corrective process ends farther from a goal than its rim (checked_task).
+        return self.out_of_reach(self.radius)
+
+    def out_of_reach(self, tolerance: float) -> tuple[str, str] | None:
+        """Key and words of the first goal that no hand, or not the initial one, can hit.
+
+        ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
+        length unit. None where all goals are within reach.
+        """
         named = None if self.initial_is_policy else hands_of(self.initial_hands)
         for index, goal in enumerate(self.goals):
-            excess = {hand: self.beyond_reach(hand, goal) for hand in self.hands}
+            excess = {hand: self.beyond_reach(hand, goal, tolerance) for hand in self.hands}
             locked = " and ".join(self.locked_base)
             where = f"({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked in {locked}"
             if all(value > 0 for value in excess.values()):
@@ -208,8 +255,9 @@ class Task(_Frozen):
                 )
         return None
 
-    def beyond_reach(self, hand: Hand, goal: Point) -> float:
-        """How far the corrective process must end short of a goal, at least."""
+    def beyond_reach(self, hand: Hand, goal: Point, tolerance: float) -> float:
+        """How far short of where it would end, ``tolerance`` from the centre of a goal, the
+        corrective process must stay at least, length unit; not positive within reach."""
         arm = self.robot.arm(hand)
         near, far = self.robot.reach(hand)
         dx = goal[0] - self.start.base[0] - arm.shoulder_x if "x" in self.locked_base else 0.0
@@ -217,7 +265,7 @@ class Task(_Frozen):
         distance = math.hypot(dx, dy)
         # A base that is free in one coordinate can always back away.
         inside = near - distance if len(self.locked_base) == 2 else 0.0
-        return max(distance - far, inside) - PAPER.correction_tolerance
+        return max(distance - far, inside) - tolerance
 
     def _check_provenance(self) -> tuple[str, str] | None:
         for key in self.provenance:
@@ -226,13 +274,28 @@ class Task(_Frozen):
         return None
 
 
+def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
+    """The task itself; TaskError where a model's corrective process cannot do it.
+
+    Goals that are not larger than its accuracy, and goals farther out of reach than that.
+    """
+    try:
+        checked_model(model, radius=task.radius)
+    except ValueError as error:
+        raise TaskError(f"task {task.name!r}: {error}") from None
+    problem = task.out_of_reach(model.correction_tolerance)
+    if problem is not None:
+        raise TaskError(f"task {task.name!r}: {' '.join(problem)}")
+    return task
+
+
 def builtin_tasks() -> tuple[str, ...]:
     """Names of the tasks shipped with the package, in the paper's order."""
     return tuple(task.name for task in _shipped())
 
 
 def load_task(name_or_path: str | Path) -> Task:
-    """A shipped task by name, or a task file by path.
+    """A shipped task, a member or an instance by name, or a task file by path.
 
     Raises TaskError, naming the file and the key, where it cannot be used.
     """
@@ -240,6 +303,10 @@ def load_task(name_or_path: str | Path) -> Task:
         for task in _shipped():
             if task.name == name_or_path:
                 return task
+        if "/" in name_or_path:
+            from coartic.families import instance  # made by what tasks are made for
+
+            return instance(name_or_path)
         from coartic.members import members, task_of  # which are made from tasks
 
         plain = task_of(name_or_path)
@@ -248,9 +315,14 @@ def load_task(name_or_path: str | Path) -> Task:
         hint = did_you_mean(name_or_path, builtin_tasks()) or "."
         raise TaskError(
             f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
-            "A task file's name ends in .toml."
+            "A task file's name ends in .toml, that of an instance is FAMILY/v1/i017."
         )
-    return _read(Path(name_or_path))
+    task = _read(Path(name_or_path))
+    if "/" in task.name:
+        from coartic.families import check_instance
+
+        check_instance(task, str(name_or_path))
+    return task
 
 
 @cache

@@ -24,9 +24,10 @@ class Trajectory:
     task: Task
     execution: Execution
     configurations: Array
-    """Configuration at each control tick, shape ``(ticks, dof)``; the first row is the
-    start. A movement of k steps gives k + 1 rows, the last one the tick that detects its
-    end, so the row after it (the next movement's first) repeats it."""
+    """Configurations passed, shape ``(ticks, dof)``: a row each control tick, the first one
+    the start. A movement of k steps gives k + 1 rows, the last one the tick that detects its
+    end, so the row after it (the next movement's first) repeats it. Under a model without
+    that tick k steps give k rows and the start one of its own: ``(ticks + 1, dof)``."""
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
@@ -39,10 +40,10 @@ class Trajectory:
     @property
     def ticks(self) -> int:
         """Number of control ticks, the total reward with its sign turned."""
-        return len(self.configurations)
+        return self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:
-        """Path of either hand, shape ``(ticks, 2)``, length unit."""
+        """Position of either hand in each row, shape ``(rows, 2)``, length unit."""
         return self.task.robot.forward_kinematics(self.configurations, hand)
 
     def subtask(self, goal: int) -> Array:
@@ -64,9 +65,9 @@ def trajectory(
     execution = execute(task, movements, model=model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
-    rows = [np.empty((0, task.robot.dof))]
     unpaid = 1 - model.arrival_tick  # the point that a movement begins with
     q = np.array(task.q0)
+    rows = [q[None, :][:unpaid]]
     elapsed = np.zeros(len(task.goals), dtype=np.int64)
     for movement in execution.movements:
         assert movement.ticks is not None
@@ -81,7 +82,8 @@ def trajectory(
             q = points[-1]
             rows.append(points)
         elapsed[movement.goal - 1 :] += movement.ticks
-    return Trajectory(task, execution, np.concatenate(rows), np.maximum(elapsed - 1, 0))
+    hits = np.maximum(elapsed - model.arrival_tick, 0)
+    return Trajectory(task, execution, np.concatenate(rows), hits)
 
 
 def _line(q: Array, target: Array, count: int, model: MotionModel) -> Array:

@@ -96,6 +96,21 @@ def test_a_frame_shows_the_robot_at_its_tick(moves):
     assert axes.texts[-1].get_text().startswith(f"reward −{-moves.execution.reward} ")
 
 
+def test_without_a_tick_for_arrival_the_start_costs_nothing():
+    model = PAPER._replace(arrival_tick=0)
+    alone = corrective_trial(TASK, "RRRR", model=model)
+    shown = trajectory(TASK, alone.movements, model)
+    figure, (scene,) = _figure([Panel("x", shown)], 400)
+    (axes,) = figure.axes
+    for row, spent in ((0, "0"), (1, "−1"), (shown.ticks, f"−{-alone.reward}")):
+        scene.show(row)
+        assert axes.texts[-1].get_text().startswith(f"reward {spent} ")
+        base = axes.patches[0].get_xy()[:4]
+        assert np.array_equal(base, TASK.robot.base_outline(shown.configurations[row]))
+    assert axes.texts[-1].get_text().endswith("done")
+    assert np.array_equal(shown.configurations[0], TASK.q0)
+
+
 def test_nothing_leaves_the_picture(moves):
     other = initial(load_task("ascending"))
     figure, scenes = _figure([Panel("a", moves), Panel("b", other)], 600)

@@ -21,6 +21,7 @@ from analysis.claims.general import shortest_reach
 from analysis.claims.page import SENTENCES, page
 from analysis.claims.power import powers
 from analysis.claims.presence import REPRESENTATIVES
+from analysis.claims.reconstructions import held_by
 from analysis.claims.statements import MARGINS, REASONS
 from analysis.published import published_cells
 from analysis.report.document import Estimate
@@ -367,10 +368,10 @@ def test_what_the_folder_lacks_is_said():
 @pytest.mark.parametrize(
     ("claim", "task", "rewards", "verdict"),
     [
-        ("right-hand-better", T1, {"RRRR": -671, "LLLL": -727}, "supported"),
+        ("right-hand-better", T1, {"RRRR": -671, "LLLL": -727}, "measured"),
         ("right-hand-better", T1, {"RRRR": -727, "LLLL": -671}, "not supported"),
         ("right-hand-better", T1, {"RRRR": -727}, "cannot tell"),
-        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -360}, "supported"),
+        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -360}, "measured"),
         ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -357}, "cannot tell"),
         ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -350}, "not supported"),
         ("ec3-departs", T2, {"RRRR": -350, "LLLL": -360}, "not supported"),
@@ -382,10 +383,27 @@ def test_judges_on_planted_sequences(claim, task, rewards, verdict, tmp_path):
     assert verdict_of(claim, study).verdict == verdict
 
 
+def test_in_how_many_reconstructions_claims_hold():
+    """What the ensembles' members judge has its counts; what goals were admitted by has none."""
+    selected = {claim.id for claim in CLAIMS if claim.selected}
+    assert selected == {"right-hand-better", "initial-base-reverses", "best-is-rrrr"}
+    held = {claim.id: held_by(claim.id) for claim in CLAIMS}
+    assert not any(held[name] for name in selected)
+    assert not any(held[claim.id] for claim in CLAIMS if not claim.fitted)
+    judged = [claim for claim in CLAIMS if held[claim.id]]
+    assert {"ec3-alternates", "ec2-sequences", "half-choose-rlrr"} <= {c.id for c in judged}
+    for claim in judged:
+        for each in held[claim.id]:
+            assert each.members >= 200
+            assert 0 <= each.supported <= each.members - each.refuted
+            assert each.task in claim.reconstructions
+
+
 def test_the_base_reverses_where_goals_lie_back_and_forth(tmp_path):
     rows = learner(T1, "EC3", MIDDLE)
     judged = verdict_of("initial-base-reverses", Study(planted_results(rows, tmp_path)))
-    assert judged.verdict == "supported"
+    assert judged.holds
+    assert judged.verdict == "measured"  # goals were admitted by it: no support
     assert judged.run_ids == ()
     assert judged.sources == ("the corrective process on two-armed-1",)
     forth = changed(T1, goals=[[4.0, 2.0], [6.0, 2.0], [8.0, 2.0], [10.0, 2.0]])

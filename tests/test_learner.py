@@ -15,6 +15,7 @@ from coartic import (
     ExplorationCondition,
     MotionModel,
     NotApplicableError,
+    corrective_trial,
     execute,
     learn,
     learn_many,
@@ -391,6 +392,10 @@ def test_errors():
         ("nullspace_gain", float("nan"), "not within 0 to 1"),
         ("bias", -1.0, "not a finite number"),
         ("bias", float("inf"), "not a finite number"),
+        ("discount", 1.5, "discount 1.5 is not within 0 to 1"),
+        ("discount", float("nan"), "not within 0 to 1"),
+        ("discount", 0.5, "it takes credit 'subtask'"),
+        ("credit", "goal", "credit 'goal': it is 'overall' or 'subtask'"),
     ]:
         with pytest.raises(ValueError, match=message):
             replace(CONDITIONS["EC1"], **{field: value})
@@ -400,7 +405,7 @@ def test_variants_differ_from_the_papers_conditions_in_one_field():
     assert list(CONDITIONS) == ["EC1", "EC2", "EC3", "EC4"]
     off = ExplorationCondition("off", HANDS, True, True, "random")
     for condition in CONDITIONS.values():
-        for field in ("nullspace_gain", "bias", "corrects"):
+        for field in ("nullspace_gain", "bias", "corrects", "credit", "discount"):
             assert getattr(condition, field) == getattr(off, field)
     for name, variant in VARIANTS.items():
         plain = CONDITIONS[name[:3]]
@@ -409,6 +414,64 @@ def test_variants_differ_from_the_papers_conditions_in_one_field():
         assert fields[0] == "id"
         method = f"dual-process/{name}"
         assert learn(load_task("two-armed-2"), method, seed=0, trials=1).method == method
+
+
+@pytest.mark.parametrize("discount", [0.0, 0.5, 1.0])
+def test_a_subtask_is_credited_with_its_return(discount):
+    """After trial 0: r_g + γ r_{g+1} + γ² r_{g+2}, or the overall reward for every goal."""
+    task = load_task("ascending")
+    own = [-ticks for ticks in corrective_trial(task, "RRR").ticks_by_goal()]
+    condition = replace(VARIANTS["EC1-subtask"], discount=discount)
+    run = learn(task, condition, seed=0, trials=1)
+    assert [run.values[0, 2, 1], *run.values[1:, 1, 1]] == [
+        own[0] + discount * own[1] + discount**2 * own[2],
+        own[1] + discount * own[2],
+        own[2],
+    ]
+    assert sum(own) == run.reward == -319
+    overall = learn(task, "EC1", seed=0, trials=1)
+    assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"discount": 0.5},
+        {"discount": 1.0},
+        {"discount": 0.9, "state": "goal", "ties": "previous"},
+        {"discount": 0.3, "update": "not-less", "first_trial": "forgotten"},
+    ],
+)
+def test_credit_of_subtasks_equals_the_slow_learner(fields):
+    condition = replace(VARIANTS["EC4-subtask"], noise_sd=0.03, **fields)
+    assert_equals_reference(load_task("two-armed-1"), condition, trials=12)
+    slow = assert_equals_reference(failing_task(), replace(condition, epsilon=0.5), trials=40)
+    assert set(slow.completed) == {True, False}
+
+
+def test_a_subtask_learned_alone_does_not_know_what_follows():
+    """Two tasks begin with the same goal: what is learned of it is the same, bit for bit, as long
+    as its own reward alone is credited."""
+    start = {"left": [0.0] * 4, "right": [0.9, -0.8, 0.7, 0.5]}
+    tasks = [
+        tiny_task(goals=[[5.0, 1.0], [5.5, y]], initial_hands="RR", start=start)
+        for y in (2.5, -1.5)
+    ]
+
+    def learned(condition):
+        """Targets of goal 1, after a trial and after many, for either successor."""
+        trials = (1, 1500)
+        runs = [[learn(t, condition, seed=3, trials=n) for n in trials] for t in tasks]
+        return np.array([[run.targets[0, 2, 1] for run in pair] for pair in runs])
+
+    alone = VARIANTS["EC1-subtask"]
+    (first, last), (_, other) = learned(alone)
+    np.testing.assert_array_equal(last, other)
+    assert np.linalg.norm(last - first) > 0.05  # something was learned
+    for condition in (replace(alone, discount=1.0), CONDITIONS["EC1"]):
+        (_, last), (_, other) = learned(condition)
+        assert np.linalg.norm(last - other) > 0.1
 
 
 def test_least_change_of_posture_shortens_the_initial_solution():

@@ -10,6 +10,7 @@ import pytest
 
 from analysis.report.player import (
     TOLERANCE,
+    _movement,
     key_frames,
     nearest_to_median,
     player_json,
@@ -18,6 +19,7 @@ from analysis.report.player import (
 from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
 from coartic import Movement, Robot, corrective_trial, load_task, trajectory
+from coartic.model import PAPER
 from coartic.robot import HANDS
 from tests.support.suites import run_and_write
 
@@ -27,7 +29,7 @@ const player = require(process.argv[1]);
 const data = JSON.parse(require("fs").readFileSync(0, "utf8"));
 const played = data.tasks.map((task) => [...task.initials, ...task.movements].map((coded) => {
   const movement = player.decode(coded, task.unit, player.degrees(task.robot));
-  const rows = [...Array(movement.ticks).keys()];
+  const rows = [...Array(movement.rows.at(-1) + 1).keys()];
   return {
     points: rows.map((row) => {
       const { left, right } = player.arms(task.robot, player.configuration(movement, row));
@@ -149,6 +151,25 @@ def test_a_crooked_path_of_an_uneven_robot_is_followed():
     ][0]
     np.testing.assert_allclose(shown["points"], drawn, atol=1e-9)
     check_moments(run, shown["moments"])
+
+
+def test_without_a_tick_for_arrival_no_tick_shows_the_start():
+    task, model = load_task("ascending"), PAPER._replace(arrival_tick=0)
+    run = trajectory(task, corrective_trial(task, "RRR", model=model).movements, model)
+    unit = rounding_unit(task.robot)
+    arms = {
+        hand: {"shoulder": getattr(task.robot, f"{hand}_shoulder"),
+               "links": getattr(task.robot, f"{hand}_links")}
+        for hand in HANDS
+    }  # fmt: skip
+    coded = _movement({}, run, unit)
+    data = {"tasks": [{"robot": arms, "unit": unit, "initials": [], "movements": [coded]}]}
+    ((shown,),) = play(data)
+    for spent, moment in enumerate(shown["moments"]):
+        ticks = min(spent, run.ticks)
+        assert (moment["ticks"], moment["row"]) == (ticks, ticks)
+        assert moment["hit"] == int((run.hits <= ticks).sum())
+    assert (len(shown["points"]), shown["moments"][-1]["hit"]) == (run.ticks + 1, 3)
 
 
 def test_a_straight_movement_needs_two_frames():

@@ -1,15 +1,18 @@
 """What the paper leaves open: the table against the code, and how a choice is written."""
 
+import itertools
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from coartic import corrective_trial, learn, reference, trajectory
-from coartic.errors import CoarticError
-from coartic.exploration import CONDITIONS
+from coartic import Movement, corrective_trial, learn, reference, trajectory
+from coartic.errors import CoarticError, TaskError
+from coartic.exploration import CONDITIONS, ExplorationCondition, State, Ties, UnknownTarget
 from coartic.model import PAPER, checked_model
+from coartic.movement import follow, path_points
 from coartic.readings import (
     Reading,
     condition_under,
@@ -19,8 +22,9 @@ from coartic.readings import (
     readings,
     task_under,
 )
-from coartic.robot import Robot
-from coartic.task import builtin_tasks, load_task
+from coartic.robot import HANDS, Robot
+from coartic.task import builtin_tasks, checked_task, load_task
+from tests.support.strategies import UNEVEN, tiny_task
 
 APPLIED = {
     "model": [PAPER],
@@ -71,6 +75,21 @@ def test_numbers_may_be_written_otherwise():
 def test_what_cannot_be_loaded_is_said(text, says):
     with pytest.raises(CoarticError, match=says):
         load_reading(text)
+
+
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        ([1], "reading 1: a reading is written id=value"),
+        ([None], "reading None: a reading is written"),
+        (["ties=right", ("ties", "left")], r"reading \('ties', 'left'\): a reading"),
+        ("ties=right", "readings 'ties=right': they are given as a list of texts"),
+        (7, "readings 7: they are given as a list of texts"),
+    ],
+)
+def test_readings_are_a_list_of_texts(texts, says):
+    with pytest.raises(CoarticError, match=says):
+        load_readings(texts)
 
 
 def test_the_rim_is_as_near_to_it_as_a_correction_may_end():
@@ -128,6 +147,109 @@ SELDOM = {
 }
 
 
+FORGETFUL = ExplorationCondition(
+    "forgetful", HANDS, True, True, "random", epsilon=0.5, first_trial="forgotten"
+)
+
+
+@pytest.mark.parametrize("state", ["previous-hand", "goal"])
+@pytest.mark.parametrize("ties", ["left", "previous", "right"])
+def test_a_tie_falls_to_the_hand_that_hit_the_goal_before(ties, state):
+    """A trial that knows nothing: every greedy choice is a tie. Its draws are repeated here."""
+    condition = replace(FORGETFUL, ties=ties, state=state)
+    task, after_right = tiny_task(), 0
+    for seed in range(40):
+        rng, hands = np.random.default_rng(seed), []
+        for _ in task.goals:
+            before = hands[-1] if hands else 0
+            tied = {"left": 0, "right": 1, "previous": before}[ties]
+            explored = rng.random() < 0.5
+            hands.append(int(rng.random() * 2) if explored else tied)
+            after_right += before == 1 and not explored
+        run = learn(task, condition, seed=seed, trials=2)
+        slow = reference.learn(task, condition, seed=seed, trials=2)
+        visited = [(0, 2, hands[0]), (1, 2 if state == "goal" else hands[0], hands[1])]
+        assert list(zip(*np.nonzero(np.isfinite(run.values)), strict=True)) == visited
+        assert [(goal, HANDS.index(hand)) for (goal, _), hand in slow.values] == [
+            (goal, hand) for goal, _, hand in visited
+        ]
+    assert after_right
+
+
+def test_without_correction_a_pair_that_has_no_target_is_still_corrected():
+    """Trial 1 explores from where the robot stands and misses; only later misses are failures."""
+    condition = replace(
+        FORGETFUL, hand_exploration="none", corrects=False, unknown_target="explores"
+    )
+    task = tiny_task()
+    for seed in range(4):
+        run = learn(task, condition, seed=seed, trials=30)
+        slow = reference.learn(task, condition, seed=seed, trials=30)
+        assert run.completed[:2].all()
+        assert not run.completed[2:].all()
+        assert run.counters.corrections == slow.corrections == 2 * len(task.goals)
+        np.testing.assert_array_equal(run.completed, slow.completed)
+        np.testing.assert_array_equal(run.rewards.data, slow.rewards)
+
+
+READ = [
+    {"ties": ties, "state": state, "unknown_target": unknown, "corrects": corrects}
+    for ties, state, unknown, corrects in itertools.product(
+        get_args(Ties), get_args(State), get_args(UnknownTarget), (True, False)
+    )
+]
+
+
+@pytest.mark.parametrize("first_trial", ["learns", "forgotten"])
+def test_the_learner_is_the_slow_one_whatever_is_read_together(first_trial):
+    task = tiny_task(
+        robot={
+            "left_links": list(UNEVEN.left_links),
+            "right_links": list(UNEVEN.right_links),
+            "left_shoulder": list(UNEVEN.left_shoulder),
+        },
+        start={"left": [1.0], "right": [0.5, -0.5, 0.2]},
+        goals=[[1.6, 0.9], [1.2, 1.1], [1.7, 0.7]],
+        initial_hands="RLR",
+    )
+    failed = 0
+    for seed, fields in enumerate(READ):
+        condition = replace(FORGETFUL, first_trial=first_trial, noise_sd=0.02, **fields)
+        fast = learn(task, condition, seed=seed, trials=9)
+        slow = reference.learn(task, condition, seed=seed, trials=9)
+        np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
+        np.testing.assert_array_equal(fast.completed, slow.completed)
+        assert fast.counters.corrections == slow.corrections
+        assert np.isfinite(fast.values).sum() == len(slow.values)
+        failed += fast.counters.failed_trials
+    assert failed > len(READ)
+
+
+def test_a_goal_is_as_far_as_the_correction_of_a_reading_ends():
+    """0.05 out of reach of the outstretched arm: within the rim, beyond the paper's accuracy."""
+    task = tiny_task(
+        goals=[[4.55, 0.1]],
+        initial_hands="R",
+        locked_base=["x", "y"],
+        start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.3, -0.2, 0.3, -0.2]},
+    )
+    near = model_under(load_readings(["correction-tolerance=0.099"]))
+    assert corrective_trial(checked_task(task, near), "R", model=near).completed
+    with pytest.raises(
+        TaskError, match=r"goals\[0\] \(4.55, 0.1\) is out of reach .* 0.04 too far"
+    ):
+        checked_task(task)
+    assert not corrective_trial(task, "R").completed
+
+
+def test_a_radius_is_held_against_the_model_that_is_read():
+    small = tiny_task(radius=0.005)
+    with pytest.raises(TaskError, match="'tiny': model.correction_tolerance 0.01 is not below"):
+        checked_task(small)
+    exact = PAPER._replace(correction_tolerance=1e-3, arrival_tolerance=1e-3)
+    assert corrective_trial(checked_task(small, exact), "RR", model=exact).completed
+
+
 def test_a_learned_replay_is_the_replay():
     task = load_task("ascending")
     run = learn(task, replace(CONDITIONS["EC1"], learned="replay"), seed=3, trials=25)
@@ -154,6 +276,72 @@ def test_shoulders_are_at_the_height_that_is_read():
 def test_a_trajectory_has_a_row_a_tick(model):
     run = learn(load_task("two-armed-1"), "EC4", seed=2, trials=20, model=model)
     made = trajectory(run.task, run.solution, model)
-    assert len(made.configurations) == -run.reward
+    assert made.ticks == -run.reward
+    assert len(made.configurations) == made.ticks + 1 - model.arrival_tick
+    np.testing.assert_array_equal(made.configurations[0], run.task.q0)
     execution = run.execute()
     np.testing.assert_array_equal(made.configurations[made.hits], execution.configurations)
+
+
+@pytest.mark.parametrize("tick", [0, 1])
+def test_rows_of_a_trajectory_start_where_the_robot_does(tick):
+    """Two lines of 3 and 2 steps and a goal hit where the robot stands, counted by hand."""
+    model = PAPER._replace(arrival_tick=tick)
+    task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
+    ahead = [np.array([x, *[0.0] * 9]) for x in (0.06, 0.08)]
+    made = trajectory(
+        task,
+        [
+            Movement(1, "right", "corrective"),
+            Movement(2, "right", "planned", ahead[0]),
+            Movement(3, "right", "planned", ahead[1]),
+        ],
+        model,
+    )
+    stands = {0: [0, 1, 2, 3, 4, 5], 1: [0, 1, 2, 3, 3, 4, 5]}[tick]
+    np.testing.assert_allclose(100 * made.configurations[:, 0], stands, atol=1e-12)
+    np.testing.assert_allclose(made.subtask(1)[:, 0], [0.0])
+
+
+LINE = [np.array([x, *[0.0] * 9]) for x in (0.1, 0.1, 0.125)]
+
+
+def test_a_path_follows_the_readings_of_its_steps():
+    far, at_start = (9.0, 0.0), (4.5, 0.1)
+    q, path = np.zeros(10), np.array([LINE[1], LINE[2], LINE[2]])
+    plain = path_points(Robot(), q, path)
+    np.testing.assert_allclose(plain[:, 0], [*np.arange(13) * 0.01, 0.125])
+    whole = PAPER._replace(whole_last_step=True)
+    np.testing.assert_allclose(path_points(Robot(), q, path, whole)[:, 0], np.arange(14) * 0.01)
+    around = np.array([LINE[0], [0.1, 0.025, *[0.0] * 8], [0.1, 0.025, *[0.0] * 8]])
+    end = path_points(Robot(), q, around, whole)[-1]
+    np.testing.assert_allclose(end[:3], [0.1, 0.03, 0.0], atol=1e-12)  # on along the last line
+    np.testing.assert_array_equal(path_points(Robot(), q, q[None], whole), q[None])
+    goal_behind_the_end = (4.5 + 0.228, 0.1)
+    assert not follow(Robot(), q, path, "right", goal_behind_the_end, 0.1).hit
+    assert follow(Robot(), q, path, "right", goal_behind_the_end, 0.1, model=whole).hit
+    first = PAPER._replace(first_step=True)
+    for model, ticks in ((PAPER, 1), (first, 2)):
+        found = follow(Robot(), q, path, "right", at_start, 0.1, model=model)
+        assert (found.ticks, found.hit) == (ticks, True)
+    assert follow(Robot(), q, q[None], "right", at_start, 0.1, model=first).ticks == 1
+    assert follow(Robot(), q, path, "right", far, 0.1, model=first).ticks == 14
+
+
+@pytest.mark.parametrize("first_step", [False, True])
+@pytest.mark.parametrize("whole_last_step", [False, True])
+def test_a_path_of_one_line_is_the_movement_under_the_same_readings(first_step, whole_last_step):
+    model = PAPER._replace(first_step=first_step, whole_last_step=whole_last_step)
+    rng, hits = np.random.default_rng(5), 0
+    for _ in range(60):
+        q, target = rng.uniform(-1, 1, (2, 10))
+        near = target if rng.random() < 0.5 else q
+        goal = tuple(Robot().forward_kinematics(near, "left") + rng.uniform(-0.11, 0.11, 2))
+        path = follow(Robot(), q, target[None], "left", goal, 0.1, model=model)
+        line = reference.move(
+            Robot(), q, target, "left", goal, 0.1, stop_on_arrival=False, model=model
+        )
+        assert (path.ticks, path.hit) == (line.ticks, line.hit)
+        np.testing.assert_allclose(path.q, line.q, atol=1e-12)
+        hits += path.hit
+    assert 20 < hits < 60

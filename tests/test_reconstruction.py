@@ -18,8 +18,9 @@ from analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Trie
 from analysis.reconstruction.ensemble import features, spread_out
 from analysis.reconstruction.layout import Layout, layouts
 from analysis.reconstruction.likelihood import likelihoods, together
+from analysis.reconstruction.lines import lines
 from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
-from analysis.reconstruction.scoring import ABSENT, Figure, Learned, Order, compared, distance
+from analysis.reconstruction.scoring import FARTHEST, Figure, Learned, Order, compared, distance
 from analysis.reconstruction.search import Search
 from analysis.reconstruction.waves import Wave, scored
 from coartic import (
@@ -72,7 +73,7 @@ def test_constraints() -> None:
     rewards = np.array([[-675.0, -700.0], [-675.0, -675.0], [-674.0, np.nan]])
     reached = np.zeros((3, 2, 4, 10))
     reached[:, 0, :, 0] = [[-1, 1, 0, 2], [-1, -2, 0, 2], [0.5, 1, 2, -1]]
-    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached))
+    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached), start_x=0.0)
     for constraint, expected in (
         (RewardIs("RRRR", -675.0), [True, True, False]),
         (Above("RRRR", ("LLLL",)), [True, False, True]),
@@ -127,12 +128,15 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
     expected = [p for p in itertools.product((0, 0.5, 1), repeat=3) if p[2] + 0.5 <= p[1]]
     np.testing.assert_array_equal(points, expected)
     np.testing.assert_array_equal(layout.places(points)[:, 1], points[:, [0, 2]])
+    np.testing.assert_array_equal(layout.points(layout.places(points)), points)
 
 
-def test_members_are_spread() -> None:
+@pytest.mark.parametrize("first", [None, 7])
+def test_members_are_spread(first: int | None) -> None:
     rng = np.random.default_rng(0)
     points = rng.normal(size=(60, 3))
-    chosen = spread_out(points, 20)
+    chosen = spread_out(points, 20, first)
+    assert first in (None, chosen[0])
     assert len(set(chosen.tolist())) == 20
     for k in range(1, 20):
         gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
@@ -142,7 +146,8 @@ def test_members_are_spread() -> None:
 def test_features_weigh_rewards_and_postures_alike(search: Search) -> None:
     goals = NEAR_PRINTED + np.random.default_rng(0).normal(0, 0.05, (30, 4, 2))
     sequences = ("LRLR", "RRRR")
-    found = features(Tried(sequences, corrective_trials(TASK, sequences, goals)), ("RRRR",))
+    trials = corrective_trials(TASK, sequences, goals)
+    found = features(Tried(sequences, trials, start_x=0.0), ("RRRR",))
     assert found[:, :2].var(axis=0).sum() == pytest.approx(1.0)
     assert found[:, 2:].var(axis=0).sum() == pytest.approx(1.0)
 
@@ -157,6 +162,13 @@ def test_distances_are_in_standard_errors() -> None:
     sd = Figure("EC3", "sd", 3.0, 20, digits=1)
     assert abs(sd.distance(cell)) < 1.0
     assert Figure("EC3", "sd", 30.0, 20).distance(cell) < -10.0
+    # Of normal runs; one far outlier makes SDs less certain.
+    twice = Figure("EC3", "sd", float(rewards.std(ddof=1)) / 2, 20, digits=9)
+    tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)))
+    variance = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (20, 400))
+    assert twice.distance(cell) == pytest.approx(math.log(2) / math.sqrt(variance))
+    rare = np.where(np.arange(400) < 4, rewards - 40.0, rewards)
+    assert 0.0 < sd.distance(Learned(rare, cell.hands)) < 3.0
     share = Figure("EC3", "share", 0.75, 20, "LRLR")
     assert share.ours(cell) == 0.75
     assert share.distance(cell) == 0.0
@@ -166,7 +178,12 @@ def test_distances_are_in_standard_errors() -> None:
     cells = {"EC3": cell, "EC4": better}
     assert compared([Order("EC4", "EC3")], cells)[0].distance == 0.0
     assert compared([Order("EC3", "EC4")], cells)[0].distance < -10.0
-    assert distance(compared([absent, share], cells)) == pytest.approx(ABSENT / math.sqrt(2))
+    assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
+    # To lose a sequence is never better than to learn it with figures far off.
+    far = Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
+    assert distance(compared([far], cells)) == distance(compared([absent], cells)) == FARTHEST
+    failing = Learned(rewards, cell.hands, failed=400)
+    assert share.ours(failing) == 0.375
 
 
 def test_chance_of_printed_counts_is_multinomial() -> None:
@@ -174,7 +191,7 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
     printed = [Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
     (counts,) = likelihoods(printed, cell)
     model = stats.multinomial(4, np.array([10.5, 30.5, 0.5]) / 41.5)
-    assert counts.log_density == pytest.approx(float(model.logpmf([2, 2, 0])))
+    assert counts.log_chance == pytest.approx(float(model.logpmf([2, 2, 0])))
     every = [c for c in itertools.product(range(5), repeat=3) if sum(c) == 4]
     chances = np.array([model.pmf(c) for c in every])
     exact = chances[chances <= model.pmf([2, 2, 0]) + 1e-12].sum()
@@ -197,6 +214,28 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(40)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
     assert max(p(rng.normal(-305.0, 3.0, 20)) for _ in range(3)) < 0.01
+
+
+def test_a_chance_is_that_of_the_rounded_figures() -> None:
+    """As counted among many samples, and certain where all runs are equal."""
+    rng = np.random.default_rng(1)
+    rewards = np.round(rng.normal(-300.0, 3.0, 1000))
+    figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
+    (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
+    drawn = rng.choice(rewards, (200_000, 20))
+    alike = (np.round(drawn.mean(axis=1)) == -301) & (
+        np.round(drawn.std(axis=1, ddof=1), 1) == 2.9
+    )
+    assert math.exp(part.log_chance) == pytest.approx(alike.mean(), rel=0.2)
+    (part,) = likelihoods(figures[:1], Learned(np.full(100, -301.0), ("R",) * 100))
+    assert math.exp(part.log_chance) == pytest.approx(1.0, abs=0.1)
+
+
+def test_runs_that_fail_speak_against_a_reading() -> None:
+    cell = Learned(np.random.default_rng(0).normal(-300, 3, 500), ("R",) * 500, failed=500)
+    figures = [Figure("EC1", "mean", -300.0, 20, sd=3.0)]
+    assert together(likelihoods(figures, cell)).p < 1e-3
+    assert together(likelihoods(figures, cell._replace(failed=0))).p > 0.1
 
 
 def test_a_task_with_other_goals_is_another_task() -> None:
@@ -224,16 +263,16 @@ def test_a_task_with_other_goals_is_another_task() -> None:
 def test_a_reconstruction_is_found_scored_and_written(search: Search, tmp_path: Path) -> None:
     effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30)
     small = replace(search, tried=Counter())
-    found = reconstruct(small, effort=effort, named={"v0.1": TASK.goal_array})
+    found = reconstruct(small, effort=effort)
     members = pd.read_csv(found.write(tmp_path)[0])
-    assert list(members.member) == ["m001", "m002", "m003", "m004", "v0.1"]
+    assert list(members.member) == ["m001", "m002", "m003", "m004", *search.layout.known]
+    known = members.set_index("member").loc["F2", ["x3", "y3"]]
+    assert known.tolist() == [2.38, 2.96]
     for _, row in members[:4].iterrows():
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = reconstruct(
-        replace(search, tried=Counter(), jobs=2), effort=effort, named={"v0.1": TASK.goal_array}
-    )
+    again = reconstruct(replace(search, tried=Counter(), jobs=2), effort=effort)
     pd.testing.assert_frame_equal(again.members, found.members)
 
 
@@ -244,3 +283,20 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
     assert len(set(labels)) == len(labels) == 9
     with pytest.raises(CoarticError, match="nothing to reconstruct of task 'ascending'"):
         search_for("ascending")
+
+
+def test_lines_stand_beside_what_is_printed() -> None:
+    table = lines(["two-armed-1-F2", "ascending"], runs=4, trials=60).set_index(["task", "figure"])
+    assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
+    row = table.loc["ascending", "EC1 mean"]
+    seeds = range(800_000_000, 800_000_004)
+    own = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
+    assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(own))
+    parts = np.array([np.var(own, ddof=1) / 4, 2.9**2 / 20])  # Welch's interval
+    freedom = parts.sum() ** 2 / (parts**2 / [3, 19]).sum()
+    half = stats.t.ppf(0.975, freedom) * math.sqrt(parts.sum())
+    assert row.low == pytest.approx(np.mean(own) + 303 - half)
+    assert row.verdict == "different"
+    assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
+    with pytest.raises(CoarticError, match="unknown task 'nope'"):
+        lines(["nope"], runs=3)

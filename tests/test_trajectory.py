@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from baselines.posture_graph import PostureGraph
-from baselines.trajectory_optimisation import METHODS
+from baselines.trajectory_optimisation import METHODS, path_movements
 from baselines.trajectory_problem import (
     COSTS,
     Instance,
@@ -19,7 +19,7 @@ from baselines.trajectory_problem import (
 )
 from baselines.whole_ticks import Rounding, movements
 from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
-from coartic.method import MethodError, Session
+from coartic.method import Information, MethodError, Session
 from tests.support.strategies import changed
 
 ORDERS = {"acceleration": 2, "jerk": 3}
@@ -264,3 +264,23 @@ def test_goals_out_of_reach_are_infeasible(method):
 
 def test_costs_have_names():
     assert {method.cost for method in METHODS} == set(COSTS)
+
+
+@pytest.mark.parametrize("tick", [0, 1])
+def test_the_rest_of_a_piece_lies_ahead_whether_arrival_costs_a_tick(tick):
+    """The base moves along x by waypoints closer than a step, past the first goal's rim."""
+    task = small_task(goals=((2.6, 1.0), (3.2, 1.0)))
+    instance = Instance.of(task, ("right", "right"), still=True, radius=task.radius)
+    start = np.array(task.q0)
+    start[:2] += (2.305, 1.0) - task.robot.forward_kinematics(task.q0, "right")
+    task = small_task(
+        goals=task.goals, start={"base": tuple(start[:2]), "left": (1.5,), "right": (0.4, 0.3)}
+    )
+    line = start + np.arange(1, 221)[:, None] * 0.004 * np.eye(len(start))[0]
+    model = PAPER._replace(arrival_tick=tick)
+    session = Session(task, 0, set(Information), model=model, trusted=True)
+    first, second = path_movements(session, task, instance, [line[:80], line[80:]])
+    made = execute(task, (first, second), model=model)
+    assert (made.completed, made.corrections, made.ticks) == (True, 0, 80 + 2 * tick)
+    hit = made.configurations[0]
+    np.testing.assert_allclose(second.waypoints, line[line[:, 0] > hit[0]])

@@ -37,7 +37,7 @@ _UNKNOWN = Chances(math.nan, math.nan)
 _COLUMNS = (
     *("id", "section", "statement", "verdict", "fitted", "evidence", "rule", "test", "beside"),
     *("p", "adjusted_p", "contrary_p", "adjusted_contrary_p", "power", "contrary_power"),
-    *("place", "quote", "figure", "runs", "sources"),
+    *("reconstructions", "place", "quote", "figure", "runs", "sources"),
 )
 
 
@@ -93,6 +93,7 @@ def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
         {
             **vars(entry.claim),
             **vars(entry),
+            "reconstructions": entry.claim.reconstructions,
             "verdict": entry.verdict,
             **{"p": entry.p, "contrary_p": entry.contrary_p},
             "runs": " ".join(entry.run_ids),

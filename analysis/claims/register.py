@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from analysis.claims.data import Data
+from analysis.claims.reconstructions import held_by
 from analysis.report.document import DataTable
 from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
 
@@ -21,18 +22,22 @@ RULES = (
     "(they must all hold: an intersection-union test) stays below 5 % after Holm's correction. "
     "*Not supported*: it is not seen, and the contrary of one of its tests is significant (the "
     "smallest p-value of the contrary times their number, below 5 % after Holm's correction). "
-    "What is counted exactly, or shows no spread over runs, needs no test and is supported or not "
-    "as it is. *Cannot tell*: neither, or the folder lacks the runs. Each of the two corrections "
-    "is over a family that the register fixes: its claims with a test on the paper's own seven "
-    "cells, or those that take other runs beside them. A claim that a folder cannot test counts "
-    "in its family all the same, with a p-value of 1, so that what is decided stays decided "
-    "whatever is run beside. Where no rule could come out both ways, and where the paper compares "
-    "nothing, things are *measured*, without a verdict."
+    "What is counted exactly, or shows no spread over runs, needs no test and is supported or "
+    "not as it is. *Cannot tell*: neither, or the folder lacks the runs. What the goals of the "
+    "two-armed tasks were chosen to give is *measured* where it is so: no support. Each of the "
+    "two corrections is over a family that the register fixes: its claims with a test on the "
+    "paper's own seven cells, or those that take other runs beside them. A claim that a folder "
+    "cannot test counts in its family all the same, with a p-value of 1, so that what is decided "
+    "stays decided whatever is run beside. Where no rule could come out both ways, and where the "
+    "paper compares nothing, things are *measured*, without a verdict."
 )
 """How verdicts are reached, in inline markup."""
 FITTED = (
-    "† rests on the two-armed tasks. Their goals are a reconstruction, chosen so that printed "
-    "rewards and hand sequences come out (docs/model.md): a reproduction, no independent test."
+    "† rests on the two-armed tasks, whose goals are not printed. The default ones are, of all "
+    "that give what is printed of the corrective process alone, those whose learned rewards and "
+    "hand sequences come nearest to the printed ones: no independent test. Beside it, in how many "
+    "of the other admissible sets of goals the claim holds, by uncorrected tests "
+    "(docs/reconstruction.md)."
 )
 """What the mark of a fitted claim means."""
 CHOSEN = (
@@ -85,6 +90,14 @@ class Claim:
     """Figure of the paper that shows it, where one does."""
     fitted: bool = False
     """Whether it rests on a task whose goals were chosen for results like it."""
+    selected: bool = False
+    """Whether goals were admitted by it."""
+
+    @property
+    def reconstructions(self) -> str:
+        """In how many admissible sets of goals it holds, in words; empty where it is not one
+        of their runs that it rests on."""
+        return "; ".join(map(str, held_by(self.id))) if self.fitted else ""
 
     @property
     def tested(self) -> bool:
@@ -134,6 +147,8 @@ class Judged(Finding):
             return "measured"
         if self.holds is None:
             return "cannot tell"
+        if self.holds and self.claim.selected:
+            return "measured"
         if self.holds:
             # NaN: counted exactly, or no spread in any sample.
             return "cannot tell" if self.adjusted_p >= LEVEL else "supported"

@@ -11,12 +11,18 @@ from typing import Any, TypeVar
 
 from analysis.claims.data import Cells
 from analysis.claims.register import Claim, Finding
+from analysis.printed import ENTRIES
 
 _APART = ("one-armed", "two-armed")
 _REGISTER = tomllib.loads((Path(__file__).parent / "claims.toml").read_text(encoding="utf-8"))
 REASONS: dict[str, dict[str, Any]] = _REGISTER.pop("margins")
 """Every margin with its value and the reason for it, by name."""
 MARGINS: dict[str, float] = {name: float(said["value"]) for name, said in REASONS.items()}
+
+_SELECTED = {
+    claim for entry in ENTRIES.values() if entry.role == "constraint" for claim in entry.claims
+}
+"""Claims that goals which are not printed had to meet to be admitted."""
 
 
 def _read() -> dict[str, dict[str, Any]]:
@@ -30,7 +36,8 @@ def _read() -> dict[str, dict[str, Any]]:
                 own["statement"] = row["statement"].replace("{which}", which)
                 fitted = section == "Two-armed tasks" or which == "two-armed"
                 key = f"{name}-{which}" if apart else name
-                found[key] = {**own, "section": section, "fitted": fitted}
+                selected = key in _SELECTED
+                found[key] = {**own, "section": section, "fitted": fitted, "selected": selected}
     return found
 
 

@@ -24,6 +24,7 @@ TOLD = {
     Information.JACOBIAN: "J",
     Information.CORRECTIVE_PROCESS: "A",
     Information.REWARD_BY_TRIAL: "T",
+    Information.REWARD_BY_SUBTASK: "U",
     Information.KINEMATIC_MODEL: "K",
     Information.REWARD_FORMULA: "R",
     Information.SECONDARY_OBJECTIVES: "S",

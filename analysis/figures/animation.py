@@ -59,7 +59,7 @@ class Timing:
 
 
 def timing(ticks: int, speed: float | None = None) -> Timing:
-    """Frames of a movement of ``ticks`` at ``speed`` (ticks per second).
+    """Frames of a movement of ``ticks`` rows at ``speed`` (ticks per second).
 
     Without a speed it lasts :data:`LASTS_S`, or less where that would be slower than a tick a
     frame.
@@ -87,10 +87,9 @@ def animate(
     the file cannot be written.
     """
     check_output(path, replace=replace)
-    ticks = max(panel.trajectory.ticks for panel in panels)
-    if not ticks:
+    if not any(panel.trajectory.ticks for panel in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
-    timed = timing(ticks, speed)
+    timed = timing(max(len(panel.trajectory.configurations) for panel in panels), speed)
     figure, scenes = _figure(panels, width)
     writer = _writer(path, timed)
     try:
@@ -151,7 +150,8 @@ class _Scene:
     def show(self, row: int) -> None:
         """The state at a row of the trajectory, or at its last one."""
         trajectory = self._trajectory
-        row = min(row, trajectory.ticks - 1)
+        last = len(trajectory.configurations) - 1
+        row = min(row, last)
         q = trajectory.configurations[row]
         robot = trajectory.task.robot
         self._base.set_xy(robot.base_outline(q))
@@ -165,7 +165,8 @@ class _Scene:
         if not hit.all():
             goal = int(np.argmin(hit))
             state = f"goal {goal + 1} with the {trajectory.hands[goal]} hand"
-        self._status.set_text(f"reward −{row + 1}   {state}")
+        spent = trajectory.ticks - (last - row)
+        self._status.set_text(f"reward {f'−{spent}' if spent else 0}   {state}")
 
 
 def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:

@@ -25,6 +25,8 @@ class Tried:
 
     sequences: tuple[str, ...]
     trials: CorrectiveTrials
+    start_x: float
+    """Where the base starts, length unit."""
 
     def reward(self, hands: str) -> Array:
         """Total reward, ``(N,)``; NaN where the corrective process failed."""
@@ -96,7 +98,7 @@ class BaseMoves:
 
     def holds(self, tried: Tried) -> Flags:
         """Where it does, ``(N,)``."""
-        x = np.insert(tried.base_x(self.hands), 0, 0.0, axis=1)
+        x = np.insert(tried.base_x(self.hands), 0, tried.start_x, axis=1)
         moved = x[:, self.last] - x[:, self.first]
         return np.asarray(moved < 0.0 if self.side == "left" else moved > 0.0)
 
@@ -121,6 +123,5 @@ def try_sequences(
     blocks = [goals[first : first + _BLOCK] for first in range(0, max(len(goals), 1), _BLOCK)]
     with ThreadPoolExecutor(jobs) as pool:
         rewards, reached = zip(*pool.map(perform, blocks), strict=True)
-    return Tried(
-        tuple(sequences), CorrectiveTrials(np.concatenate(rewards), np.concatenate(reached))
-    )
+    trials = CorrectiveTrials(np.concatenate(rewards), np.concatenate(reached))
+    return Tried(tuple(sequences), trials, task.q0[0])

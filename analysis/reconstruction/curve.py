@@ -1,4 +1,4 @@
-"""Specification curves: each claim's effect under every choice that the paper leaves open."""
+"""Claims under every choice that the paper leaves open: verdicts, and effects sorted."""
 
 from __future__ import annotations
 
@@ -18,9 +18,64 @@ _COLORS = {
     "cannot tell": style.GREY,
     "not supported": style.VERMILLION,
 }
+_MARKS = {"supported": "o", "cannot tell": ".", "not supported": "X"}
+_HATCHES = {"supported": "", "cannot tell": "", "not supported": "////"}
 _COLUMNS = 3
 _HEIGHT = 1.9  # of a panel, inches
 _LEAST = 2  # specifications that make a curve
+
+
+@style.styled
+def verdicts(table: pd.DataFrame) -> Plot:
+    """The verdict of each claim under each set of readings, and its shares over members.
+
+    ``table`` is that of :func:`~analysis.reconstruction.specifications.judged_specifications`.
+    """
+    plain = table[table.member == ""]
+    sets = sorted(dict.fromkeys(plain.readings), key=lambda words: (words != "", words))
+    tasks = sorted({task for task in table.task if task})
+    claims = list(dict.fromkeys(table.claim))
+    widths = [max(0.14 * len(sets), 0.4), *(0.9 for _ in tasks)]
+    figure = Figure(figsize=(style.TWO, 1.1 + 0.14 * len(claims)), layout="constrained")
+    panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths, squeeze=False)[0]
+    height = {claim: -number for number, claim in enumerate(claims)}
+    for number, words in enumerate(sets):
+        own = plain[plain.readings == words]
+        for verdict, color in _COLORS.items():
+            rows = [height[claim] for claim in own.claim[own.verdict == verdict]]
+            panels[0].plot([number] * len(rows), rows, _MARKS[verdict], color=color, markersize=4)
+    panels[0].set_xticks(range(len(sets)), [words or "default" for words in sets], rotation=90)
+    panels[0].set_yticks(list(height.values()), claims)
+    panels[0].set_title("readings")
+    for axes, task in zip(panels[1:], tasks, strict=True):
+        counts = pd.crosstab(table.claim[table.task == task], table.verdict[table.task == task])
+        shares = counts.div(counts.sum(axis=1), axis=0).reindex(columns=list(_COLORS)).fillna(0.0)
+        left = np.zeros(len(shares))
+        for verdict, color in _COLORS.items():
+            width = shares[verdict].to_numpy()
+            rows = [height[claim] for claim in shares.index]
+            axes.barh(rows, width, 0.7, left, color=color, hatch=_HATCHES[verdict])
+            left += width
+        axes.set(xlim=(0, 1), xticks=[0, 1], xticklabels=["0", "all"])
+        axes.set_title(f"members of\n{task}")
+        axes.tick_params(left=False)
+    handles = [_dot(verdict) for verdict in _COLORS]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    members = counted(len(table[table.member != ""].member.unique()), "member")
+    return Plot(
+        "verdicts",
+        "Verdicts under every choice that the paper leaves open",
+        f"Verdict of each claim with the default goals, one column a reading, and its shares over "
+        f"{members} of the ensembles. They are no sample: a share is no probability.",
+        "; ".join(_shared(table, claim) for claim in claims),
+        figure,
+        table,
+    )
+
+
+def _shared(table: pd.DataFrame, claim: str) -> str:
+    counts = table.verdict[table.claim == claim].value_counts()
+    return f"{claim}: " + ", ".join(f"{verdict} {count}" for verdict, count in counts.items())
 
 
 @style.styled
@@ -97,7 +152,7 @@ def _matrix(axes: Axes, own: pd.DataFrame, choices: list[str], *, named: bool) -
 def _dot(verdict: str) -> Any:
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], marker=".", linestyle="", color=_COLORS[verdict], label=verdict)
+    return Line2D([], [], ls="", marker=_MARKS[verdict], color=_COLORS[verdict], label=verdict)
 
 
 def _spoken(data: pd.DataFrame, claim: str) -> str:

@@ -29,13 +29,14 @@ def _standard(values: Array) -> Array:
     return np.asarray(scaled / np.sqrt(max(scaled.shape[1], 1)))
 
 
-def spread_out(points: Array, count: int) -> NDArray[np.int64]:
+def spread_out(points: Array, count: int, first: int | None = None) -> NDArray[np.int64]:
     """Indices of ``count`` points, each as far as possible from those before it.
 
-    The first one is nearest to the mean; then greedily the farthest (Gonzalez 1985,
-    doi:10.1016/0304-3975(85)90224-5), so that the first k are spread for every k.
+    They begin with ``first``, or with the one nearest to the mean; then greedily the farthest
+    (Gonzalez 1985, doi:10.1016/0304-3975(85)90224-5), so that the first k are spread for every k.
     """
-    first = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+    if first is None:
+        first = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
     chosen, gap = [first], np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
         gap = np.minimum(gap, ((points - points[chosen[-1]]) ** 2).sum(axis=1))

@@ -155,7 +155,7 @@ def _row(judged: Judged, default: Judged | None) -> Iterator[tuple[str, object]]
     for part in judged.parts:
         yield f"p: {part.what}", float(f"{part.p:.3g}")
     whole = judged.whole
-    yield "log likelihood", round(whole.log_density, 2)
+    yield "log likelihood", round(whole.log_chance, 2)
     yield "p", float(f"{whole.p:.3g}")
     same = default is not None and judged.chosen and judged.is_as(default)
     yield "verdict", "refuted" if judged.refuted else "as the default" if same else "stands"

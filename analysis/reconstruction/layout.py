@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -28,6 +28,8 @@ class Layout:
     """a, b, gap: a + gap <= b."""
     apart: float = 0.0
     """Least distance of two goals' centres, length unit."""
+    known: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    """Sets of goals found before, by name."""
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -59,6 +61,15 @@ class Layout:
         columns = [[self.names.index(name) for name in goal] for goal in self.goals]
         return np.asarray(points[:, np.array(columns)])
 
+    def points(self, places: Array) -> Array:
+        """The points ``(N, P)`` of goals (N, G, 2); what :meth:`places` undoes."""
+        found = {
+            name: places[:, number, axis]
+            for number, goal in enumerate(self.goals)
+            for axis, name in enumerate(goal)
+        }
+        return np.stack([found[name] for name in self.names], axis=1)
+
     def allowed(self, points: Array) -> NDArray[np.bool_]:
         """Whether points lie within the ranges and are arranged as the layout says, ``(N,)``."""
         low, high, _ = np.array(list(self.grid.values())).T
@@ -83,6 +94,7 @@ def layouts() -> dict[str, Layout]:
             {name: tuple(values) for name, values in entry["grid"].items()},
             tuple(map(tuple, entry["less"])),
             float(entry["apart"]),
+            {name: tuple(map(tuple, goals)) for name, goals in entry["known"].items()},
         )
         for task, entry in content.items()
     }

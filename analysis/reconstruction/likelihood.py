@@ -2,7 +2,8 @@
 
 A cell's runs fall into hand sequences, and the runs of each have a mean and an SD. The counts
 are multinomial; mean and SD are taken together, as they come out where as many runs as were
-printed are drawn from ours with the same hands.
+printed are drawn from ours with the same hands. All are probabilities of what is printed, rounded
+as it is, so that they can be multiplied.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ class Likelihood:
     """How likely something printed is."""
 
     what: str
-    log_density: float
-    """Natural logarithm; of counts that of their probability."""
+    log_chance: float
+    """Natural logarithm of its probability."""
     p: float
     """Chance of something as unlikely as this or less likely."""
 
@@ -36,8 +37,8 @@ class Likelihood:
 def likelihoods(figures: Sequence[Figure], learned: Learned) -> list[Likelihood]:
     """Of the counts of a cell, and of mean and SD of each group of runs that are printed.
 
-    Groups with fewer than FEWEST of our runs are left out: that they are few lowers the
-    likelihood of the counts.
+    A group with fewer than FEWEST of our runs is left out: that they are few lowers the
+    likelihood of the counts, and that runs fail is a part of its own.
     """
     shares = [figure for figure in figures if figure.kind == "share"]
     found = [_of_counts(shares, learned)] if shares else []
@@ -46,9 +47,17 @@ def likelihoods(figures: Sequence[Figure], learned: Learned) -> list[Likelihood]
         if mean.kind != "mean":
             continue
         rewards = learned.with_hands(mean.hands)
+        if mean.hands is None and learned.failed:
+            found.append(_of_failures(mean, learned))
         if len(rewards) >= FEWEST:
             found.append(_of_group(mean, spreads.get(mean.hands), rewards))
     return found
+
+
+def _of_failures(mean: Figure, learned: Learned) -> Likelihood:
+    """Of as many runs as are printed, none fails."""
+    chance = ((len(learned.hands) + 0.5) / (learned.runs + 1.0)) ** mean.runs
+    return Likelihood(f"{mean.condition}: all {mean.runs} complete", math.log(chance), chance)
 
 
 def of_gain(gain: float, initial: float, mean: Figure) -> Likelihood | None:
@@ -76,7 +85,7 @@ def of_gain(gain: float, initial: float, mean: Figure) -> Likelihood | None:
 def together(parts: Sequence[Likelihood]) -> Likelihood:
     """All parts as one, by Fisher's method; they are independent."""
     p = stats.combine_pvalues([max(part.p, 1e-300) for part in parts]).pvalue
-    return Likelihood("all", sum(part.log_density for part in parts), float(p))
+    return Likelihood("all", sum(part.log_chance for part in parts), float(p))
 
 
 def _of_counts(shares: Sequence[Figure], learned: Learned) -> Likelihood:
@@ -84,7 +93,7 @@ def _of_counts(shares: Sequence[Figure], learned: Learned) -> Likelihood:
     runs = shares[0].runs
     printed = [round(share.value * runs) for share in shares]
     own = [sum(hands == share.hands for hands in learned.hands) for share in shares]
-    printed, own = [*printed, runs - sum(printed)], [*own, len(learned.hands) - sum(own)]
+    printed, own = [*printed, runs - sum(printed)], [*own, learned.runs - sum(own)]
     chances = (np.array(own) + 0.5) / (sum(own) + 0.5 * len(own))
     model = stats.multinomial(runs, chances)
     log_chance = float(model.logpmf(printed))
@@ -97,25 +106,28 @@ def _of_counts(shares: Sequence[Figure], learned: Learned) -> Likelihood:
 
 
 def _of_group(mean: Figure, sd: Figure | None, rewards: np.ndarray) -> Likelihood:
-    """Kernel estimate of the density of mean and logarithm of the SD, both as printed."""
+    """Kernel estimate of the chance that mean and SD are rounded to what is printed.
+
+    Spread evenly over a unit of the last printed digit, samples have as their density at the
+    printed figures the share of those that round to them, over the size of that unit.
+    """
     rng = np.random.default_rng(0)
     drawn = rng.choice(rewards, size=(2 * DRAWS, mean.runs))
-    printed = [mean.value]
-    figures = [_rounded(drawn.mean(axis=1), mean.digits)]
+    printed = [(mean, drawn.mean(axis=1))]
     if sd is not None:
-        printed.append(math.log(sd.value))
-        spread = _rounded(drawn.std(axis=1, ddof=1), sd.digits)
-        figures.append(np.log(np.maximum(spread, 10.0**-sd.digits)))
+        printed.append((sd, drawn.std(axis=1, ddof=1)))
+    units = np.array([10.0**-figure.digits for figure, _ in printed])
+    values = np.array([sample for _, sample in printed])
+    values += units[:, None] * rng.uniform(-0.5, 0.5, values.shape)
     # Density from one half of the samples, its distribution from the other.
-    fitted, judged = np.split(np.array(figures), 2, axis=1)
-    fitted = fitted + 1e-6 * rng.standard_normal(fitted.shape)
+    fitted, judged = np.split(values, 2, axis=1)
     density = stats.gaussian_kde(fitted)
-    log_density = float(density.logpdf(printed)[0])
+    log_density = float(density.logpdf([figure.value for figure, _ in printed])[0])
     below = np.sum(density.logpdf(judged) <= log_density)
     words = f"{mean.condition} {mean.hands or 'all'}: {mean.value:g}"
     words += "" if sd is None else f" ± {sd.value:g}"
-    return Likelihood(words, log_density, float((1 + below) / (1 + judged.shape[1])))
-
-
-def _rounded(values: np.ndarray, digits: int) -> np.ndarray:
-    return np.asarray(np.round(values, digits))
+    return Likelihood(
+        words,
+        log_density + float(np.log(units).sum()),
+        float((1 + below) / (1 + judged.shape[1])),
+    )

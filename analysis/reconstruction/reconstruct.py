@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,8 @@ from analysis.reconstruction.scoring import Figure
 from analysis.reconstruction.search import Search
 from analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
 from analysis.reconstruction.waves import PLAN, REPORTED, Scored, Wave, best_of_waves, scored
-from coartic import PAPER, CoarticError, MotionModel, load_task
+from coartic import CoarticError, load_task
+from coartic.readings import load_readings, task_under
 from coartic.text import did_you_mean
 
 Array = NDArray[np.float64]
@@ -51,7 +52,8 @@ class Reconstruction:
     nearest: Scored
     """The point that is nearest to what is printed, by seeds that selected nothing."""
     members: pd.DataFrame
-    """A row a member: coordinates, figures and distances; the nearest one is the first."""
+    """A row a member: coordinates, figures and distances; the nearest one is the first, each of
+    the others as far as possible from those before it; known sets of goals come last."""
     pool: int
     """Admissible points among which the members are spread."""
 
@@ -70,75 +72,93 @@ class Reconstruction:
         return paths
 
 
-def search_for(task: str, *, model: MotionModel = PAPER, jobs: int = 2) -> Search:
-    """A search for the goals of a task; CoarticError for one whose goals are printed."""
+def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Search:
+    """A search for the goals of a task under readings, as ``ties=right``.
+
+    Raises CoarticError for a task whose goals are printed, and for readings that are none.
+    """
     known = layouts()
     if task not in known:
         raise CoarticError(
             f"there is nothing to reconstruct of task {task!r}; tasks with goals that are not "
             f"printed: {', '.join(known)}{did_you_mean(task, known)}"
         )
-    found = load_task(task)
-    return Search(found, known[task], constraints_of(found), model=model, jobs=jobs)
+    chosen = load_readings(readings)
+    found = task_under(chosen, load_task(task))
+    return Search(found, known[task], constraints_of(found), chosen, jobs)
 
 
 def reconstruct(
     search: Search,
     *,
     effort: Effort = FULL,
-    named: Mapping[str, Array] | None = None,
     report: Callable[[str], None] = lambda text: None,
-    progress: Callable[[int, int], None] = lambda done, size: None,
 ) -> Reconstruction:
     """Search, choose and score: the admissible region, the point nearest to what is printed,
-    and an ensemble spread over the region.
+    and from there an ensemble spread over the region.
 
-    ``named`` sets of goals (G, 2) are scored beside it, admissible or not. The result depends
-    on the arguments and on nothing else.
+    The layout's known sets of goals compete with what is found where they meet every constraint,
+    and are scored beside it. The result depends on the arguments and on nothing else.
     """
     name = search.task.name
     tests, conditions = tests_of(name), conditions_of(name)
-    pool = _pool(search, report, progress)
-    hands = tuple(sorted({c.hands for c in search.printed}))
-    order = spread_out(features(search.every_sequence(pool), hands), len(pool))
-    pool = pool[order]
-    ranked = best_of_waves(
-        search, pool, tests, conditions=conditions, plan=effort.plan, report=report,
+    pool = _pool(search, report)
+    layout = search.layout
+    known = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
+    compete = layout.points(known)
+    compete = search.admitted(compete[layout.allowed(compete)], "known")
+    begin = pool[_apart(search, pool, effort.plan[0].points - len(compete))]
+    begin = np.concatenate([compete, begin])
+    best = best_of_waves(
+        search, begin, tests, conditions=conditions, plan=effort.plan, report=report,
         trials=effort.trials,
-    )  # fmt: skip
-    best = ranked[0]
-    others = pool[~(pool == best).all(axis=1)][: effort.members - 1]
-    members = {f"m{k:03d}": point for k, point in enumerate([best, *others], 1)}
-    goals = {member: search.layout.places(point[None])[0] for member, point in members.items()}
-    goals |= named or {}
+    )[:1]  # fmt: skip
+    pool = np.concatenate([best, pool[~(pool == best).all(axis=1)]])
+    members = pool[_apart(search, pool, effort.members, first=0)]
+    names = [*(f"m{k:03d}" for k in range(1, len(members) + 1)), *layout.known]
+    goals = dict(zip(names, [*layout.places(members), *known], strict=True))
     results = scored(
         search, goals.values(), tests, conditions=conditions, wave=REPORTED,
         runs=effort.runs, trials=effort.trials,
     )  # fmt: skip
     report(f"{len(results)} members, {effort.runs} runs a condition")
     rows = [_row(*pair) for pair in zip(goals.items(), results, strict=True)]
+    if search.readings:
+        rows = [{"readings": " ".join(map(str, search.readings))} | row for row in rows]
     return Reconstruction(search, results[0], pd.DataFrame(rows), len(pool))
 
 
-def _pool(
-    search: Search, report: Callable[[str], None], progress: Callable[[int, int], None]
-) -> Array:
-    """Admissible points with rounded coordinates, without repetitions."""
+def _apart(
+    search: Search, points: Array, count: int, first: int | None = None
+) -> NDArray[np.int64]:
+    """Indices of points that are far from each other in what the corrective process does."""
+    hands = tuple(sorted({c.hands for c in search.printed}))
+    return spread_out(features(search.every_sequence(points), hands), count, first)
+
+
+def _pool(search: Search, report: Callable[[str], None]) -> Array:
+    """Admissible points with rounded coordinates, without repetitions, in random order."""
     rng = np.random.default_rng(0)
+    tenths = 0
+
+    def progress(done: int, size: int) -> None:
+        nonlocal tenths
+        if 10 * done // size > tenths:
+            tenths = 10 * done // size
+            report(f"{10 * tenths} % of the grid")
+
     exact, near = search.grid(progress)
     report(f"{len(exact)} round sets of goals meet every constraint, {len(near)} come near")
     near = near[rng.permutation(len(near))[:_MOST_NEAR]]
     found = np.concatenate([exact, search.admitted(search.solve(near), "moved")])
+    if len(found):
+        found = np.concatenate([found, search.spread(found, _MOST_STEPS, rng, _STEP)])
+    found = np.unique(np.round(found, DECIMALS), axis=0)
+    found = search.admitted(found[search.layout.allowed(found)], "rounded")
+    report(f"{len(found)} sets of goals with {DECIMALS} decimals meet every constraint")
     if not len(found):
         raise CoarticError(f"no set of goals of {search.task.name} meets every constraint")
-    steps = search.spread(found, _MOST_STEPS, rng, _STEP)
-    found = np.unique(np.round(np.concatenate([found, steps]), DECIMALS), axis=0)
-    found = search.admitted(found[search.layout.allowed(found)], "rounded")
-    found = np.concatenate([exact, found[rng.permutation(len(found))]])
-    _, first = np.unique(found, axis=0, return_index=True)
-    found = found[np.sort(first)]
-    report(f"{len(found)} sets of goals with {DECIMALS} decimals meet every constraint")
-    return found[:_POOL]
+    return found[rng.permutation(len(found))[:_POOL]]
 
 
 def _row(member: tuple[str, Array], result: Scored) -> dict[str, Any]:

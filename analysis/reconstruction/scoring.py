@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from coartic import PAPER, MotionModel, Task, learn_many
 from coartic.exploration import ExplorationCondition
@@ -26,6 +27,13 @@ class Learned(NamedTuple):
     """Learned reward of each run that completed a trial, ``(N,)``."""
     hands: tuple[str, ...]
     """The hand sequence of each."""
+    failed: int = 0
+    """Runs that completed no trial."""
+
+    @property
+    def runs(self) -> int:
+        """All of them."""
+        return len(self.hands) + self.failed
 
     def with_hands(self, hands: str | None) -> NDArray[np.float64]:
         """Rewards of the runs that learned a sequence; of all for None."""
@@ -57,17 +65,17 @@ class Figure:
     def ours(self, learned: Learned) -> float:
         """The same figure of our runs; NaN where too few runs learned the sequence."""
         rewards = learned.with_hands(self.hands)
-        if not learned.hands:
+        if not learned.runs:
             return math.nan
         if self.kind == "share":
-            return len(rewards) / len(learned.hands)
+            return len(rewards) / learned.runs
         if self.kind == "mean":
             return float(rewards.mean()) if len(rewards) else math.nan
         return float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
 
     def distance(self, learned: Learned) -> float:
         """Difference in standard errors, positive where ours is the larger; NaN as above."""
-        ours, own, runs = self.ours(learned), learned.with_hands(self.hands), len(learned.hands)
+        ours, own, runs = self.ours(learned), learned.with_hands(self.hands), learned.runs
         rounding = 10.0**-self.digits / math.sqrt(12.0)
         if not runs:
             return math.nan
@@ -81,8 +89,8 @@ class Figure:
             spread = self.sd or float(own.std(ddof=1))
             error = spread**2 / self.runs + own.var(ddof=1) / len(own) + rounding**2
             return (ours - self.value) / math.sqrt(error)
-        # The logarithm of an SD is nearly normal, with variance 1 / (2 (n - 1)).
-        error = 0.5 / (self.runs - 1) + 0.5 / (len(own) - 1) + (rounding / self.value) ** 2
+        error = _of_log_sd(self.runs, own) + _of_log_sd(len(own), own)
+        error += (rounding / self.value) ** 2
         return math.log(max(ours, 1e-3) / self.value) / math.sqrt(error)
 
 
@@ -100,8 +108,18 @@ class Order:
 
 
 Test = Figure | Order
-ABSENT = 5.0
-"""Distance, in standard errors, of a figure of a hand sequence that too few runs learned."""
+FARTHEST = 5.0
+"""Standard errors that a figure counts at most, and where too few runs learned its hands: a
+sequence that is not learned is as bad as one with a figure far off, never better."""
+
+
+def _of_log_sd(runs: int, like: NDArray[np.float64]) -> float:
+    """Variance of the logarithm of the SD of that many runs, of a kurtosis as some have.
+
+    To first order (delta method); 1 / (2 (n - 1)) for normal ones, and never taken as less.
+    """
+    tails = max(3.0, float(stats.kurtosis(like, fisher=False)) if np.ptp(like) else 3.0)
+    return (tails - (runs - 3) / (runs - 1)) / (4 * runs)
 
 
 @dataclass(frozen=True)
@@ -129,6 +147,7 @@ def learned(
     return Learned(
         np.array([run.reward for run in completed], dtype=np.float64),
         tuple(run.hands or "" for run in completed),
+        len(runs) - len(completed),
     )
 
 
@@ -150,7 +169,7 @@ def _compared(test: Test, cells: Mapping[str, Learned]) -> Compared:
 
 
 def distance(comparisons: Iterable[Compared]) -> float:
-    """Root mean square of the distances, standard errors; absent figures count as ABSENT."""
-    values = [each.distance for each in comparisons]
-    squares = [ABSENT**2 if math.isnan(value) else value**2 for value in values]
+    """Root mean square of the distances, standard errors; none counts as more than FARTHEST."""
+    values = [abs(each.distance) for each in comparisons]
+    squares = [FARTHEST**2 if math.isnan(value) else min(value, FARTHEST) ** 2 for value in values]
     return math.sqrt(sum(squares) / len(squares))

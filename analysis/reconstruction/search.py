@@ -22,7 +22,8 @@ from analysis.reconstruction.constraints import (
     try_sequences,
 )
 from analysis.reconstruction.layout import Layout
-from coartic import PAPER, MotionModel, Task, hand_sequences
+from coartic import MotionModel, Task, hand_sequences
+from coartic.readings import ChosenReading, model_under
 
 Array = NDArray[np.float64]
 _DIFFERENCE = 0.1  # of the finite differences: rewards are whole ticks, some 100 a length unit
@@ -38,12 +39,18 @@ class Search:
     task: Task
     layout: Layout
     constraints: tuple[Constraint, ...]
-    model: MotionModel = PAPER
+    readings: tuple[ChosenReading, ...] = ()
+    """Of the model and of the exploration conditions; the task is as they have it."""
     jobs: int = 2
     near: float = 12.0
     """Ticks by which the rewards of a point of the grid may miss the printed ones."""
     tried: Counter[str] = field(default_factory=Counter)
     """How many points each stage tried, and how many passed each constraint, by words."""
+
+    @property
+    def model(self) -> MotionModel:
+        """As the readings have it."""
+        return model_under(self.readings)
 
     def attempt(self, points: Array, sequences: Sequence[str]) -> Tried:
         """Corrective trials at points ``(N, P)``."""

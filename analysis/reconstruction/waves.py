@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from analysis.reconstruction.scoring import (
     learned,
 )
 from analysis.reconstruction.search import Search
+from coartic import CONDITIONS
+from coartic.readings import condition_under
 
 Array = NDArray[np.float64]
 _SEEDS = 1_000_000  # of a wave begin at a multiple of this
@@ -80,12 +82,15 @@ def scored(
 ) -> list[Scored]:
     """Learning runs at sets of goals (G, 2), with the seeds of a wave; in their order."""
     seeds = range(_SEEDS * wave, _SEEDS * wave + runs)
+    explored = {
+        name: replace(CONDITIONS[name], **condition_under(search.readings)) for name in conditions
+    }
 
     def score(places: Array) -> Scored:
         task = search.task_with(places)
         cells = {
-            condition: learned(task, condition, seeds, model=search.model, trials=trials)
-            for condition in conditions
+            name: learned(task, condition, seeds, model=search.model, trials=trials)
+            for name, condition in explored.items()
         }
         return Scored(places, cells, compared(tests, cells))
 

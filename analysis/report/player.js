@@ -51,8 +51,9 @@ function arms(robot, q) {
 /* After `spent` ticks: the row shown, reward so far, goals hit, hand at work. */
 function moment(movement, spent) {
   const ticks = Math.min(spent, movement.ticks);
-  const row = Math.max(ticks - 1, 0);
-  const hit = movement.hits.filter((at) => at < ticks).length;
+  const seen = movement.rows.at(-1) + 1 - (movement.ticks - ticks);
+  const row = Math.max(seen - 1, 0);
+  const hit = movement.hits.filter((at) => at < seen).length;
   const hand = { L: "left", R: "right" }[movement.hands[hit]];
   return { ticks, row, hit, hand };
 }
@@ -118,7 +119,7 @@ class Panel {
     this.task = task;
     this.movement = decode(list[Number(this.select.value.slice(1))], task.unit, dof);
     this.trails = Object.fromEntries(task.hands.map((hand) => [hand, []]));
-    for (let row = 0; row < this.movement.ticks; row += 1) {
+    for (let row = 0; row <= this.movement.rows.at(-1); row += 1) {
       const points = arms(task.robot, configuration(this.movement, row));
       task.hands.forEach((hand) => this.trails[hand].push(points[hand].at(-1)));
     }

@@ -1,6 +1,6 @@
 """The command line. It sits on top of the four packages; nothing imports it.
 
-Each command is a function in one of four files by what it does; it imports what it needs when
+Each command is a function in one of five files by what it does; it imports what it needs when
 it is called, so that help and completion are there at once.
 """
 
@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import drawing, reading, reconstructing, running
+from coartic.cli import drawing, families, reading, reconstructing, running
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 
@@ -49,6 +49,7 @@ for group, commands in (
     (running.GROUP, running.COMMANDS),
     (reading.GROUP, reading.COMMANDS),
     (drawing.GROUP, drawing.COMMANDS),
+    (families.GROUP, families.COMMANDS),
     (reconstructing.GROUP, reconstructing.COMMANDS),
 ):
     for command in commands:

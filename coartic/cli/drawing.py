@@ -26,16 +26,17 @@ def draw(
     task_file: given.TaskFiles = None,
     replace: given.Replace = False,
 ) -> None:
-    """Draw start configuration and goals of tasks."""
+    """Draw start configuration and goals of tasks; FAMILY/v1/i000..i003 are several."""
     from analysis.figures.plot import FORMATS, picture
     from analysis.figures.tasks import tasks_plot
     from coartic import builtin_tasks, load_task
+    from coartic.families import named_by
     from coartic.files import check_outputs, write_outputs
 
     if out.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}")
     check_outputs([out], replace=replace)
-    names = names_in(tasks, "--tasks")
+    names = [name for text in names_in(tasks, "--tasks") for name in named_by(text)]
     if not names and not task_file:
         names = list(builtin_tasks())
     chosen = [load_task(name) for name in dict.fromkeys(names)] + [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated
@@ -23,16 +24,23 @@ def readings(
         str | None, typer.Option("--judge", metavar="FOLDER", help="Judge them, into a folder.")
     ] = None,
     runs: Annotated[
-        int, typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task.")
-    ] = 1000,
-    trials: Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")] = 10_000,
+        int | None,
+        typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task, 1000 if not said."),
+    ] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option(min=1, max=MOST_TRIALS, help="Trials per run, 10 000 if not said."),
+    ] = None,
     pairs: Annotated[bool, typer.Option(help="Every two readings together as well.")] = False,
     jobs: given.Jobs = -1,
 ) -> None:
     """List what the paper leaves open, or judge it by what is printed of one-armed tasks."""
     if judge is None:
-        if pairs:
-            raise CoarticError("--pairs says what is judged: name a folder with --judge")
+        given_too = {"--pairs": pairs, "--runs": runs, "--trials": trials}
+        if without := [name for name, value in given_too.items() if value]:
+            raise CoarticError(
+                f"{', '.join(without)}: what is judged, and how; name a folder with --judge"
+            )
         _list_readings()
         return
     from analysis.reconstruction.judge import combinations, judge_all, judged_table
@@ -42,8 +50,8 @@ def readings(
     folder.mkdir(parents=True, exist_ok=True)
     judged = judge_all(
         list(combinations(pairs)),
-        runs=runs,
-        trials=trials,
+        runs=runs or 1000,
+        trials=trials or 10_000,
         jobs=_threads(jobs),
         progress=lambda each: say(f"{' '.join(map(str, each.chosen)) or 'default'}: "
                                   f"p = {each.whole.p:.2g}"),
@@ -84,18 +92,41 @@ def reconstruct(
     """Search for goals that give what is printed, and make an ensemble of them."""
     from analysis.reconstruction.reconstruct import Effort, search_for
     from analysis.reconstruction.reconstruct import reconstruct as perform
-    from coartic.readings import load_readings, model_under
 
     check_numbers(jobs, None)
-    out, chosen = folder_named(folder, "--out"), load_readings(reading or ())
-    if others := [str(each) for each in chosen if each.reading.part != "model"]:
-        raise CoarticError(f"a search knows readings of the model only, not {', '.join(others)}")
-    search = search_for(task, model=model_under(chosen), jobs=_threads(jobs))
+    out = folder_named(folder, "--out")
+    search = search_for(task, readings=tuple(reading or ()), jobs=_threads(jobs))
     out.mkdir(parents=True, exist_ok=True)
     found = perform(search, effort=Effort(members=members, runs=runs), report=say)
     paths = found.write(out)
     say("", f"The nearest is {found.nearest.distance:.2f} standard errors from what is printed.")
     say(f"Results in {paths[0]} and {paths[1]}.")
+
+
+def printed(
+    tasks: Annotated[list[str], typer.Argument(help="Tasks, or members of an ensemble.")],
+    runs: Annotated[int, typer.Option(min=3, max=MOST_RUNS, help="Runs a condition.")] = 100,
+    trials: Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run.")] = 10_000,
+    out: Annotated[str | None, typer.Option(help="Folder for a table of it.")] = None,
+    reading: given.Readings = None,
+    jobs: given.Jobs = -1,
+) -> None:
+    """Show what the paper prints of tasks, line by line, beside fresh runs."""
+    from analysis.reconstruction.lines import lines
+
+    check_numbers(jobs, None)
+    folder = None if out is None else folder_named(out, "--out")
+    table = lines(
+        tasks, readings=tuple(reading or ()), runs=runs, trials=trials, jobs=_threads(jobs),
+        progress=say,
+    )  # fmt: skip
+    shown = table[["figure", "task", "printed", "sd", "ours", "our_sd", "runs", "verdict"]]
+    rows = [tuple(map(_short, row)) for row in shown.itertuples(index=False)]
+    show_table("What is printed", tuple(shown.columns), rows)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        table.to_csv(folder / "printed.csv", index=False, lineterminator="\n")
+        say("", f"Results in {folder / 'printed.csv'}.")
 
 
 def robustness(
@@ -107,7 +138,7 @@ def robustness(
     """Judge the paper's claims under each reading and with the goals of each member."""
     from analysis import load
     from analysis.figures.plot import rendered
-    from analysis.reconstruction.curve import specification_curve
+    from analysis.reconstruction.curve import specification_curve, verdicts
     from analysis.reconstruction.specifications import judged_specifications, shares
 
     folder = folder_named(out, "--out")
@@ -117,16 +148,25 @@ def robustness(
     folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / "specifications.csv", index=False, lineterminator="\n")
     found.to_csv(folder / "shares.csv", index=False, lineterminator="\n")
+    figures = [verdicts(table)]
     if table.effect.notna().any():
-        for name, content in rendered(specification_curve(table), (".svg", ".pdf")).items():
+        figures.append(specification_curve(table))
+    for figure in figures:
+        for name, content in rendered(figure, (".svg", ".pdf", ".png")).items():
             (folder / name).write_bytes(content)
     rows = [tuple(map(str, row)) for row in found.itertuples(index=False)]
     show_table("Claims", tuple(found.columns), rows)
     say("", f"Results in {folder}.")
 
 
+def _short(value: object) -> str:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{round(value, 3):g}"
+    return str(value)
+
+
 def _threads(jobs: int) -> int:
     return (os.cpu_count() or 1) if jobs == -1 else max(jobs, 1)
 
 
-COMMANDS = (readings, reconstruct, robustness)
+COMMANDS = (readings, printed, reconstruct, robustness)

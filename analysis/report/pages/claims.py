@@ -29,6 +29,7 @@ def claims_table(study: Study) -> DataTable | None:
             claim=entry.claim.id,
             statement=entry.claim.statement,
             verdict=entry.marked,
+            reconstructions=entry.claim.reconstructions or None,
             place=", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
         )
         tested = "beside" if entry.claim.beside else "paper"
@@ -93,6 +94,13 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
             "holds."
         )
     items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
+    if claim.reconstructions:
+        items.append(
+            f"With other admissible goals it is supported in {claim.reconstructions}: what was "
+            "chosen is no sample, and this no probability."
+        )
+    if claim.selected:
+        items.append("Goals were admitted by it: that it holds is no support.")
     blocks: list[Block] = [Prose((escaped(claim.statement),)), Bullets(tuple(items))]
     if entry.table is not None:
         columns = tuple(replace(column, how=f"{claim.test}.") for column in entry.table.columns)

@@ -1,0 +1,67 @@
+"""Random numbers that stay the same: a counter-based generator in integers alone.
+
+Philox4x32-10 (Salmon, Moraes, Dror & Shaw 2011, *Parallel random numbers: as easy as 1, 2, 3*)
+turns a counter of four words and a key of two into four words. Nothing is carried from one draw to
+the next, so that what is drawn depends on counter and key alone, and on no library.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+T = TypeVar("T")
+Words = tuple[int, int, int, int]
+_WORD = (1 << 32) - 1
+_ROUNDS = 10
+_FACTORS = 0xD2511F53, 0xCD9E8D57
+_WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
+
+
+def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
+    """Four random words of 32 bits from a counter of four and a key of two."""
+    a, b, c, d = counter
+    left, right = key
+    for _ in range(_ROUNDS):
+        first, second = a * _FACTORS[0], c * _FACTORS[1]
+        a, b, c, d = (
+            second >> 32 ^ b ^ left,
+            second & _WORD,
+            first >> 32 ^ d ^ right,
+            first & _WORD,
+        )
+        left, right = left + _WEYL[0] & _WORD, right + _WEYL[1] & _WORD
+    return a, b, c, d
+
+
+def key_of(name: str) -> tuple[int, int]:
+    """The key that a name stands for: the first 64 bits of its SHA-256."""
+    digest = hashlib.sha256(name.encode()).digest()
+    return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
+
+
+class Draws:
+    """Integers drawn one after the other, from a key and three words of the counter.
+
+    The fourth counts the blocks of four words that were used.
+    """
+
+    def __init__(self, key: tuple[int, int], *place: int) -> None:
+        first, second, third = place
+        self._pairs = self._made(key, (first, second, third))
+
+    @staticmethod
+    def _made(key: tuple[int, int], place: tuple[int, int, int]) -> Iterator[int]:
+        for block in range(_WORD):
+            a, b, c, d = philox4x32((block, *place), key)
+            yield a << 32 | b
+            yield c << 32 | d
+
+    def integer(self, least: int, most: int) -> int:
+        """One of ``least`` to ``most``, all of them as likely to within (most - least) / 2^64."""
+        return least + (next(self._pairs) * (most - least + 1) >> 64)
+
+    def one_of(self, choices: Sequence[T]) -> T:
+        """One of some things, each as likely."""
+        return choices[self.integer(0, len(choices) - 1)]

@@ -1,0 +1,544 @@
+"""Families of random tasks: what is drawn, what is rejected, and that it stays."""
+
+import hashlib
+import json
+import math
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks.run import Selection, plan_suite, run_suite
+from coartic import TaskError, builtin_tasks, corrective_trial, load_task, parse_task
+from coartic.families import (
+    CORRECTIVE,
+    MOST_NUMBER,
+    RULES,
+    RULES_IN_WORDS,
+    Draws,
+    broken_rule,
+    candidate_of,
+    drawn,
+    families,
+    instance,
+    load_family,
+    names_in,
+    read_family,
+    rejections,
+    task_hash,
+    task_text,
+)
+from coartic.inputs import MOST_CELLS
+from coartic.tables import RUNS
+from coartic.task import Address, address_of
+from tests.support.commands import call
+from tests.support.suites import KNOWN, ROOT, suite_of
+
+# What the shipped families draw, by the hash of the task's file. A family is never changed: what
+# makes these fail makes results under these names incomparable, and needs a new version.
+PINNED = {
+    "aligned/v1/i017": "df3a3cee4eea483f",
+    "aligned/v1/d003": "c25cede53a58ee73",
+    "aligned/v1/2027-041": "c79ebd38eb04e921",
+    "long/v1/i017": "0c274c3863f2febc",
+    "long/v1/d003": "1e66e6a44e109d4d",
+    "long/v1/2027-041": "66be010eeaecdab3",
+    "one-armed/v1/i017": "d045540cec694356",
+    "one-armed/v1/d003": "15287e3c04086d4e",
+    "one-armed/v1/2027-041": "db6b68237c741b36",
+    "redundancy/v1/i017": "ec87099bc927fc54",
+    "redundancy/v1/d003": "4f8a3750862c01aa",
+    "redundancy/v1/2027-041": "d8b0ac44d016bd18",
+    "two-armed/v1/i017": "b76d21c3df982a43",
+    "two-armed/v1/d003": "261073742a1b5a7c",
+    "two-armed/v1/2027-041": "d3a3670771eef97e",
+}
+RELEASED = {
+    "aligned/v1": "1acc695728233543",
+    "long/v1": "bc600910c824b195",
+    "one-armed/v1": "b8ab1125c46640e1",
+    "redundancy/v1": "29dd33d58da81c12",
+    "two-armed/v1": "421fe30fedfb532a",
+}
+TEXT = """\
+name = "two-armed/v1/i016"
+title = "Two-armed i016"
+description = "4 goals, 4 links an arm, a free base: drawn from family two-armed/v1."
+hands = ["left", "right"]
+goals = [[5.063, -0.303], [3.888, 0.845], [2.511, -0.612], [5.742, 0.985]]
+radius = 0.1
+locked_base = []
+initial_hands = "LLLL"
+
+[start]
+base = [0.0, 0.0]
+left = [2.147, 0.048, -0.662, -0.499]
+right = [1.405, 0.228, 0.966, -0.396]
+
+[provenance]
+goals = { status = "chosen", source = "drawn: family two-armed/v1, instance i016" }
+start = { status = "chosen", source = "drawn: family two-armed/v1, instance i016" }
+initial_hands = { status = "chosen", source = "drawn: family two-armed/v1, instance i016" }
+"""
+addresses = st.builds(
+    Address,
+    st.sampled_from(sorted(RELEASED)),
+    st.sampled_from(["d", "i", "2027-", "1999-"]),
+    st.integers(0, MOST_NUMBER),
+)
+
+
+def test_the_shipped_families():
+    assert set(families()) == set(RELEASED)
+    bounds = [family.goals for family in families().values()]
+    assert (min(low for low, _ in bounds), max(high for _, high in bounds)) == (2, 8)
+    assert load_family("redundancy").links == (3, 8)
+    assert load_family("two-armed") is families()["two-armed/v1"]
+    bases = {base for family in families().values() for base in family.base}
+    assert bases == {"free", "rail", "locked"}
+
+
+@pytest.mark.parametrize("name", RELEASED)
+def test_a_released_family_is_not_changed(name):
+    text = json.dumps(families()[name].model_dump(mode="json"), sort_keys=True)
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == RELEASED[name]
+
+
+def test_an_instance_is_what_it_was():
+    assert task_text(load_task("two-armed/v1/i016")) == TEXT
+    assert {name: task_hash(instance(name))[:16] for name in PINNED} == PINNED
+
+
+def test_an_instance_depends_on_its_name_alone():
+    names = names_in("two-armed/v1/i000..i011")
+    forwards = {name: task_text(instance(name)) for name in names}
+    drawn.cache_clear()
+    alone = task_text(instance("two-armed/v1/i007"))
+    drawn.cache_clear()
+    backwards = {name: task_text(instance(name)) for name in reversed(names)}
+    assert backwards == forwards
+    assert alone == forwards["two-armed/v1/i007"]
+
+
+@given(addresses)
+def test_every_instance_is_valid(address):
+    """By distances in floating point, beside the rules in integers."""
+    made = drawn(address)
+    task, family = made.task, families()[address.family]
+    assert load_task(task.name) is task
+    assert (task.family, task.name) == (address.family, str(address))
+    assert family.goals[0] <= len(task.goals) <= family.goals[1]
+    assert set(task.initial_hands) <= {hand[0].upper() for hand in task.hands}
+    assert corrective_trial(task, task.initial_hands).completed
+    figures = [v for goal in task.goals for v in goal] + [*task.start.left, *task.start.right]
+    assert all(round(figure, 3) == figure for figure in figures)
+    for a, b in combinations(task.goals, 2):
+        assert math.dist(a, b) > 2 * task.radius
+    for hand in task.hands:
+        links = task.robot.left_links if hand == "left" else task.robot.right_links
+        assert math.fsum(links) == pytest.approx(4.0, abs=1e-12)
+        assert family.links[0] <= len(links) <= family.links[1]
+        position = task.robot.forward_kinematics(task.q0, hand)
+        for goal in task.goals:
+            assert math.dist(position, goal) > task.radius + 0.19
+            assert task.beyond_reach(hand, goal, 0.01) < 0
+        jacobian = task.robot.jacobian(task.q0, hand)[:, task.robot.joints(hand)]
+        singular = np.linalg.svd(jacobian, compute_uv=False)[1] < 1e-3
+        assert not singular or not family.bent
+    assert broken_rule(candidate_of(address, len(made.rejected))) is None
+    for attempt, rule in enumerate(made.rejected):
+        assert broken_rule(candidate_of(address, attempt)) == rule
+
+
+@given(addresses)
+def test_its_file_is_the_task(address):
+    import tomllib
+
+    task = drawn(address).task
+    assert parse_task(tomllib.loads(task_text(task)), "text") == task
+
+
+@pytest.mark.parametrize("name", builtin_tasks())
+def test_any_task_can_be_written(name, tmp_path):
+    path = tmp_path / "copy.toml"
+    path.write_text(task_text(load_task(name)), encoding="utf-8")
+    assert load_task(path) == load_task(name)
+
+
+def good(name="two-armed/v1/i016", **family):
+    """The candidate that an instance comes from, of a family with some changes."""
+    address = address_of(name)
+    candidate = candidate_of(address, len(drawn(address).rejected))
+    return replace(candidate, family=candidate.family.model_copy(update=family))
+
+
+def changed(candidate, index, goal):
+    goals = list(candidate.goals)
+    goals[index] = goal
+    return replace(candidate, goals=tuple(goals))
+
+
+def at_hand(candidate):
+    x, y = candidate.task().robot.forward_kinematics(candidate.task().q0, "right")
+    return round(1000 * x) + 290, round(1000 * y)
+
+
+STRAIGHT = {"left": (0, 0, 0, 0), "right": (0, 0, 0, 0)}
+ALONG = ((2500, 100), (3000, 100))  # on the line of straight arms, which cannot bend to them
+BROKEN = {
+    "outside": lambda: changed(good(), 1, (7001, 0)),
+    "overlap": lambda: changed(good(), 1, (5063 + 298, -303 + 30)),
+    "reach": lambda: replace(changed(good(), 1, (3888, 3901)), base="rail", family=good(
+        region=load_family("long").region.model_copy(update={"y": (-9000, 9000)})).family),
+    "straight": lambda: replace(good(), angles=good().angles | {"left": (1800, 199, -199, 0)}),
+    "start-hit": lambda: changed(good(), 2, at_hand(good())),
+    CORRECTIVE: lambda: replace(good(bent=0), base="locked", angles=STRAIGHT, goals=ALONG),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("rule", [*RULES, CORRECTIVE])
+def test_each_rule_rejects(rule):
+    assert broken_rule(good()) is None
+    assert broken_rule(BROKEN[rule]()) == rule
+    assert RULES_IN_WORDS[rule]
+
+
+def test_limits_of_the_rules():
+    """The nearest figures that are let in."""
+    assert broken_rule(changed(good(), 1, (7000, 0))) is None
+    assert broken_rule(changed(good(), 1, (5063 + 300, -303))) is None
+    rail = replace(changed(good(), 1, (3888, 3800)), base="rail")
+    assert broken_rule(rail) is None  # within 3.8 of shoulders at 0.1
+    bent = replace(good(), angles=good().angles | {"left": (1800, 200, -199, 0)})
+    assert broken_rule(bent) is None
+
+
+def test_restrictions_are_asked_for_as_well():
+    far = changed(good(), 1, (6000, 0))
+    assert broken_rule(far) is None
+    restricted = far.family.model_copy(update={"restrictions": ("locked",)})
+    assert broken_rule(replace(far, family=restricted)) == "reach"
+    # With a free base straight arms come to these goals, with a locked one they never do.
+    free = replace(good(bent=0), base="free", angles=STRAIGHT, goals=ALONG)
+    assert broken_rule(free) is None
+    locked = free.family.model_copy(update={"restrictions": ("locked",)})
+    assert broken_rule(replace(free, family=locked)) == CORRECTIVE
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_both_hands_reach_every_goal(side):
+    """With a locked base, a goal at 4.2 is 3.7 from one shoulder and 4.7 from the other."""
+    goals = ((side * 1000, 2000), (side * 4200, 100))
+    found = replace(good(), base="locked", goals=goals)
+    assert broken_rule(found) == "reach"
+    one = {1: "right", -1: "left"}[side]
+    alone = found.family.model_copy(update={"hands": (one,)})
+    assert broken_rule(replace(found, family=alone)) is None
+
+
+def test_rejection_leaves_the_structure_alone():
+    for name in names_in("aligned/v1/i000..i059"):
+        address = address_of(name)
+        first, last = (candidate_of(address, k) for k in (0, len(drawn(address).rejected)))
+        for what in ("links", "base", "angles"):  # straight arms of either kind
+            assert getattr(first, what) == getattr(last, what)
+        assert len(first.goals) == len(last.goals)
+
+
+def test_goals_of_the_aligned_family():
+    axes = set()
+    for name in names_in("aligned/v1/i000..i039"):
+        goals = instance(name).goals
+        for axis in (0, 1):
+            levels = [goal[axis] for goal in goals]
+            odd = [k for k, level in enumerate(levels) if levels.count(level) == 1]
+            if len(odd) == 1:
+                axes.add(axis)
+                assert 0 < odd[0] < len(goals) - 1
+                places = [goal[1 - axis] for goal in goals]
+                assert places in (sorted(places), sorted(places, reverse=True))
+                break
+        else:
+            raise AssertionError(f"{name}: no line with one goal off it")
+    assert axes == {0, 1}
+
+
+def test_rejections_are_counted():
+    names = names_in("long/v1/d000..d029")
+    found = rejections(names)
+    assert found.instances == 30
+    assert found.draws == 30 + sum(found.by_rule.values())
+    assert found.by_rule["overlap"] > 0
+    assert found.rate == pytest.approx(1 - 30 / found.draws)
+    assert list(found.by_rule) == [*RULES, CORRECTIVE]
+
+
+def test_splits_share_no_instance():
+    ranges = ("d000..d099", "i000..i099", "2027-000..2027-099", "2028-000..2028-099")
+    tasks = [[instance(name) for name in names_in(f"two-armed/v1/{each}")] for each in ranges]
+    assert [{task.split for task in each} for each in tasks] == [
+        {"development"}, {"test"}, {"fresh"}, {"fresh"},
+    ]  # fmt: skip
+    assert len({task.goals for each in tasks for task in each}) == 400
+    assert len({task.name for each in tasks for task in each}) == 400
+    streams = [family.key(each) for family in families().values() for each in ("d", "i", "2027-")]
+    assert len(set(streams)) == 15
+    assert load_task("ascending").family is load_task("ascending").split is None
+
+
+@pytest.mark.parametrize("name", ["two-armed/v1/i1000", "long/v1/2027-000", "a-b/v12/d999999"])
+def test_addresses(name):
+    address = address_of(name)
+    assert str(address) == name
+    assert address.family == name.rpartition("/")[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("two-armed/v1/i17", "is no instance of a family; one is written two-armed/v1/i017"),
+        ("two-armed/v1/i0017", "is no instance of a family"),
+        ("two-armed/v1/x017", "is no instance of a family"),
+        ("two-armed/v1/i1000000", "is no instance of a family"),
+        ("/etc/passwd", "is no instance of a family"),
+        ("two-armd/v1/i017", "unknown family 'two-armd/v1'; did you mean 'two-armed/v1'?"),
+        ("two-armed/v9/i017", "unknown family 'two-armed/v9'"),
+        ("nothing", "that of an instance is FAMILY/v1/i017"),
+    ],
+)
+def test_what_is_no_instance_is_said(name, words):
+    with pytest.raises(TaskError) as caught:
+        load_task(name)
+    assert words in str(caught.value)
+
+
+def test_ranges():
+    assert names_in("long/v1/2027-008..2027-011") == [
+        f"long/v1/2027-{n}" for n in ("008", "009", "010", "011")
+    ]
+    for text in ("long/v1/i003..i001", f"long/v1/i000..i{MOST_CELLS}"):
+        with pytest.raises(TaskError, match="names no instance, or more than 10_000"):
+            names_in(text)
+    for text in ("long/v1/i000..d003", "long/v1/i000", "long/v1/i000..", "i000..i003"):
+        with pytest.raises(TaskError, match="is no range of instances"):
+            names_in(text)
+
+
+def test_a_file_by_an_instances_name_is_that_instance(tmp_path):
+    path = tmp_path / "i016.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    assert load_task(path) == instance("two-armed/v1/i016")
+    path.write_text(TEXT.replace("5.063", "5.064"), encoding="utf-8")
+    with pytest.raises(TaskError, match="this is not what the family draws by that name"):
+        load_task(path)
+    path.write_text(TEXT.replace("two-armed/v1/i016", "two-armed/v1/mine"), encoding="utf-8")
+    with pytest.raises(TaskError, match="is no instance of a family"):
+        load_task(path)
+
+
+def family_file(tmp_path, name="mine.v1.toml", **changes):
+    content = {
+        "title": '"Mine"', "description": '"Mine."', "goals": "[2, 3]", "links": "[4, 4]",
+        "base": '["free"]',
+    } | changes  # fmt: skip
+    text = "".join(f"{key} = {value}\n" for key, value in content.items())
+    path = tmp_path / name
+    path.write_text(text + "[region]\nx = [-5, 5]\ny = [-3, 3]\n[[start]]\n", encoding="utf-8")
+    return path
+
+
+def test_a_family_of_ones_own(tmp_path):
+    family = read_family(family_file(tmp_path, bent="0.0"))
+    assert (family.name, family.reach, family.region.x) == ("mine/v1", 4000, (-5000, 5000))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"goals": "[1, 3]"}, "goals[0] is 1; it must be at least 2"),
+        ({"goals": "[3, 2]"}, "goals: goes from more to less"),
+        ({"links": "[3, 9]"}, "links[1] is 9; it must be at most 8"),
+        ({"apart": "0.1"}, "toml: apart lets goals overlap"),
+        ({"radius": "0.01"}, "radius is not larger than the accuracy of the corrective process"),
+        ({"reach": "4.0001"}, "reach: has more than three decimals"),
+        ({"reach": "-1"}, "reach: should be greater than 0"),
+        ({"within": "1.5"}, "within: should be above 0, at most 1"),
+        ({"clear": "true"}, "clear: should be a number up to 1000"),
+        ({"clear": "nan"}, "clear: should be a number up to 1000"),
+        ({"base": "[]"}, "base has too few entries"),
+        ({"base": '["flying"]'}, "base[0] is 'flying'"),
+        ({"bend": "0.1"}, "bend is an unknown key; did you mean 'bent'?"),
+        ({"name": "x.toml"}, "the name of a family's file is NAME.v1.toml"),
+    ],
+)
+def test_a_family_that_cannot_be_is_refused(tmp_path, changes, words):
+    with pytest.raises(TaskError) as caught:
+        read_family(family_file(tmp_path, **changes))
+    assert words in str(caught.value)
+
+
+def test_a_family_that_cannot_be_met_ends(monkeypatch):
+    monkeypatch.setattr("coartic.families.MOST_ATTEMPTS", 20)
+    monkeypatch.setitem(RULES, "overlap", lambda candidate: True)
+    drawn.cache_clear()
+    with pytest.raises(TaskError, match="20 draws of family 'two-armed/v1' broke a rule, 20 of"):
+        instance("two-armed/v1/i000")
+    drawn.cache_clear()
+
+
+def test_draws_follow_version_and_number(monkeypatch):
+    """What an instance takes its numbers from, and nothing else."""
+    asked = []
+    monkeypatch.setattr(
+        "coartic.families.Draws", lambda *given: asked.append(given) or Draws(*given)
+    )
+    candidate_of(Address("long/v1", "2027-", 41), 3)
+    key = hashlib.sha256(b"coartic long/v1/2027-").digest()[:8]
+    words = int.from_bytes(key[:4], "little"), int.from_bytes(key[4:], "little")
+    assert asked == [(words, 41, 0, 0), (words, 41, 3, 1)]
+
+
+SMALL = Selection(
+    tasks=["two-armed/v1/i000..i001"], methods=["EC3", "EC4", "corrective-alone/given"]
+)
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_small_suite(tmp_path):
+    """Every record holds the whole task, and thereby the hash of the instance's file."""
+    report = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
+    assert (report.progress.done, report.progress.failed) == (10, 0)
+    names = names_in("two-armed/v1/i000..i001")
+    hashes = {name: task_hash(instance(name)) for name in names}
+    seen = {(record.task.name, task_hash(record.task)) for record in report.records.values()}
+    assert seen == set(hashes.items())
+    plan = report.manifest.specification
+    assert {n: task_hash(parse_task(t, "manifest")) for n, t in plan.tasks.items()} == hashes
+    runs = load_runs(report.folder)
+    assert set(runs.task) == set(names)
+    assert list(runs.columns) == RUNS.names
+    again = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
+    assert (again.progress.present, again.progress.done) == (10, 0)
+
+
+def load_runs(folder):
+    from analysis.results.folder import load_results
+
+    return load_results(folder).runs
+
+
+def test_a_record_of_another_task_has_another_id():
+    (plan,) = plan_suite(
+        "families", runs=1, select=Selection(["two-armed/v1/i016"], ["EC4"])
+    ).cells
+    asked = plan.setting.asked
+    moved = asked.model_copy(
+        update={"task": asked.task | {"goals": [[5.064, -0.303], *asked.task["goals"][1:]]}}
+    )
+    assert list(asked.keys([0])) != list(moved.keys([0]))
+
+
+def test_the_shipped_suite():
+    suite = plan_suite("families", runs=1)
+    tasks = {plan.cell.task.name: plan.cell.task for plan in suite.cells}
+    assert {task.family for task in tasks.values()} == set(families())
+    assert {task.split for task in tasks.values()} == {"test"}
+    assert len(tasks) >= 200
+
+
+def test_blocks_name_ranges(tmp_path):
+    block = (
+        'tasks = ["one-armed/v1/d000..d002", "one-armed/v1/d001"]\nmethods = ["dual-process/EC1"]'
+    )
+    cells = suite_of(tmp_path, block)
+    assert [cell.task.name for cell in cells] == names_in("one-armed/v1/d000..d002")
+
+
+def test_a_goal_of_an_instance_moves(tmp_path):
+    block = 'tasks = ["two-armed/v1/i003"]\nmethods = ["dual-process/EC4"]\n'
+    cells = suite_of(tmp_path, block + "move = { goal = 2, by = [[0, 0.5]] }")
+    (task,) = (cell.task for cell in cells)
+    assert task.name == "two-armed/v1/i003.goal2_0_0.5"
+    assert task.family is task.split is None
+    assert task.goals[1] == pytest.approx(np.add(instance("two-armed/v1/i003").goals[1], (0, 0.5)))
+
+
+def test_an_instance_beside_a_suites_tasks():
+    select = Selection(tasks=["two-armed/v1/i003..i004", "two-armed-1"], methods=["EC4"])
+    plan = plan_suite("paper", runs=1, select=select)
+    assert [cell.cell.task.name for cell in plan.cells] == [
+        "two-armed-1", "two-armed/v1/i003", "two-armed/v1/i004",
+    ]  # fmt: skip
+    # The paper's EC1 is for one arm, and comes to the right hand by itself.
+    alone = plan_suite("paper", runs=1, select=Selection(tasks=["one-armed/v1/i000"]))
+    assert [cell.cell.method for cell in alone.cells] == ["dual-process/EC1"]
+
+
+def test_command_lists_families(monkeypatch, capsys):
+    code, text, error = call(monkeypatch, capsys, "families", "--count", 20)
+    assert (code, error) == (0, "")
+    for name in RELEASED:
+        assert name in text
+    found = rejections(names_in("long/v1/i000..i019"))
+    line = next(line.split() for line in text.splitlines() if line.split()[:1] == ["long/v1"]
+                and "%" in line)  # fmt: skip
+    counts = [str(found.by_rule[rule]) for rule in (*RULES, CORRECTIVE)]
+    assert line == ["long/v1", str(found.draws), f"{found.rate:.1%}", *counts]
+    assert all(words in text for words in RULES_IN_WORDS.values())
+
+
+def test_command_writes_instances(monkeypatch, capsys, tmp_path):
+    out = tmp_path / "tasks"
+    command = ("families", "long", "--draw", 2, "--out", out, "--split", "2027")
+    for _ in range(2):  # what it wrote itself is replaced
+        code, text, error = call(monkeypatch, capsys, *command)
+        assert (code, error) == (0, "")
+    for name in names_in("long/v1/2027-000..2027-001"):
+        path = out / f"{name}.toml"
+        assert load_task(path) == instance(name)
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        assert digest == task_hash(instance(name))
+        assert digest[:16] in text
+    assert (out / "long.v1.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--draw", 2), "--draw N and --out FOLDER go together"),
+        (("long", "--draw", 2), "--draw N and --out FOLDER go together"),
+        (("long", "--split", "spring"), "give development, test, or a year such as 2027"),
+        (("lang",), "unknown family 'lang'"),
+    ],
+)
+def test_command_refuses(monkeypatch, capsys, arguments, words):
+    code, _, error = call(monkeypatch, capsys, "families", *arguments)
+    assert code == 2
+    assert words in error
+
+
+def test_command_draws_ranges(monkeypatch, capsys, tmp_path):
+    out = tmp_path / "some.svg"
+    code, text, _ = call(
+        monkeypatch, capsys, "draw", "--tasks", "one-armed/v1/d000..d001", "--out", out
+    )
+    assert code == 0
+    assert "one-armed/v1/d000, one-armed/v1/d001 drawn in" in text
+
+
+def test_the_picture_is_of_instances_as_they_are(monkeypatch, capsys, tmp_path):
+    two = [f"{name}/v1/i000..i001" for name in ("one-armed", "two-armed", "aligned", "redundancy")]
+    names = ",".join([*two, "long/v1/i001..i002"])
+    call(monkeypatch, capsys, "draw", "--tasks", names, "--out", tmp_path / "families.svg")
+    drawn_now = (tmp_path / "families.svg").read_bytes()
+    assert drawn_now == (ROOT / "docs" / "families.svg").read_bytes()
+
+
+def test_learners_apply_to_instances():
+    for name in ("two-armed/v1/i000", "redundancy/v1/i000", "long/v1/i000", "aligned/v1/i000"):
+        for method in ("dual-process/EC2", "dual-process/EC4", "optimum/dynamic-programming"):
+            assert KNOWN[method].why_not(load_task(name)) is None
+    assert KNOWN["dual-process/EC1"].why_not(load_task("one-armed/v1/i000")) is None
