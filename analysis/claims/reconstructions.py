@@ -1,7 +1,7 @@
 """In how many admissible reconstructions of the two-armed tasks each claim holds.
 
 ``reconstructions.csv`` has a row a claim and a task whose goals were replaced by those of each
-member of its ensemble: counts of verdicts, those of the register. It is ``shares.csv`` of
+member of its ensemble: counts of verdicts, p-values uncorrected. It is ``shares.csv`` of
 ``coartic robustness`` over suite ``reconstructions`` (docs/reconstruction.md). Members are no
 sample of anything: these counts are no probabilities.
 """
