@@ -84,6 +84,22 @@ def test_suite_comparison_has_every_method_on_every_task_it_applies_to():
     assert set(suites()) >= {"paper", "comparison", "quick"}
 
 
+def test_suite_ablations_frees_the_base():
+    cells = select_cells(load_suite("ablations"), KNOWN)
+    tasks = {cell.task.name: cell.task for cell in cells}
+    free, rail = tasks["two-armed-1.free-base"], tasks["two-armed-1"]
+    assert (free.locked_base, rail.locked_base) == ((), ("y",))
+    assert free.provenance["locked_base"].status == "chosen"
+    same = {"goals", "start", "hands", "radius", "initial_hands"}
+    assert free.model_dump(include=same) == rail.model_dump(include=same)
+    blocks = {
+        "cells": [{"tasks": ["ascending"], "methods": ["dual-process/EC1"], "free_base": True}]
+    }
+    suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
+    with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
+        select_cells(suite, KNOWN)
+
+
 def test_runs_table(results):
     runs = results.runs
     assert list(runs.columns) == RUNS.names

@@ -204,6 +204,14 @@ def test_conditions_have_the_claims_test_and_the_others_two_tails(tmp_path):
     assert second["test"].startswith("two-tailed")
 
 
+def test_a_condition_that_explores_more_may_be_lower(tmp_path):
+    """Its p is near 1, which the page turns."""
+    conditions = cell("dual-process/EC4", EC3, travel=1.0), cell("dual-process/EC3", EC4)
+    found = study(tmp_path, *conditions)
+    assert found.pairs.p.tolist() == [1.0]
+    assert "dual-process/EC4 and other conditions: lower than dual-process/EC3" in page(found)
+
+
 def test_holm_over_the_rows_of_a_task(tmp_path):
     """By hand: the smallest p times the number of tests, the next times one less, rising."""
     shifts = {"a": 20, "b": 2, "c": 1, "d": 0}

@@ -43,18 +43,26 @@ def _arm_prepares(data: Data) -> Finding:
     tests, parts = [], []
     for task in (ONE, TWO):
         for condition in ("EC3", "EC4"):
-            runs = data.cell(task, LEARNER + condition).runs
-            gains = np.array([served(run) for run in runs])
-            if not np.isfinite(gains).all():
-                raise MissingError(f"the corrective process alone misses a goal of {task}")
-            own, following = gains.mean(axis=1).T
+            own, following = _served(data.cell(task, LEARNER + condition))
             tests.append(exceeds(following, 0.0))
             parts.append(f"{task} {condition} {shown(following)} ticks, {shown(own)} ticks")
+        for label in _CONTROLS:
+            with suppress(MissingError):
+                own, following = _served(data.cell(task, label))
+                parts.append(f"{task} {label} {following.mean():.1f}, {own.mean():.1f}")
     before = (
         "gained on the way to the next goal, and spent more on the way to this one, against the "
         "posture in which the corrective process would have hit it, mean over goals: "
     )
     return all_hold(tests, parts, before)
+
+
+def _served(cell: Trajectories) -> Array:
+    """Means over goals of :func:`analysis.signatures.subtasks.served`, shape ``(2, runs)``."""
+    gains = np.array([served(run) for run in cell.runs])
+    if not np.isfinite(gains).all():
+        raise MissingError(f"the corrective process alone misses a goal of {cell.task.name}")
+    return np.asarray(gains.mean(axis=1).T)
 
 
 def prepared_by_waiting(cell: Trajectories) -> Array:

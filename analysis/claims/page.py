@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import sys
+import textwrap
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +30,17 @@ SENTENCES: list[dict[str, Any]] = tomllib.loads(
 
 def page() -> str:
     """The page in Markdown."""
-    return "\n".join(_lines()) + "\n"
+    return "\n".join(map(_wrapped, _lines())) + "\n"
+
+
+def _wrapped(line: str) -> str:
+    """A line of text in several; headings and rows of tables stay as they are."""
+    if line.startswith(("#", "|")):
+        return line
+    indent = "  " * line.startswith(("- ", "  "))
+    return textwrap.fill(
+        line, 100, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
+    )
 
 
 def _lines() -> Iterator[str]:

@@ -6,12 +6,15 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from analysis.claims.data import Data
 from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Claim, Finding
 from analysis.claims.statements import JUDGED, MARGINS, STATEMENTS
+from analysis.printed import ENTRIES, Count
 from analysis.published import published_cell, published_exhaustive, published_initial
 from analysis.statistics.estimates import (
     SEED,
@@ -19,7 +22,7 @@ from analysis.statistics.estimates import (
     difference_of_means,
     probability_of_improvement,
 )
-from analysis.statistics.hypotheses import share_test
+from analysis.statistics.hypotheses import Alternative, share_p, share_test
 from analysis.words import interval, tally
 from coartic.robot import Array
 
@@ -79,16 +82,18 @@ def printed_known(task: str, side: Side) -> float | None:
     return None if printed is None else printed[1]
 
 
-def printed_mean(task: str, side: Side) -> float | None:
-    """Printed mean reward of one side, as far as the paper has one."""
+def _as_printed(task: str, side: Side) -> str | None:
+    """Mean reward of one side as the paper has it, in words."""
     if side.known:
-        return printed_known(task, side)
-    cell = published_cell(task, side.name)
-    if cell is None:
-        return None
-    of_hands = {s.hands: s.summary for s in cell.sequences}
-    summary = of_hands.get(side.hands) if side.hands else cell.summary
-    return None if summary is None else summary.mean
+        initial = published_initial(task)
+        derived = side.name == "initial" and initial is not None and initial[2]
+        value = printed_known(task, side)
+    else:
+        cell = published_cell(task, side.name)
+        of_hands = {s.hands: s.summary for s in cell.sequences} if cell else {}
+        summary = of_hands.get(side.hands) if side.hands else cell and cell.summary
+        value, derived = (summary.mean, summary.derived) if summary else (None, False)
+    return None if value is None else f"{value:.4g}{' (derived)' * derived}"
 
 
 def _rewards(data: Data, task: str, side: Side, other: Side) -> Array | float:
@@ -118,9 +123,9 @@ def _higher(data: Data, claim: Claim) -> Finding:
                     f"{interval(difference_of_means(a, b, seed=SEED))}, "
                     f"P(higher) {interval(chance, '.2f')}"
                 )
-            printed = [printed_mean(task, side) for side in (first, second)]
-            if printed[0] is not None and printed[1] is not None:
-                found += f" (published {printed[0]:.4g} and {printed[1]:.4g})"
+            printed = [_as_printed(task, side) for side in (first, second)]
+            if None not in printed:
+                found += f"; published {' and '.join(map(str, printed))}"
             parts.append(f"{task} {'replay of ' * first.replay}{first} {found}")
     return all_hold(tests, parts)
 
@@ -158,11 +163,10 @@ def _share(data: Data, claim: Claim) -> Finding:
     return nearly_all(f"{words} ({tally(found)})", count, found.total(), rule)
 
 
-def half_p(count: int, total: int) -> float:
+def half_p(count: ArrayLike, total: int) -> Array:
     """p that a share lies between :data:`FEW` and :data:`MOST`: the larger of two exact tests."""
-    return max(
-        share_test(count, total, FEW, "greater").p, share_test(count, total, MOST, "less").p
-    )
+    bounds: tuple[tuple[float, Alternative], ...] = (FEW, "greater"), (MOST, "less")
+    return np.maximum(*(share_p(count, total, bound, side) for bound, side in bounds))
 
 
 def unlike_p(ours: tuple[int, int], printed: tuple[int, int]) -> float:
@@ -183,18 +187,23 @@ def _about(data: Data, claim: Claim) -> Finding:
     condition, hands, _ = counted_hands(text)
     words, count, found = _count(data, task, text)
     total, printed = found.total(), printed_count(task, condition, hands)
+    derived = any(
+        (entry.task, entry.condition, entry.hands) == (task, condition, hands)
+        for entry in ENTRIES.values()
+        if isinstance(entry, Count) and entry.derived
+    )
     low, high = stats.binomtest(count, total).proportion_ci()
     share = count / total
     return Finding(
         FEW < share < MOST,
         f"{words} in {count} of {total} runs ({tally(found)}), {low:.0%} to {high:.0%} of all "
-        f"(95 %); published {printed[0]} of {printed[1]}",
+        f"(95 %); published {printed[0]} of {printed[1]}{' (derived)' * derived}",
         (
             Inference(
                 min(share - FEW, MOST - share),
                 (total,),
                 f"two one-tailed exact binomial tests, {FEW:.0%} and {MOST:.0%}",
-                p=half_p(count, total),
+                p=float(half_p(count, total)),
             ),
         ),
         (

@@ -104,7 +104,7 @@ def judged_specifications(
     Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
     ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. Of
     a member are the claims that some member's runs can judge; where another's cannot, it *cannot
-    tell*. Verdicts are the register's, corrected over its families; ``p`` is not corrected.
+    tell*. p-values are not corrected: of most of a family's claims there are no runs here.
     """
     claims, rows = tuple(claims), []
     known: set[tuple[str, str]] = set()
@@ -116,7 +116,8 @@ def judged_specifications(
             for judged in judge(seen, claims):
                 if own.intersection(judged.run_ids):
                     known.add((spec.task, judged.claim.id))
-                rows.append(dict(_row(spec, judged)))
+                alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
+                rows.append(dict(_row(spec, alone)))
             progress(spec)
     kept = [row for row in rows if (row["task"], row["claim"]) in known]
     return pd.DataFrame(kept, columns=list(COLUMNS))

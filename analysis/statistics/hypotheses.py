@@ -151,8 +151,18 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
         count / total - share,
         (total,),
         f"{_TAILS[alternative]} exact binomial test against {share:.0%}",
-        p=float(stats.binomtest(count, total, share, alternative).pvalue),
+        p=float(share_p(count, total, share, alternative)),
     )
+
+
+def share_p(count: ArrayLike, total: int, share: float, alternative: Alternative) -> Array:
+    """p-values of :func:`share_test`, in the shape of ``count``."""
+    k = np.asarray(count)
+    if alternative == "greater":
+        return np.asarray(stats.binom.sf(k - 1, total, share))
+    if alternative == "less":
+        return np.asarray(stats.binom.cdf(k, total, share))
+    return np.asarray(np.vectorize(lambda one: stats.binomtest(one, total, share).pvalue)(k))
 
 
 def independence_test(first: Sequence[int], second: Sequence[int], *, seed: int) -> Inference:

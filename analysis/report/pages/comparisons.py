@@ -70,7 +70,9 @@ _VERDICTS = _HIGHER, _LOWER, _NOT_APART, _UNTESTED = (
 
 
 def _verdict(row: PairRow) -> str:
-    p = row.p if row.kind == "conditions" else row.p_holm
+    p = row.p_holm
+    if row.kind == "conditions":  # one-tailed: turned where it speaks for the contrary
+        p = min(row.p, 1 - row.p)
     if math.isnan(p):
         return _UNTESTED
     if p >= LEVEL:
