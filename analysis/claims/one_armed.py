@@ -63,6 +63,32 @@ def sacrifice(data: Data, method: str) -> tuple[float, float]:
     return float(first.value), float(total.value)
 
 
+@decides("overall-reward")
+def _overall_reward(data: Data) -> Finding:
+    tests, parts = [], []
+    alone = f"{_EC1}-subtask"
+    for task in (ASCENDING, DESCENDING):
+        replays = data.replays(task, "EC1"), data.replays(task, "EC1-subtask")
+        first = [
+            np.array([float(run.execution.ticks_by_goal()[0]) for run in data.cell(task, m).runs])
+            for m in (_EC1, alone)
+        ]
+        tests += [exceeds(*replays), exceeds(*first)]
+        initial = data.initial(task)
+        parts.append(
+            f"{task}: replay {shown(replays[0])} against {shown(replays[1])} (initial "
+            f"{-initial.ticks}), first movement {shown(first[0])} against {shown(first[1])} ticks "
+            f"(initial {initial.ticks_by_goal()[0]})"
+        )
+    with suppress(MissingError):
+        apart = [context_distance(data, method) for method in (_EC1, alone)]
+        parts.append(
+            f"postures at goal 1 before different successors {apart[0]:.2f} and {apart[1]:.2f} "
+            "apart in the best trials, which are chosen by the whole reward"
+        )
+    return all_hold(tests, parts)
+
+
 @decides("context")
 def _context_matters(data: Data) -> Finding:
     distance = context_distance(data, _EC1)
