@@ -39,7 +39,7 @@ from analysis.words import interval
 from benchmarks.suites import Cell
 from coartic import corrective_trial, load_task, trajectory
 from tests.support.made_up import MadeUp, manifest_for, replanned, row
-from tests.support.strategies import changed
+from tests.support.strategies import as_released, changed
 from tests.support.suites import KNOWN, ROOT, run_and_write
 
 NOTHING = Results(None, manifest_for([]), pd.DataFrame(), pd.DataFrame())
@@ -165,11 +165,6 @@ def planted_results(rows, tmp_path, sequences=SEQUENCES, tasks=()):
         for hands, reward in rewards.items()
     ]
     return Results(tmp_path, manifest_for(known.values(), runs), runs, pd.DataFrame(table))
-
-
-def as_released(task):
-    """A task with its goals of the first release: cases that these goals have and others lack."""
-    return changed(task, goals=load_task(f"{task}-v0.1").goals)
 
 
 def verdict_of(claim, study):
