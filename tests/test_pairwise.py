@@ -20,7 +20,7 @@ from analysis.study import Study
 from benchmarks.registry import registry
 from benchmarks.suites import Cell
 from coartic import load_task
-from tests.support.made_up import manifest_for, row
+from tests.support.made_up import MadeUp, made_up_optima, manifest_for, row
 from tests.support.reports import shown
 from tests.support.suites import run_and_write
 
@@ -52,7 +52,8 @@ def study(tmp_path, *cells, tasks=None):
             "reward": pd.array([-671, -357, -319], "Int64"),
         }
     )
-    return Study(Results(tmp_path, manifest_for(tasks.values(), runs), runs, initial))
+    results = Results(tmp_path, manifest_for(tasks.values(), runs), runs, initial)
+    return MadeUp(results, optima=made_up_optima(*{T1, T2, "ascending"}.intersection(tasks)))
 
 
 def page(of):
