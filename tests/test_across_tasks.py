@@ -40,9 +40,8 @@ def test_scores_of_a_results_folder(tmp_path):
     assert scores[["reward", "score", "gap"]].iloc[1].isna().all()
     values = by_task(scores, "dual-process/EC2", "gap")["two-armed-1"]
     assert values == pytest.approx([first.gap, math.nan], nan_ok=True)
-    assert normalised_scores(
-        MadeUp(results, optima=optima)
-    ).empty  # no sequences, no initial solution
+    without_sequences = MadeUp(results, optima=optima)  # hence without an initial solution
+    assert normalised_scores(without_sequences).empty
 
 
 def test_interquartile_mean_over_equal_tasks_is_of_all_runs():
