@@ -10,8 +10,7 @@ from scipy import stats
 
 from analysis.comparisons.overall import by_task, normalised_scores, profiles
 from analysis.statistics import across_tasks
-from analysis.study import Study
-from tests.support.made_up import fake_results
+from tests.support.made_up import MadeUp, fake_results, made_up_optima
 
 
 def test_normalised_scores_and_gaps():
@@ -22,7 +21,7 @@ def test_normalised_scores_and_gaps():
 
 
 def test_scores_of_a_results_folder(tmp_path):
-    """The optimum of two-armed-1 is shipped; its initial solution is among the sequences."""
+    """The initial solution of two-armed-1 is among its sequences."""
     runs = {
         "run": [0, 1], "seed": [7, 8], "status": ["ok", "infeasible"], "reason": ["", "planted"],
         "reward": [-520, None], "hands": ["RRLR", None], "initial_reward": [-671, None],
@@ -30,9 +29,10 @@ def test_scores_of_a_results_folder(tmp_path):
     results = fake_results(tmp_path, runs)
     sequences = pd.DataFrame({"hands": ["LRLR", "RRRR"], "reward": [-533, -671]})
     sequences = sequences.assign(task="two-armed-1", reason="")
-    study = Study(replace(results, sequences=sequences))
+    optima = made_up_optima("two-armed-1")
+    study = MadeUp(replace(results, sequences=sequences), optima=optima)
     scores = normalised_scores(study)
-    optimum = study.optima["two-armed-1", "free"].reward
+    optimum = optima["two-armed-1", "free"].reward
     first = scores.iloc[0]
     assert (first.task, first.method, first.seed) == ("two-armed-1", "dual-process/EC2", 7)
     assert first.score == pytest.approx((671 - 520) / (671 + optimum))
@@ -40,7 +40,8 @@ def test_scores_of_a_results_folder(tmp_path):
     assert scores[["reward", "score", "gap"]].iloc[1].isna().all()
     values = by_task(scores, "dual-process/EC2", "gap")["two-armed-1"]
     assert values == pytest.approx([first.gap, math.nan], nan_ok=True)
-    assert normalised_scores(Study(results)).empty  # no sequences, no initial solution
+    without_sequences = MadeUp(results, optima=optima)  # hence without an initial solution
+    assert normalised_scores(without_sequences).empty
 
 
 def test_interquartile_mean_over_equal_tasks_is_of_all_runs():

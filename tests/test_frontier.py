@@ -29,11 +29,11 @@ from analysis.results.folder import Results
 from analysis.study import Study
 from coartic import load_task
 from coartic.tables import PlanLimits
-from tests.support.made_up import manifest_for, replanned
+from tests.support.made_up import MadeUp, made_up_optima, manifest_for, replanned
 from tests.support.reports import shown
 from tests.support.strategies import tiny_task
 
-BEST = -465  # proven optimum of two-armed 1
+BEST = -465  # made-up optimum of two-armed 1; -490 with the other arm kept still
 NAN = math.nan
 
 
@@ -68,7 +68,8 @@ def study(rows, tmp_path):
     counts = ("reward", "proven_bound", "trials", "movement_ticks", "forward_kinematics")
     runs = pd.DataFrame(rows).drop(columns="rewards").astype(dict.fromkeys(counts, "Int64"))
     task = load_task("two-armed-1")
-    return Study(Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame()))
+    results = Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame())
+    return MadeUp(results, optima=made_up_optima(task.name))
 
 
 def of(frame, method, spend="trials", other_arm="free"):

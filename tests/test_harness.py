@@ -29,14 +29,23 @@ from benchmarks.suites import (
 )
 from benchmarks.tables import write_tables
 from benchmarks.worker import ForeignCodeError, perform
-from coartic import CoarticError, Movement, execute, files, hand_sequences, learn, load_task
+from coartic import (
+    CoarticError,
+    Movement,
+    corrective_trial,
+    execute,
+    files,
+    hand_sequences,
+    learn,
+    load_task,
+)
 from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
 from coartic.method import Information, Parameters, Session
 from coartic.record import run_seeds
 from coartic.rows import movements_from
 from coartic.tables import FORMAT, RUNS
-from tests.support.strategies import tiny_task
+from tests.support.strategies import as_released, tiny_task
 from tests.support.suites import (
     KNOWN,
     paper_cells,
@@ -532,7 +541,8 @@ def test_every_sequence_is_sorted_and_bounded():
     rewards = [execution.reward for _, execution in trials]
     assert rewards == sorted(rewards, reverse=True)
     assert all(hands == execution.hands for hands, execution in trials)
-    two = load_task("two-armed-2")  # RLRR and RRRR tie: fewer changes of hand go first
+    two = as_released("two-armed-2")  # RLRR and RRRR tie: fewer changes of hand go first
+    assert [corrective_trial(two, hands).reward for hands in ("RLRR", "RRRR")] == [-357] * 2
     assert [hands for hands, _ in ranked_sequences(two, hand_sequences(two))[:2]] == [
         "RRRR",
         "RLRR",

@@ -12,7 +12,7 @@ from analysis.results.folder import Results
 from analysis.study import Study
 from coartic import load_task
 from coartic.method import Information
-from tests.support.made_up import manifest_for, row
+from tests.support.made_up import MadeUp, made_up_optima, manifest_for, row
 from tests.support.strategies import changed
 
 
@@ -20,6 +20,12 @@ def study_of(rows, tmp_path, task=None):
     task = task or load_task("two-armed-1")
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     return Study(Results(tmp_path, manifest_for([task], runs), runs, pd.DataFrame()))
+
+
+def study_near_optimum(rows, tmp_path):
+    """Two-armed 1 with a made-up optimum: -465, with the other arm still -490."""
+    results = study_of(rows, tmp_path).results
+    return MadeUp(results, optima=made_up_optima("two-armed-1"))
 
 
 def shown(study):
@@ -36,7 +42,7 @@ def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):
         row("still", -510, run=1),
         row("still", None, run=2, status="infeasible"),
     ]
-    found = study_of(rows, tmp_path).methods.set_index("method")
+    found = study_near_optimum(rows, tmp_path).methods.set_index("method")
     assert found.loc["moving", "gap"] == 10
     assert np.isnan(found.loc["moving", "gap_still"])
     assert found.loc["still", "gap"] == 40
@@ -49,7 +55,7 @@ def test_gaps_are_to_the_optimum_of_the_restriction(tmp_path):
 
 
 def test_what_is_shown(tmp_path):
-    study = study_of([row("m", -475, travel=0.3, jacobians=0)], tmp_path)
+    study = study_near_optimum([row("m", -475, travel=0.3, jacobians=0)], tmp_path)
     assert methods_table(study, "two-armed-1").caption == (
         "All methods on two-armed-1 †; optimum, by the other arm: "
         "free −465 LRLR (proven), still −490 LRLR (proven)."
@@ -64,11 +70,11 @@ def test_what_is_shown(tmp_path):
 
 
 def test_a_reward_above_the_optimum_is_shouted(tmp_path):
-    study = study_of([row("miracle", -464, travel=1.0)], tmp_path)
+    study = study_near_optimum([row("miracle", -464, travel=1.0)], tmp_path)
     assert study.methods.beaten.sum() == 1
     shouted = reading_of_methods(study)[0]
     assert "better than the optimum: it is not one" in shouted
-    study = study_of([row("good", -465, travel=1.0)], tmp_path)
+    study = study_near_optimum([row("good", -465, travel=1.0)], tmp_path)
     assert study.methods.beaten.sum() == 0
     assert shouted not in reading_of_methods(study)
 
@@ -129,7 +135,7 @@ def test_a_base_locked_by_a_parameter_has_no_gap(tmp_path):
 
 
 def test_a_still_arm_above_its_optimum_is_shouted_too(tmp_path):
-    study = study_of([row("still", -480)], tmp_path)  # above -490, below -465
+    study = study_near_optimum([row("still", -480)], tmp_path)  # above -490, below -465
     assert study.methods.beaten.sum() == 1
 
 

@@ -12,8 +12,10 @@ from coartic import (
     hand_sequences,
     learn,
     load_task,
+    reference,
 )
 from coartic.errors import SolutionError
+from coartic.exploration import load_condition
 from coartic.scores import MOST_STEPS, solved
 from tests.support.strategies import PAPER_CELLS, tiny_task
 
@@ -33,20 +35,23 @@ def test_best_trials_re_execute_exactly(name, condition):
             assert np.hypot(*miss) <= run.task.radius
 
 
-def test_corrective_process_alone():
-    """Rewards of the best hand sequences; the first of each task is printed."""
-    best = {"two-armed-1": [-532, -574, -629, -632], "two-armed-2": [-357, -357, -401, -406]}
-    for name, rewards in best.items():
-        task = load_task(name)
-        found = sorted(
-            (corrective_trial(task, h).reward for h in hand_sequences(task)), reverse=True
-        )
-        assert found[:4] == rewards
-        assert len(found) == 16
-    task = load_task("two-armed-1")
-    assert corrective_trial(task, "LRLR").reward == -532
-    assert corrective_trial(task, "RRRR").reward == -675
-    assert corrective_trial(task, "LLLL").reward == -760
+@pytest.mark.parametrize(
+    ("name", "printed"),
+    [("two-armed-1", {"LRLR": -532, "RRRR": -675}), ("two-armed-2", {"RRRR": -357})],
+)
+def test_corrective_process_alone(name, printed):
+    """Every hand sequence, step by step; those of the best and of the initial are printed."""
+    task = load_task(name)
+    found = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
+    assert len(found) == 16
+    for hands, reward in found.items():
+        given = task.model_copy(update={"initial_hands": hands})
+        slow = reference.learn(given, load_condition("EC3"), seed=0, trials=1)
+        assert (reward, slow.completed[0]) == (slow.rewards[0], True)
+    assert {hands: found[hands] for hands in printed} == printed
+    assert max(found, key=found.get) == next(iter(printed))
+    assert sorted(found.values())[-2] < max(found.values())
+    assert found["RRRR"] > found["LLLL"]  # printed of the first task
 
 
 def test_no_way_is_followed_without_end():

@@ -39,3 +39,8 @@ def changed(like, **update):
     """A shipped task with some keys changed, reachable or not."""
     content = {**load_task(like).model_dump(mode="json"), **update}
     return parse_task(content, "test", reach=False)
+
+
+def as_released(task):
+    """A task with its goals of the first release: cases that these goals have and others lack."""
+    return changed(task, goals=load_task(f"{task}-v0.1").goals)
