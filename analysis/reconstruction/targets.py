@@ -74,12 +74,9 @@ def _tests(
             yield Figure(condition, "share", int(entry.value) / RUNS, RUNS, entry.hands)
         case printed.Sequences(condition=condition, found=(only,)):
             yield Figure(condition, "share", 1.0, RUNS, only)
-        case printed.Order(condition=str(condition), than=than) if not entry.sample:
-            if than.condition is not None and entry.goal is None:
-                both = runs, counts.get((than.condition, than.hands), RUNS)
-                below = None if entry.p_below is None else float(entry.p_below)
-                hands = entry.hands, than.hands
-                yield Order(condition, than.condition, both, *hands, p_below=below)
+        case printed.Order(condition=str(condition), hands=None) if not entry.sample:
+            if entry.than.condition is not None and entry.than.hands is None:
+                yield Order(condition, entry.than.condition)
 
 
 def conditions_of(task: str) -> tuple[str, ...]:
