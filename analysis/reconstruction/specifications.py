@@ -9,11 +9,12 @@ doi:10.1038/s41562-020-0912-z).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import pandas as pd
+from joblib import Parallel, delayed
 
 from analysis.claims.catalogue import CLAIMS, judge
 from analysis.claims.register import Claim, Judged
@@ -97,6 +98,7 @@ def judged_specifications(
     studies: Iterable[Study],
     *,
     claims: Iterable[Claim] = PAPERS,
+    jobs: int = 1,
     progress: Callable[[Specification], None] = lambda spec: None,
 ) -> pd.DataFrame:
     """A row a specification and claim of the paper that its runs can judge.
@@ -104,23 +106,34 @@ def judged_specifications(
     Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
     ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. Of
     a member are the claims that some member's runs can judge; where another's cannot, it *cannot
-    tell*. p-values are not corrected: of most of a family's claims there are no runs here.
+    tell*. p-values are not corrected: of most of a family's claims there are no runs here. In
+    ``jobs`` processes; the result is the same.
     """
-    claims, rows = tuple(claims), []
     known: set[tuple[str, str]] = set()
-    for study in studies:
-        for spec, seen in specifications(study):
-            own = set(
-                seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id
-            )
-            for judged in judge(seen, claims):
-                if own.intersection(judged.run_ids):
-                    known.add((spec.task, judged.claim.id))
-                alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
-                rows.append(dict(_row(spec, alone)))
-            progress(spec)
+    rows: list[dict[str, Any]] = []
+    wanted = [claim.id for claim in claims]
+    views = (view for study in studies for view in specifications(study))
+    work = (delayed(_judged)(spec, seen.results, wanted) for spec, seen in views)
+    for spec, found, own in Parallel(jobs, return_as="generator")(work):
+        rows += found
+        known |= {(spec.task, name) for name in own}
+        progress(spec)
     kept = [row for row in rows if (row["task"], row["claim"]) in known]
     return pd.DataFrame(kept, columns=list(COLUMNS))
+
+
+def _judged(
+    spec: Specification, results: Results, claims: Collection[str]
+) -> tuple[Specification, list[dict[str, Any]], list[str]]:
+    """Rows of a specification, and the claims that its own runs can judge."""
+    seen, rows, known = Study(results), [], []
+    own = set(seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id)
+    for judged in judge(seen, [claim for claim in CLAIMS if claim.id in claims]):
+        if own.intersection(judged.run_ids):
+            known.append(judged.claim.id)
+        alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
+        rows.append(dict(_row(spec, alone)))
+    return spec, rows, known
 
 
 def _row(spec: Specification, judged: Judged) -> Iterator[tuple[str, Any]]:

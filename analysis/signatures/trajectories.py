@@ -130,8 +130,11 @@ def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
 
 def all_trajectories(study: Study) -> dict[tuple[str, str], Trajectories]:
     """By task and label, in the order of the plan; those without a solution have no runs."""
-    solutions = dict(list(study.results.solutions().groupby("run_id")))
-    waypoints = study.results.paths()
+    movements, waypoints = (
+        table[table.run_id.isin(study.runs.run_id)]  # a study may be of some of a folder's runs
+        for table in (study.results.solutions(), study.results.paths())
+    )
+    solutions = dict(list(movements.groupby("run_id")))
     paths = dict(list(waypoints.groupby("run_id"))) if len(waypoints) else {}
     found, model = {}, study.model
     for key, cell in study.cells.items():

@@ -134,6 +134,7 @@ def robustness(
         list[Path], typer.Argument(parser=folder_named, help="Results folders, one a reading.")
     ],
     out: given.Out,
+    jobs: given.Jobs = -1,
 ) -> None:
     """Judge the paper's claims under each reading and with the goals of each member."""
     from analysis import load
@@ -141,9 +142,16 @@ def robustness(
     from analysis.reconstruction.curve import specification_curve, verdicts
     from analysis.reconstruction.specifications import judged_specifications, shares
 
+    check_numbers(jobs, None)
     folder = folder_named(out, "--out")
     studies = (load(each) for each in folders)
-    table = judged_specifications(studies, progress=lambda spec: say(f"judged: {spec.label}"))
+    table = judged_specifications(
+        studies, jobs=_threads(jobs), progress=lambda spec: say(f"judged: {spec.label}")
+    )
+    if table.empty:
+        raise CoarticError(
+            "no claim of the paper can be judged there: run its conditions with its 10 000 trials"
+        )
     found = shares(table)
     folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / "specifications.csv", index=False, lineterminator="\n")
