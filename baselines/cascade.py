@@ -43,7 +43,8 @@ SETTINGS: dict[SolverName, dict[str, Any]] = {
         "max_iter": 50_000,
         "adaptive_rho_interval": 50,  # by iterations: by time, results would depend on it
     },
-    "proxqp": {"eps_abs": 1e-11, "eps_rel": 0.0},
+    # Its inner iterations never end on some of these programs, unless they are counted.
+    "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000, "max_iter_in": 100},
 }
 
 SLACK = 1e-6
