@@ -46,7 +46,6 @@ import itertools
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from baselines.cascade import Cascade, CascadeError, Modelling, SolverName, cascade_for

@@ -103,13 +103,13 @@ def recorded(count: int) -> list[Problem]:
 
 def measure(problems: list[Problem]) -> dict[SolverName, Ways]:
     """Every solver on every problem, in both ways."""
-    size = problems[0].rows.shape
+    rows, joints = problems[0].rows.shape
     figures = {name: Ways(Figures(0.0), Figures(0.0)) for name in SOLVERS}
     called: list[tuple[Solver, Figures]] = []
     for name, ways in figures.items():
         for kind, of in ((Cascade, ways.direct), (ModelledCascade, ways.modelled)):
             clock = time.perf_counter()
-            called.append((kind(*size, name), of))
+            called.append((kind(rows, joints, name), of))
             of.build_s = time.perf_counter() - clock
     for problem in problems[:_WARM_UP]:
         for solver, _ in called:

@@ -483,7 +483,7 @@ def test_table_of_solvers(monkeypatch):
     rows = [line.strip("| ").split(" | ") for line in text.splitlines()[2:6]]
     assert [row[0] for row in rows] == list(qp_solvers.SOLVERS)
     for row in rows:
-        assert all(0 < float(figure) < 1000 for figure in row[1:6])  # ms
+        assert all(0 < float(figure) < 60_000 for figure in row[1:6])  # ms
         assert 0 < int(row[6].rstrip("%")) < 100
         assert max(float(figure) for figure in row[7:9] if figure != "-") < 1e-5
         if row[0] in ("clarabel", "daqp"):  # the others give up now and then
