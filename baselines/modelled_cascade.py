@@ -1,7 +1,7 @@
 """The cascade of two quadratic programs as cvxpy states it.
 
 The levels are written here as they are defined; :mod:`baselines.cascade` has the same programs as
-numbers, which saves 63 to 95 % of the time (``python -m benchmarks.qp_solvers``).
+numbers, which saves 94 to 99 % of the time (``python -m benchmarks.qp_solvers``).
 """
 
 from __future__ import annotations

@@ -484,9 +484,9 @@ def test_table_of_solvers(monkeypatch):
     assert [row[0] for row in rows] == list(qp_solvers.SOLVERS)
     for row in rows:
         assert all(0 < float(figure) < 60_000 for figure in row[1:6])  # ms
-        assert 0 < int(row[6].rstrip("%")) < 100
         assert max(float(figure) for figure in row[7:9] if figure != "-") < 1e-5
         if row[0] in ("clarabel", "daqp"):  # the others give up now and then
             assert row[9] == "0, 0"
-    assert text.endswith("osqp: level 2: osqp ended user_limit")
+            assert 0 < int(row[6].rstrip("%")) < 100
+    assert "osqp: level 2: osqp ended user_limit" in text
     assert all(f"{name} " in qp_solvers.conditions() for name in ("cvxpy", "daqp", "osqp"))
