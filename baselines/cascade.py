@@ -1,13 +1,14 @@
-"""A cascade of two prioritised quadratic programs over joint rates.
+"""A cascade of two prioritised quadratic programs over changes of the joints.
 
-Level 1 follows the hand: ``min |J x - v|^2 + λ^2 |x|^2``. Level 2 takes, of all rates
-that move the hand just so, those nearest to the preferred ones: ``min |x - z|^2``
-subject to ``J x = J x_1``. Both keep every joint within ``LIMIT``. Rates ``x`` are in
-units of the joint step m per tick, so that a rate of norm 1 is a full step.
+Level 1 is an inequality task: ``rows @ x >= least`` as nearly as it can be had, ``min s^2 +
+λ^2 |x|^2`` subject to ``rows @ x + s >= least``. Level 2 takes, of all changes that fall
+short of it no more than that, the one nearest to the preferred: ``min |x - z|^2`` subject to
+``rows @ x >= least - s``. Both keep every joint within ``LIMIT``.
 
-Lexicographic quadratic programs: O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), Kinematic
-control of redundant manipulators, IEEE Transactions on Robotics. Without limits the
-answer is :func:`damped_projection`, which the tests check.
+Inequality tasks in lexicographic quadratic programs: O. Kanoun, F. Lamiraux, P.-B. Wieber
+(2011), Kinematic control of redundant manipulators: generalizing the task-priority framework
+to inequality tasks, IEEE Transactions on Robotics. With one row and no limit the answer is
+:func:`damped_projection`, which the tests check.
 """
 
 from __future__ import annotations
@@ -26,16 +27,14 @@ SolverName = Literal["clarabel", "daqp", "osqp", "proxqp"]
 Modelling = Literal["cvxpy", "none"]
 
 DAMPING = 0.01
-"""λ, length unit per unit rate: 1e-4 of the hand's rate is given up where the smallest
-singular value of J is 1, and rates stay bounded where it is 0."""
+"""λ, length unit per unit of change: 1e-4 of what level 1 asks is given up where the singular
+value is 1, and changes stay bounded where it is 0."""
 
 LIMIT = 2.0
-"""Largest rate of any joint. Level 1 is asked for a full step (norm 1) and level 2 adds to
-it; only their sum is scaled to the step. With a limit of 1, a hand carried by the base at
-full speed would leave level 2 nothing (next goal on ascending: -318 where 2 gives -304)."""
+"""Largest change of any joint; where it binds, level 1 falls short."""
 
 SETTINGS: dict[SolverName, dict[str, Any]] = {
-    # Tighter than their defaults, which are seen in the rates (up to 1e-5).
+    # Tighter than their defaults, which are seen in the changes (up to 1e-5).
     "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "daqp": {},
     "osqp": {
@@ -44,8 +43,12 @@ SETTINGS: dict[SolverName, dict[str, Any]] = {
         "max_iter": 50_000,
         "adaptive_rho_interval": 50,  # by iterations: by time, results would depend on it
     },
-    "proxqp": {"eps_abs": 1e-11, "eps_rel": 0.0},
+    # Its inner iterations never end on some of these programs, unless they are counted.
+    "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000, "max_iter_in": 100},
 }
+
+SLACK = 1e-6
+"""Length unit, added to level 1's shortfall: where limits bind, level 2 has more than a point."""
 
 
 class CascadeError(CoarticError):
@@ -53,43 +56,34 @@ class CascadeError(CoarticError):
 
 
 class Program(NamedTuple):
-    """A quadratic program: min ½ x'Px subject to lower <= Ax <= upper.
-
-    The variables are what is to be least (the error of the hand, or of the rates) and then
-    the rates. So a problem changes only A and the bounds of its first rows, the equalities,
-    as when a modelling language states it.
-    """
+    """A quadratic program: min ½ x'Px + g'x subject to Ax <= upper."""
 
     hessian: Array
     """P, diagonal, shape ``(n, n)``."""
+    gradient: Array
     rows: Array
-    """A, shape ``(m, n)``."""
-    lower: Array
+    """A, shape ``(m, n)``: the task's, then the limits of the changes."""
     upper: Array
-    equalities: int
-    """Rows of equalities; the others keep the rates within ``LIMIT``."""
 
     @classmethod
-    def of(cls, errors: Array, weight: float, joints: int) -> Program:
-        """A program of ``errors`` (rows, errors), and rates with a ``weight``."""
-        equalities, size = errors.shape
-        limits = np.vstack([np.eye(joints), -np.eye(joints)])
-        rows = np.zeros((equalities + 2 * joints, size + joints))
-        rows[:equalities, :size] = errors
-        rows[equalities:, size:] = limits
+    def of(cls, slacks: int, weight: float, task: int, joints: int) -> Program:
+        """Of ``slacks`` (0 or 1), which come first, and changes of a ``weight``."""
+        size = slacks + joints
+        rows = np.zeros((task + 2 * joints, size))
+        rows[:task, :slacks] = -1.0
+        rows[task:, slacks:] = np.vstack([np.eye(joints), -np.eye(joints)])
         return cls(
-            hessian=np.diag([2.0] * size + [2.0 * weight] * joints),
+            hessian=np.diag([2.0] * slacks + [2.0 * weight] * joints),
+            gradient=np.zeros(size),
             rows=rows,
-            lower=np.repeat([0.0, -np.inf], [equalities, 2 * joints]),
-            upper=np.repeat([0.0, LIMIT], [equalities, 2 * joints]),
-            equalities=equalities,
+            upper=np.full(len(rows), LIMIT),
         )
 
-    def demand(self, first: int, rates: Array, value: Array) -> None:
-        """Fill in equalities from row ``first``: what the rates add up to, less the errors."""
-        rows = slice(first, first + len(value))
-        self.rows[rows, -rates.shape[1] :] = rates
-        self.lower[rows] = self.upper[rows] = value
+    def demand(self, rows: Array, least: Array) -> None:
+        """Fill in the task: ``rows @ x`` is at least this, less the slack."""
+        task, joints = rows.shape
+        self.rows[:task, -joints:] = -rows
+        self.upper[:task] = -least
 
 
 class Solved(NamedTuple):
@@ -102,33 +96,30 @@ class Solved(NamedTuple):
 
 
 class Cascade:
-    """Both levels for robots with ``joints`` joints that may move, built once.
+    """Both levels for so many ``rows`` of a task and ``joints`` that may move, built once.
 
     Each solve only fills in numbers. ``iterations`` and ``solves`` count up; nothing else is
     kept between solves.
     """
 
-    def __init__(self, joints: int, solver: SolverName) -> None:
+    def __init__(self, rows: int, joints: int, solver: SolverName) -> None:
         self.solver = solver
         self.iterations = self.solves = 0
-        self._unit = np.eye(joints)
-        self._follow = Program.of(-np.eye(2), DAMPING**2, joints)
-        self._prefer = Program.of(-np.eye(joints + 2, joints), 0.0, joints)
+        self._reach = Program.of(1, DAMPING**2, rows, joints)
+        self._prefer = Program.of(0, 1.0, rows, joints)
 
-    def solve(self, jacobian: Array, rate: Array, preferred: Array | None = None) -> Array:
-        """Joint rates, shape ``(joints,)``.
+    def solve(self, rows: Array, least: Array, preferred: Array) -> Array:
+        """Changes of the joints, shape ``(joints,)``.
 
-        ``jacobian`` (2, joints) in length unit per unit rate, ``rate`` (2,) of the hand,
-        ``preferred`` (joints,) rates of level 2; None leaves it out, and level 1 alone
-        gives the least rates. Raises CascadeError where a solver fails.
+        ``rows`` (rows, joints) in length unit per unit of change, ``least`` (rows,) what they
+        are to add up to, ``preferred`` (joints,) the changes of level 2. Raises CascadeError
+        where a solver fails.
         """
-        self._follow.demand(0, jacobian, rate)
-        rates = self._solve(1, self._follow)
-        if preferred is not None:
-            self._prefer.demand(0, self._unit, preferred)
-            self._prefer.demand(len(preferred), jacobian, jacobian @ rates)  # as level 1 has it
-            rates = self._solve(2, self._prefer)
-        return rates
+        self._reach.demand(rows, least)
+        short = max(0.0, float(self._solve(1, self._reach)[0])) + SLACK
+        self._prefer.demand(rows, least - short)
+        self._prefer.gradient[:] = -2.0 * preferred
+        return self._solve(2, self._prefer)
 
     def _solve(self, level: Literal[1, 2], program: Program) -> Array:
         try:
@@ -139,25 +130,22 @@ class Cascade:
         self.iterations += found.iterations
         if not found.optimal:
             raise CascadeError(f"level {level}: {self.solver} ended {found.status}")
-        return np.array(found.variables[-len(self._unit) :], dtype=np.float64)
+        return np.array(found.variables, dtype=np.float64)
 
 
 def _daqp(program: Program, settings: dict[str, Any]) -> Solved:
     import daqp
 
-    hessian, rows, lower, upper, equalities = program
-    free = np.full(len(hessian), np.inf)
-    sense = np.zeros(len(free) + len(rows), dtype=np.intc)
-    sense[len(free) : len(free) + equalities] = 5  # an equality
-    proximal = 0.0 if hessian.diagonal().all() else 1e-5  # steps, where P is singular
+    hessian, gradient, rows, upper = program
+    free = np.full(len(gradient), np.inf)
     x, _, flag, info = daqp.solve(
         hessian,
-        np.zeros(len(free)),
+        gradient,
         rows,
         np.concatenate([free, upper]),
-        np.concatenate([-free, lower]),
-        sense,
-        **{"eps_prox": proximal, **settings},
+        np.full(len(free) + len(upper), -np.inf),
+        np.zeros(len(free) + len(upper), dtype=np.intc),
+        **settings,
     )
     return Solved(flag == 1, f"with exit flag {flag}", x, info["iterations"])
 
@@ -165,17 +153,16 @@ def _daqp(program: Program, settings: dict[str, Any]) -> Solved:
 def _clarabel(program: Program, settings: dict[str, Any]) -> Solved:
     import clarabel
 
-    hessian, rows, _, upper, equalities = program
+    hessian, gradient, rows, upper = program
     chosen = clarabel.DefaultSettings()
     for name, value in {"verbose": False, **settings}.items():
         setattr(chosen, name, value)
-    limits = len(rows) - equalities
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix(hessian),
-        np.zeros(len(hessian)),
+        gradient,
         sparse.csc_matrix(rows),
         upper,
-        [clarabel.ZeroConeT(equalities), clarabel.NonnegativeConeT(limits)],
+        [clarabel.NonnegativeConeT(len(rows))],
         chosen,
     ).solve()
     status = str(solution.status)
@@ -185,13 +172,13 @@ def _clarabel(program: Program, settings: dict[str, Any]) -> Solved:
 def _osqp(program: Program, settings: dict[str, Any]) -> Solved:
     import osqp
 
-    hessian, rows, lower, upper, _ = program
+    hessian, gradient, rows, upper = program
     solver = osqp.OSQP()
     solver.setup(
         sparse.csc_matrix(hessian),
-        np.zeros(len(hessian)),
+        gradient,
         sparse.csc_matrix(rows),
-        lower,
+        np.full(len(rows), -np.inf),
         upper,
         **{"verbose": False, "polishing": True, **settings},
     )
@@ -203,19 +190,11 @@ def _osqp(program: Program, settings: dict[str, Any]) -> Solved:
 def _proxqp(program: Program, settings: dict[str, Any]) -> Solved:
     from proxsuite import proxqp
 
-    hessian, rows, lower, upper, equalities = program
-    solver = proxqp.dense.QP(len(hessian), equalities, len(rows) - equalities)
+    hessian, gradient, rows, upper = program
+    solver = proxqp.dense.QP(len(gradient), 0, len(rows))
     for name, value in settings.items():
         setattr(solver.settings, name, value)
-    solver.init(
-        hessian,
-        np.zeros(len(hessian)),
-        rows[:equalities],
-        upper[:equalities],
-        rows[equalities:],
-        lower[equalities:],
-        upper[equalities:],
-    )
+    solver.init(hessian, gradient, None, None, rows, np.full(len(rows), -np.inf), upper)
     solver.solve()
     found = solver.results
     optimal = found.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED
@@ -231,25 +210,28 @@ _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
 
 
 @cache
-def cascade_for(joints: int, solver: SolverName, modelling: Modelling = "none") -> Cascade:
-    """The one cascade of this process for so many joints, this solver and statement."""
+def cascade_for(
+    rows: int, joints: int, solver: SolverName, modelling: Modelling = "none"
+) -> Cascade:
+    """The one cascade of this process for such a task, this solver and statement."""
     if modelling == "none":
-        return Cascade(joints, solver)
+        return Cascade(rows, joints, solver)
     from baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
 
-    return ModelledCascade(joints, solver)
+    return ModelledCascade(rows, joints, solver)
 
 
 def damped_projection(
-    jacobian: Array, rate: Array, preferred: Array, damping: float = DAMPING
+    row: Array, least: float, preferred: Array, damping: float = DAMPING
 ) -> Array:
-    """What the cascade gives where no limit is active, in closed form.
+    """What the cascade gives for a task of one row where no limit is active, in closed form.
 
-    ``J^T (J J^T + λ^2 I)^-1 v + (I - J^+ J) z``; shapes as for :meth:`Cascade.solve`.
-    Sources: Liegeois (1977) for the projection, Nakamura & Hanafusa (1986) for the
-    damping.
+    ``z + a (b - a.z)_+ / |a|^2``, with ``a`` the row and ``b`` what the damping leaves of a
+    demand, ``least |a|^2 / (|a|^2 + λ^2)`` if that is positive; shapes ``(joints,)``. Sources:
+    Liegeois (1977) for the projection, Nakamura & Hanafusa (1986) for the damping.
     """
-    gram = jacobian @ jacobian.T + damping**2 * np.eye(len(jacobian))
-    follow = jacobian.T @ np.linalg.solve(gram, rate)
-    rest: Array = follow + preferred - np.linalg.pinv(jacobian) @ (jacobian @ preferred)
-    return rest
+    square = float(row @ row)
+    left = least * square / (square + damping**2) if least > 0 else least
+    missing = max(0.0, left - float(row @ preferred))
+    found: Array = preferred + row * (missing / square if missing else 0.0)
+    return found

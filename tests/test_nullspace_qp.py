@@ -8,19 +8,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.linalg import null_space
-from scipy.optimize import LinearConstraint, lsq_linear, minimize
+from scipy.optimize import LinearConstraint, minimize
 
 from baselines.cascade import (
     DAMPING,
     LIMIT,
     SETTINGS,
+    SLACK,
     Cascade,
     CascadeError,
     cascade_for,
     damped_projection,
 )
+from baselines.corrective_alone import EverySequence
 from baselines.modelled_cascade import ModelledCascade
-from baselines.nullspace_control import Aim, Controller
+from baselines.nullspace_control import FACES, Aim, Controller
 from baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
 from benchmarks import qp_solvers
 from coartic import PAPER, Robot, execute, load_task
@@ -29,6 +31,8 @@ from tests.support.strategies import configurations, tiny_task
 
 ROBOT = Robot()
 NOTHING = np.zeros(ROBOT.dof)
+ANGLES = 2 * np.pi * np.arange(FACES) / FACES
+NORMALS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 
 
 def solve(method, task, **parameters):
@@ -38,50 +42,114 @@ def solve(method, task, **parameters):
     return result, execute(task, result.solution), session
 
 
-def problems(count, seed, rate=0.5, preferred=0.3):
+def problems(count, seed, far=0.5, preferred=0.3):
+    """Discs of goals that lie so far from the hand, and changes preferred."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         jacobian = ROBOT.jacobian(rng.uniform(-2, 2, ROBOT.dof), "right")
-        yield jacobian, rng.normal(size=2) * rate, rng.normal(size=ROBOT.dof) * preferred
+        error = rng.normal(size=2) * far
+        yield NORMALS @ jacobian, NORMALS @ error - 0.1, rng.normal(size=ROBOT.dof) * preferred
+
+
+def exact(rows, least, preferred):
+    """The cascade by enumeration: every pair of rows may be the active ones of level 2.
+
+    No limit may be active; two rows decide in the plane of the hand. Level 1 is solved as
+    nonnegative least squares would be, by the same enumeration in ``(s / λ, x)``.
+    """
+    joints = rows.shape[1]
+
+    def nearest(rows, least, preferred):
+        best = None
+        for active in itertools.chain.from_iterable(
+            itertools.combinations(range(len(rows)), size) for size in range(3)
+        ):
+            some = rows[list(active)]
+            found = preferred + np.linalg.pinv(some) @ (least[list(active)] - some @ preferred)
+            if (rows @ found < least - 1e-9).any():
+                continue
+            if best is None or np.linalg.norm(found - preferred) < np.linalg.norm(
+                best - preferred
+            ):
+                best = found
+        return best
+
+    slack = np.full((len(rows), 1), DAMPING)  # in units of 1 / λ
+    first = nearest(np.hstack([rows, slack]), least, np.zeros(joints + 1))
+    return nearest(rows, least - DAMPING * first[-1], preferred)
 
 
 @settings(max_examples=50)
 @given(
     configurations(ROBOT, -3, 3),
-    arrays(float, 2, elements=st.floats(-1, 1)),
+    st.floats(0, 2 * np.pi),
+    st.floats(-1, 1),
     arrays(float, ROBOT.dof, elements=st.floats(-0.5, 0.5)),
     st.sampled_from([0.0, DAMPING, 0.3]),
 )
-def test_closed_form_is_the_damped_pseudoinverse_and_a_projection(q, rate, preferred, damping):
+def test_closed_form_is_the_damped_pseudoinverse_and_a_projection(
+    q, angle, least, preferred, damping
+):
     """Level 1 by least squares with the damping as rows, level 2 in a basis of the nullspace."""
-    jacobian = ROBOT.jacobian(q, "left")
-    rows = np.vstack([jacobian, damping * np.eye(ROBOT.dof)])
-    first = np.linalg.lstsq(rows, np.concatenate([rate, NOTHING]), rcond=None)[0]
-    basis = null_space(jacobian)
-    found = damped_projection(jacobian, rate, preferred, damping)
-    np.testing.assert_allclose(found, first + basis @ (basis.T @ preferred), atol=1e-8)
+    row = np.array([np.cos(angle), np.sin(angle)]) @ ROBOT.jacobian(q, "left")
+    found = damped_projection(row, least, preferred, damping)
+    rows = np.vstack([row, damping * np.eye(ROBOT.dof)])
+    first = np.linalg.lstsq(rows, np.array([max(least, 0.0), *NOTHING]), rcond=None)[0]
+    wanted = row @ first if least > 0 else least
+    if row @ preferred >= wanted:
+        np.testing.assert_array_equal(found, preferred)
+        return
+    basis = null_space(row[None])
+    if least > 0:
+        np.testing.assert_allclose(found, first + basis @ (basis.T @ preferred), atol=1e-8)
+    assert row @ found == pytest.approx(wanted, abs=1e-8)
+    np.testing.assert_allclose(basis.T @ (found - preferred), 0, atol=1e-8)
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
-def test_without_active_limits_the_cascade_is_the_closed_form(solver):
-    cascade = cascade_for(ROBOT.dof, solver)
-    for problem in problems(10, 1):
-        exact = damped_projection(*problem)
-        assert np.abs(exact).max() < LIMIT
-        np.testing.assert_allclose(cascade.solve(*problem), exact, atol=1e-7)
-        least = damped_projection(*problem[:2], NOTHING)
-        np.testing.assert_allclose(cascade.solve(*problem[:2]), least, atol=1e-7)
+def test_one_row_without_active_limits_is_the_closed_form(solver):
+    cascade = cascade_for(1, ROBOT.dof, solver)
+    for rows, least, preferred in problems(10, 1):
+        found = damped_projection(rows[0], least[0], preferred)
+        assert np.abs(found).max() < LIMIT
+        np.testing.assert_allclose(
+            cascade.solve(rows[:1], least[:1], preferred), found, atol=1e-7 + SLACK
+        )
+
+
+@pytest.mark.parametrize("solver", SETTINGS)
+def test_a_disc_without_active_limits_is_the_nearest_by_enumeration(solver):
+    cascade = cascade_for(FACES, ROBOT.dof, solver)
+    decided = 0
+    for rows, least, preferred in problems(10, 5):
+        wanted = exact(rows, least, preferred)
+        assert np.abs(wanted).max() < LIMIT
+        np.testing.assert_allclose(
+            cascade.solve(rows, least, preferred), wanted, atol=1e-6 + 10 * SLACK
+        )
+        decided += np.linalg.norm(wanted - preferred) > 1e-3
+    assert decided > 5
+
+
+def test_what_is_preferred_is_left_alone_where_the_task_allows_it():
+    """An inequality: inside the disc the hand goes wherever the joints would have it."""
+    rows = NORMALS @ ROBOT.jacobian(np.linspace(-1, 1, ROBOT.dof), "right")
+    preferred = np.linspace(-0.01, 0.01, ROBOT.dof)
+    assert (rows @ preferred).min() > -0.1
+    found = cascade_for(FACES, ROBOT.dof, "daqp").solve(rows, np.full(FACES, -0.1), preferred)
+    np.testing.assert_allclose(found, preferred, atol=1e-12)
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_a_modelling_language_gives_the_same(solver):
     """cvxpy is told the two levels as they are defined; limits are active in half of them."""
-    modelled = ModelledCascade(ROBOT.dof, solver)
+    modelled = ModelledCascade(FACES, ROBOT.dof, solver)
     assert all(level.is_dcp(dpp=True) for level in modelled.levels)
-    cascade = cascade_for(ROBOT.dof, solver)
-    for problem in (*problems(5, 3), *problems(5, 4, rate=4.0, preferred=1.0)):
+    cascade = cascade_for(FACES, ROBOT.dof, solver)
+    for number, problem in enumerate((*problems(5, 3), *problems(5, 4, far=4.0, preferred=1.0))):
         found = cascade.solve(*problem)
-        np.testing.assert_allclose(found, modelled.solve(*problem), rtol=0, atol=1e-8)
+        close = 0.0 if solver == "daqp" else 1e-7 if number < 5 else 1e-4
+        np.testing.assert_allclose(found, modelled.solve(*problem), rtol=0, atol=close)
 
 
 def test_the_method_through_cvxpy_is_the_same_to_the_last_bit():
@@ -97,50 +165,59 @@ def test_the_method_through_cvxpy_is_the_same_to_the_last_bit():
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
-def test_singular_jacobians_leave_the_rates_bounded(solver):
+def test_singular_jacobians_leave_the_changes_bounded(solver):
     """Both arms straight along x on a base locked in x: nothing moves the hand along x."""
-    cascade = cascade_for(ROBOT.dof - 1, solver)
+    cascade = cascade_for(1, ROBOT.dof - 1, solver)
     jacobian = np.delete(ROBOT.jacobian(NOTHING, "right"), 0, axis=1)
     assert np.linalg.matrix_rank(jacobian) == 1
     preferred = np.linspace(-0.2, 0.2, ROBOT.dof - 1)
-    for rate in ([1.0, 0.0], [0.0, 1.0], [0.6, 0.8]):
-        exact = damped_projection(jacobian, np.array(rate), preferred)
-        assert np.linalg.norm(exact) < 1
-        found = cascade.solve(jacobian, np.array(rate), preferred)
-        np.testing.assert_allclose(found, exact, atol=1e-7)
+    for direction in ([1.0, 0.0], [0.0, 1.0], [0.6, 0.8]):
+        rows = np.array(direction)[None] @ jacobian
+        wanted = damped_projection(rows[0], 1.0, preferred) if rows.any() else preferred
+        assert np.linalg.norm(wanted) < 1
+        found = cascade.solve(rows, np.ones(1), preferred)
+        np.testing.assert_allclose(found, wanted, atol=1e-7 + SLACK)
 
 
 def test_with_active_limits_both_levels_are_optimal():
-    """Against bounded least squares (level 1) and a general solver (level 2)."""
-    cascade = cascade_for(ROBOT.dof, "daqp")
-    active = 0
-    for jacobian, rate, preferred in problems(15, 2, rate=8.0, preferred=2.0):
-        rows = np.vstack([jacobian, DAMPING * np.eye(ROBOT.dof)])
-        first = lsq_linear(
-            rows, np.concatenate([rate, NOTHING]), (-LIMIT, LIMIT), method="bvls", tol=1e-14
-        ).x
-        np.testing.assert_allclose(cascade.solve(jacobian, rate), first, atol=1e-5)
-        found = cascade.solve(jacobian, rate, preferred)
-        np.testing.assert_allclose(jacobian @ found, jacobian @ first, atol=1e-5)
+    """Against a general solver: level 1's shortfall, level 2's distance from the preferred."""
+    cascade = cascade_for(FACES, ROBOT.dof, "daqp")
+    limits = [(-LIMIT, LIMIT)] * ROBOT.dof
+    active = missed = 0
+    for rows, least, preferred in problems(12, 2, far=10.0, preferred=2.0):
+        found = cascade.solve(rows, least, preferred)
+        level_1 = minimize(
+            lambda y: y[0] ** 2 + DAMPING**2 * (y[1:] ** 2).sum(),
+            [max(least.max(), 0.0), *NOTHING],
+            jac=lambda y: 2 * np.array([y[0], *(DAMPING**2 * y[1:])]),
+            method="SLSQP",
+            bounds=[(0, None), *limits],
+            constraints=LinearConstraint(np.hstack([np.ones((FACES, 1)), rows]), least),
+            options={"ftol": 1e-15, "maxiter": 1000},
+        )
+        short = level_1.x[0]
+        assert max(0, (least - rows @ found).max()) <= short + 1e-5
         assert np.abs(found).max() <= LIMIT + 1e-9
-        active += np.abs(found).max() > LIMIT - 1e-6
-        second = minimize(
+        level_2 = minimize(
             lambda x, z=preferred: ((x - z) ** 2).sum(),
-            first,
+            level_1.x[1:],
             jac=lambda x, z=preferred: 2 * (x - z),
             method="SLSQP",
-            bounds=[(-LIMIT, LIMIT)] * ROBOT.dof,
-            constraints=LinearConstraint(jacobian, jacobian @ first, jacobian @ first),
-            options={"ftol": 1e-14},
-        ).x
-        np.testing.assert_allclose(found, second, atol=1e-4)
+            bounds=limits,
+            constraints=LinearConstraint(rows, least - short - SLACK),
+            options={"ftol": 1e-14, "maxiter": 1000},
+        )
+        assert ((found - preferred) ** 2).sum() == pytest.approx(level_2.fun, rel=1e-3)
+        active += np.abs(found).max() > LIMIT - 1e-6
+        missed += short > 0.1
     assert active > 5
+    assert missed > 0
 
 
 def test_a_failed_solve_says_which_and_why(monkeypatch):
     monkeypatch.setitem(SETTINGS, "proxqp", {"max_iter": 0})
     with pytest.raises(CascadeError, match="level 1: proxqp"):
-        Cascade(4, "proxqp").solve(np.ones((2, 4)), np.ones(2))
+        Cascade(1, 4, "proxqp").solve(np.ones((1, 4)), np.ones(1), np.zeros(4))
 
 
 def test_a_failed_solve_is_an_outcome(monkeypatch):
@@ -196,7 +273,7 @@ def test_subgoals_of_lower_priority_coarticulate():
     task = load_task("ascending")
     _, none, _ = solve(NullspaceQP, task)
     _, concurrent, _ = solve(NextGoal, task)
-    assert (none.reward, concurrent.reward) == (-325, -304)
+    assert (none.reward, concurrent.reward) == (-318, -293)
 
 
 def test_a_goal_behind_a_straight_arm_is_reached():
@@ -281,39 +358,123 @@ def test_hands_that_do_not_fit_are_refused():
     )
 
 
-def test_the_posture_hits_its_goal_and_lies_near():
-    """Against a general solver started from the same configuration."""
-    task = load_task("two-armed-2")
+def controller(task, **options):
     session = Session(task, 0, NextGoal.told, trusted=True)
-    control = Controller(session, task, cascade_for(ROBOT.dof, "daqp"), 1, 100)
+    joints = task.robot.dof - len(task.locked_base)
+    cascade = cascade_for(FACES, joints, "daqp")
+    return Controller(session, task, cascade, 5, 1000, **options)
+
+
+def test_the_posture_hits_its_goal_and_lies_near():
+    """Against a general solver started from the same configuration, with the disc itself."""
+    task = load_task("two-armed-2")
+    control = controller(task)
     rng = np.random.default_rng(3)
     for goal in (0, 1, 2, 3) * 2:
         q = rng.uniform(-1, 1, ROBOT.dof)
-        posture = control.posture(q, Aim("right", goal))
-        miss = ROBOT.forward_kinematics(posture, "right") - task.goal_array[goal]
-        assert np.hypot(*miss) < 1e-3
+        posture = control.postures(q, (Aim("right", goal),), {})[0]
+        assert miss(posture, task, "right", goal) <= task.radius
         nearest = minimize(
             lambda p, q=q: ((p - q) ** 2).sum(),
             posture,
             jac=lambda p, q=q: 2 * (p - q),
             method="SLSQP",
             constraints={
-                "type": "eq",
-                "fun": lambda p, goal=goal: (
-                    ROBOT.forward_kinematics(p, "right") - task.goal_array[goal]
-                ),
-                "jac": lambda p: ROBOT.jacobian(p, "right"),
+                "type": "ineq",
+                "fun": lambda p, goal=goal: task.radius - miss(p, task, "right", goal),
             },
         ).x
         gap = np.linalg.norm(posture - q) - np.linalg.norm(nearest - q)
-        assert abs(gap) < 2e-3
+        assert -1e-6 < gap < 2e-3  # the polygon lies within the disc
         assert np.linalg.norm(posture - nearest) < 0.05
+
+
+def miss(q, task, hand, goal):
+    return np.hypot(*(ROBOT.forward_kinematics(q, hand) - task.goal_array[goal]))
+
+
+@pytest.mark.parametrize("name", ["ascending", "two-armed/v1/d003"])
+def test_postures_make_the_way_through_all_discs_shortest(name):
+    """A local minimum of the reward's own metric: a general solver finds nothing shorter near."""
+    task = load_task(name)
+    goals = range(len(task.goals))
+    aims = tuple(Aim("right", goal) for goal in goals)
+    postures = controller(task, gain=1.0).postures(task.q0, aims, {})
+
+    def length(flat):
+        chain = np.vstack([task.q0, flat.reshape(len(aims), -1)])
+        return np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
+
+    start = np.concatenate(postures)
+    found = minimize(
+        length,
+        start,
+        method="SLSQP",
+        constraints=[
+            {
+                "type": "ineq",
+                "fun": lambda flat, goal=goal: (
+                    task.radius - miss(flat.reshape(len(aims), -1)[goal], task, "right", goal)
+                ),
+            }
+            for goal in goals
+        ],
+        options={"maxiter": 500},
+    )
+    for goal, posture in zip(goals, postures, strict=True):
+        assert miss(posture, task, "right", goal) <= task.radius
+    assert length(start) < found.fun + 0.03  # three steps
+
+
+@pytest.mark.parametrize("locked", [(), ("y",)])
+def test_faces_say_how_the_hand_leaves_the_disc(locked):
+    """Rows by finite differences of the distances that come with them."""
+    task = load_task("two-armed-2").model_copy(update={"locked_base": locked})
+    control = controller(task)
+    q = np.random.default_rng(4).uniform(-1, 1, ROBOT.dof)
+    rows, outside = control._disc(q, Aim("left", 2))
+    for column, joint in enumerate(control.moving):
+        moved = q.copy()
+        moved[joint] += 1e-6
+        change = outside - control._disc(moved, Aim("left", 2))[1]
+        np.testing.assert_allclose(change / 1e-6, rows[:, column], atol=1e-5)
+    assert outside.max() == pytest.approx(miss(q, task, "left", 2) - 0.1, abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["two-armed-1", "one-armed/v1/d003"])
+def test_the_hand_comes_nearer_all_the_time(name):
+    """Level 1 of the movement: to within what a disc's polygon and its linear steps leave."""
+    task = load_task(name)
+    method = NextGoal(NextGoal.Parameters(hands="nearest"))
+    result = method.solve(Session(task, 0, method.told, trusted=True))
+    for movement in result.solution:
+        hands = ROBOT.forward_kinematics(movement.waypoints, movement.hand)
+        distances = np.hypot(*(hands - task.goal_array[movement.goal - 1]).T)
+        assert (np.diff(distances) < 0.02 * distances[:-1]).all()
+
+
+def test_looking_farther_ahead_pays():
+    """Development instances: the controller against itself and the corrective process."""
+    totals = []
+    names = [f"{family}/v1/d00{k}" for family in ("one-armed", "aligned") for k in range(3)]
+    for method, parameters in (
+        (EverySequence, {}),
+        (NullspaceQP, {}),
+        (NextGoal, {"horizon": 1}),
+        (NextGoal, {}),
+    ):
+        executions = [solve(method, load_task(name), **parameters)[1] for name in names]
+        assert not any(execution.reason for execution in executions)
+        totals.append(sum(execution.reward for execution in executions))
+    alone, none, one, two = totals
+    assert none < one < two
+    assert two > 0.9 * alone
 
 
 def test_table_of_solvers(monkeypatch):
     monkeypatch.setattr(qp_solvers, "HANDS", "RRR")
     monkeypatch.setattr(qp_solvers, "TASK", "ascending")
-    monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-304")
+    monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-293")
     found = qp_solvers.recorded(6)
     figures = qp_solvers.measure(found)
     figures["osqp"].modelled.failures.append("level 2: osqp ended user_limit")
@@ -322,9 +483,10 @@ def test_table_of_solvers(monkeypatch):
     rows = [line.strip("| ").split(" | ") for line in text.splitlines()[2:6]]
     assert [row[0] for row in rows] == list(qp_solvers.SOLVERS)
     for row in rows:
-        assert all(0 < float(figure) < 1000 for figure in row[1:6])  # ms
-        assert 0 < int(row[6].rstrip("%")) < 100
-        assert max(float(figure) for figure in row[7:10]) < 1e-6
-        assert row[10] == ("0, 1" if row[0] == "osqp" else "0, 0")
-    assert text.endswith("osqp: level 2: osqp ended user_limit")
+        assert all(0 < float(figure) < 60_000 for figure in row[1:6])  # ms
+        assert max(float(figure) for figure in row[7:9] if figure != "-") < 1e-5
+        if row[0] in ("clarabel", "daqp"):  # the others give up now and then
+            assert row[9] == "0, 0"
+            assert 0 < int(row[6].rstrip("%")) < 100
+    assert "osqp: level 2: osqp ended user_limit" in text
     assert all(f"{name} " in qp_solvers.conditions() for name in ("cvxpy", "daqp", "osqp"))
