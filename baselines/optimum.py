@@ -56,8 +56,8 @@ class BoundParameters(GraphParameters):
     """As above, for the proof."""
 
     most_nodes: Annotated[int, Field(ge=1)] = 20_000
-    """Cone programmes that may be solved for it, some 300 a second. The shipped tasks need
-    600 to 15 000 with the other arm free, up to 67 000 with it still."""
+    """Cone programmes that may be solved for it, some 500 a second with five goals. The search
+    ends with the bound that it has then, and says how many ticks that leaves."""
 
 
 class MultistartParameters(OptimumParameters):
@@ -146,10 +146,12 @@ class Optimum(Method):
             most = len(instance.hands)
             if found is not None and rounding.least(plan) - most >= found[0]:
                 continue
-            for merged, shortest in (((), plan), *rounding.merged_plans(plan, task)):
+            for merged, shortest in rounding.plans(plan, task):
+                if found is not None and rounding.least(shortest, merged) >= found[0]:
+                    continue
                 for whole in rounding.every(shortest, merged):
                     if found is not None and whole.ticks >= found[0]:
-                        break
+                        continue
                     made, evaluations = movements(
                         task,
                         whole.hands,
@@ -163,6 +165,8 @@ class Optimum(Method):
                     entry = execution.ticks, execution.corrections, tuple(made)
                     if execution.completed and (found is None or entry[:2] < found[:2]):
                         found = entry
+                    if found is not None and rounding.least(shortest, merged) >= found[0]:
+                        break  # no other rounding takes fewer
             session.spend(**rounding.spent)
         if found is None:
             raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
@@ -231,6 +235,7 @@ class BranchAndBound(DynamicProgramming):
             "proven_optimal": found.proven,
             "nodes": found.nodes,
             "open_nodes": found.open_nodes,
+            "ticks_left": ticks - found.ticks,
         }
 
 

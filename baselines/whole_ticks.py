@@ -124,21 +124,29 @@ class Rounding:
 
 
 def mergers(task: Task, hands: tuple[Hand, ...]) -> Iterator[tuple[int, ...]]:
-    """Every set of goals (0-based) that can be hit without a movement, the empty set first.
+    """Every set of goals (0-based) that can be hit without a movement, the empty set first."""
+    able = mergeable(task, hands)
+    for count in range(len(able) + 1):
+        yield from itertools.combinations(able, count)
+
+
+def mergeable(task: Task, hands: Sequence[Hand | None]) -> tuple[int, ...]:
+    """Goals (0-based) that can be hit without a movement; a hand of None is undecided.
 
     A goal can where its hand may be there already: at the start, or because another hand
     hits the goal before, or because the two discs overlap.
     """
-    start = task.robot.forward_kinematics(task.q0, hands[0])
-    able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
+    first = task.hands if hands[0] is None else (hands[0],)
+    starts = [task.robot.forward_kinematics(task.q0, hand) for hand in first]
+    able = [0] if min(math.dist(q, task.goals[0]) for q in starts) <= task.radius else []
     able += [
         g
         for g in range(1, len(hands))
-        if hands[g] != hands[g - 1]
+        if (hands[g] is None and len(task.hands) > 1)
+        or hands[g] != hands[g - 1]
         or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
     ]
-    for count in range(len(able) + 1):
-        yield from itertools.combinations(able, count)
+    return tuple(able)
 
 
 def add(total: dict[str, int], spent: Mapping[str, int]) -> None:
