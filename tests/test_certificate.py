@@ -185,7 +185,9 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         robot=SMALL,
         locked_base=("y",),
         start={"base": (0.0, 0.0), "left": (1.2,), "right": (0.4,)},
-        goals=tuple((round(x, 3), round(y, 3)) for x, y in rng.uniform((-2, -0.7), (2, 0.9), (2, 2))),
+        goals=tuple(
+            (round(x, 3), round(y, 3)) for x, y in rng.uniform((-2, -0.7), (2, 0.9), (2, 2))
+        ),
         initial_hands="RR",
     )
     assert not mergeable(task, hands_of("RR"))
@@ -194,10 +196,10 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         layers = []
         for hand, goal in zip(hands, task.goals, strict=True):
             # All angles and points of the disc: the base follows from the hand's x.
-            angle, dy = np.meshgrid(np.linspace(-3, 4, 1401), np.linspace(-0.1, 0.1, 21))
+            angle = np.linspace(-3, 4, 7001)
             q = np.zeros((angle.size, 4))
             q[:] = task.q0
-            q[:, task.robot.joints(hand)] = angle.reshape(-1, 1)
+            q[:, task.robot.joints(hand)] = angle[:, None]
             off = task.robot.forward_kinematics(q, hand) - np.array(goal)
             half = np.sqrt(np.maximum(task.radius**2 - off[:, 1] ** 2, 0.0))
             near = np.abs(off[:, 1]) <= task.radius
