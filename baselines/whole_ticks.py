@@ -23,7 +23,7 @@ from coartic import MotionModel, Movement, Task
 from coartic.movement import move
 from coartic.robot import Array, Hand
 
-MOST_ROUNDINGS = 64
+MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals
 _SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
 _BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the rim
 
