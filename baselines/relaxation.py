@@ -269,7 +269,7 @@ class Lagrangian:
 
     def at(self, angles: Array) -> Array:
         """Each link's term at its angle, shape ``(links,)``."""
-        return self.slopes * angles + self.sizes * np.cos(angles - self.towards)
+        return self.slopes * angles + self.sizes * directions(angles - self.towards)[..., 0]
 
     def least(self, box: Array) -> Array:
         """Least of each link's term over its interval, exactly."""
@@ -300,7 +300,9 @@ class Lagrangian:
             angles = found[:, side]
             for _ in range(_PARABOLAS):
                 excess = np.maximum(self.at(angles) - limit, 0.0)
-                rise = sign * (self.slopes - self.sizes * np.sin(angles - self.towards))
+                rise = sign * (
+                    self.slopes - self.sizes * directions(angles - self.towards)[..., 1]
+                )
                 safe = (rise + np.sqrt(rise**2 + 2.0 * size * excess)) / size
                 angles = np.where(excess > 0.0, angles + sign * safe, angles)
             found[:, side] = angles
