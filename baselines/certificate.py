@@ -11,8 +11,8 @@ the narrower the intervals, the tighter the bound. Three things are split, until
 is bounded above the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 
 - an interval of a link angle, in two;
-- a goal whose hand is undecided, into one part for each hand. The search begins with all of
-  them undecided, so that what is found out about some goals' hands serves every sequence that
+- a goal whose hand is undecided, into one part for each hand. With five goals and more the
+  search begins with all of them undecided, so that what is found out about some goals' hands serves every sequence that
   has them so; a hand is decided where that matters more than the angles do;
 - goals that may be hit without a movement, where only their ticks are still wanting: into one
   part for each, as the first that is. The part in which none is is bounded already.
@@ -37,6 +37,7 @@ from coartic import MotionModel, Task
 from coartic.robot import HANDS, Array
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
+_APART = 16  # hand sequences that are bounded one by one: few are proven sooner so
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
@@ -134,13 +135,16 @@ class _Search:
         return max(0, self._ticks - 1 - moves) * self._step
 
     def begin(self) -> None:
-        """All solutions as one part."""
+        """All solutions: a part for each hand sequence, or one part where they are many."""
         if not self._ticks:
             return
-        both = len(self._robot_hands) > 1
-        hands: Hands = (None if both else self._robot_hands[0],) * len(self._task.goals)
-        box = self.relaxation(hands, ()).first_box(self.longest(0))
-        self._add(_Part(hands, (), mergeable(self._task, hands), box), 0.0)
+        goals = len(self._task.goals)
+        sequences: list[Hands] = [(None,) * goals]
+        if len(self._robot_hands) ** goals <= _APART:
+            sequences = list(itertools.product(self._robot_hands, repeat=goals))
+        for hands in sequences:
+            box = self.relaxation(hands, ()).first_box(self.longest(0))
+            self._add(_Part(hands, (), mergeable(self._task, hands), box), 0.0)
 
     def branch(self, node: _Node) -> None:
         """Split a part into parts that together hold every solution in it."""
