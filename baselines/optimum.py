@@ -50,14 +50,17 @@ class GraphParameters(OptimumParameters):
     """Postures per goal and hand."""
     graphs: Annotated[int, Field(ge=1)] = 3
     """Independent graphs."""
+    most_sequences: Annotated[int, Field(ge=1)] = 64
+    """Hand sequences that are planned for each graph: all where there are no more, with two
+    hands up to six goals; else those that a beam of this width over the goals ends with."""
 
 
 class BoundParameters(GraphParameters):
     """As above, for the proof."""
 
     most_nodes: Annotated[int, Field(ge=1)] = 20_000
-    """Cone programmes that may be solved for it, some 300 a second. The shipped tasks need
-    600 to 15 000 with the other arm free, up to 67 000 with it still."""
+    """Cone programmes that may be solved for it, some 500 a second with five goals. The search
+    ends with the bound that it has then, and says how many ticks that leaves."""
 
 
 class MultistartParameters(OptimumParameters):
@@ -71,10 +74,6 @@ class Optimum(Method):
     """The shortest path over all hand sequences, in whole ticks."""
 
     stochastic = False
-
-    def why_not(self, task: Task) -> str | None:
-        """More hand sequences than can be planned one by one."""
-        return too_many_sequences(task, len(task.hands))
 
     @abstractmethod
     def starts(self, session: Session, task: Task) -> Iterator[Start]:
@@ -103,6 +102,7 @@ class Optimum(Method):
             "path_lengths": {letters_of(i.hands): plan.cost for i, plan in ranked[:MOST_KEPT]},
             "solves": solves,
             "failed_solves": failed,
+            "sequences_planned": len(best),
             **proof,
         }
         return Result(made, details, bound=bound)
@@ -140,16 +140,22 @@ class Optimum(Method):
     ) -> tuple[tuple[Movement, ...], int]:
         """The fewest ticks over all plans, roundings and mergers, as executed."""
         found: tuple[int, int, tuple[Movement, ...]] | None = None
+
+        def worth(ticks: int) -> bool:
+            return found is None or ticks < found[0]
+
         for instance, plan in sorted(best.values(), key=lambda entry: entry[1].cost):
             rounding = Rounding(problem, instance, session.model.step)
             # A merger saves one tick a goal and never shortens the path.
             most = len(instance.hands)
-            if found is not None and rounding.least(plan) - most >= found[0]:
+            if not worth(rounding.least(plan) - most):
                 continue
-            for merged, shortest in (((), plan), *rounding.merged_plans(plan, task)):
+            for merged, shortest in rounding.plans(plan, task, worth):
+                if not worth(rounding.least(shortest, merged)):
+                    continue
                 for whole in rounding.every(shortest, merged):
-                    if found is not None and whole.ticks >= found[0]:
-                        break
+                    if not worth(whole.ticks):
+                        continue
                     made, evaluations = movements(
                         task,
                         whole.hands,
@@ -163,6 +169,8 @@ class Optimum(Method):
                     entry = execution.ticks, execution.corrections, tuple(made)
                     if execution.completed and (found is None or entry[:2] < found[:2]):
                         found = entry
+                    if not worth(rounding.least(shortest, merged)):
+                        break  # no other rounding takes fewer
             session.spend(**rounding.spent)
         if found is None:
             raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
@@ -198,7 +206,7 @@ class DynamicProgramming(Optimum):
             missing = graph.why_none()
             if missing:
                 raise MethodError("infeasible", missing)
-            for chain in graph.chains():
+            for chain in graph.chains(most=self.parameters.most_sequences):
                 yield chain.hands, chain.configurations
                 if self.parameters.other_arm == "free":
                     yield chain.hands, spread_out(task, chain)
@@ -231,6 +239,7 @@ class BranchAndBound(DynamicProgramming):
             "proven_optimal": found.proven,
             "nodes": found.nodes,
             "open_nodes": found.open_nodes,
+            "ticks_left": ticks - found.ticks,
         }
 
 
@@ -250,6 +259,10 @@ class Multistart(Optimum):
     )
     Parameters = MultistartParameters
     quick: ClassVar[dict[str, Any]] = {"starts": 2}
+
+    def why_not(self, task: Task) -> str | None:
+        """More hand sequences than can be planned one by one."""
+        return too_many_sequences(task, len(task.hands))
 
     def starts(self, session: Session, task: Task) -> Iterator[Start]:
         """The corrective process's configurations, and Gaussian noise of many sizes on them."""

@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -43,9 +43,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from baselines.posture_graph import PostureGraph
 from coartic import Movement, Task
 from coartic.compiled import entry, inner
-from coartic.initial import too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.robot import BASE_DOF, Array, Hand, chain, lever
 from coartic.task import hands_of
@@ -61,6 +61,7 @@ _RETRIEVED = 40  # steps for a stored posture, which may be far off
 _GENERATED = 3  # steps for a generated one, which is close by
 _INSIDE = 0.999  # part of the tolerated error that is aimed at
 _FINEST = 0.01  # last SD of the diffusion, as a part of the first
+_BEAM_POSTURES = 60  # per goal and hand, to choose hand sequences by
 _TOGETHER = 16  # plans that are made side by side: more take memory, and no less time
 
 
@@ -90,6 +91,10 @@ class PostureBasedParameters(Parameters):
     hands: Literal["chosen", "given", "every"] = "chosen"
     """By cost of travel, goal by goal; the sequence that the task names; or every
     sequence, of which the one with the best reward expected is kept."""
+    most_sequences: Annotated[int, Field(ge=1)] = 64
+    """Hand sequences of ``every`` that are planned for: all where there are no more, with two
+    hands up to six goals; else those that a beam of this width over the goals of a posture
+    graph ends with, by the distance between sampled postures."""
     other_arm: Literal["still", "free"] = "still"
     """Whether the arm that is not to hit the goal may move as well."""
 
@@ -115,11 +120,9 @@ class PostureBased(Method):
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
     def why_not(self, task: Task) -> str | None:
-        """A policy names no hands; more sequences than can be planned one by one."""
+        """A policy names no hands."""
         if self.parameters.hands == "given" and task.initial_is_policy:
             return f"task {task.name!r} names no hand sequence but {task.initial_hands!r}"
-        if self.parameters.hands == "every":
-            return too_many_sequences(task, len(task.hands))
         return None
 
     def solve(self, session: Session) -> Result:
@@ -131,14 +134,28 @@ class PostureBased(Method):
             case "given":
                 options = [[(hand,) for hand in hands_of(session.initial_hands)]]
             case _:
-                every = itertools.product(sorted(session.hands), repeat=session.goals_count)
-                options = [[(hand,) for hand in hands] for hands in every]
+                options = [[(hand,) for hand in hands] for hands in self._every(session)]
         with session.building():
             planner = _Planner(session, self.parameters, self.horizon)
         with session.solving():
             plans = planner.plans(options)
         best = min(plans, key=lambda plan: sum(plan.ticks))
         return Result(tuple(best.movements), {"expected_ticks": best.ticks})
+
+    def _every(self, session: Session) -> Iterable[Hands]:
+        """Every hand sequence, or the most promising of too many."""
+        most = self.parameters.most_sequences
+        if len(session.hands) ** session.goals_count <= most:
+            return itertools.product(sorted(session.hands), repeat=session.goals_count)
+        task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
+        graph = PostureGraph.sampled(task, _BEAM_POSTURES, session.rng)
+        session.spend(
+            forward_kinematics=graph.spent.forward_kinematics, jacobians=graph.spent.jacobians
+        )
+        missing = graph.why_none()
+        if missing:
+            raise MethodError("infeasible", missing)
+        return [chain.hands for chain in graph.chains(most=most)]
 
 
 class OneGoal(PostureBased):

@@ -82,6 +82,19 @@ def sample_postures(
     return np.asarray(q[np.hypot(*miss.T) <= task.radius])
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """The cheapest chains of nodes for the beginning of a hand sequence."""
+
+    hands: tuple[Hand, ...]
+    nodes: dict[Hand, Array]
+    """Of each hand, where it may be."""
+    cost: Array
+    """``cost[i, j]``: the cheapest way to node i of the hand used last and j of the other."""
+    back: tuple[NDArray[np.int32], ...]
+    """For each goal, the node that a state came from."""
+
+
 @dataclass
 class PostureGraph:
     """The layers of a task and the dynamic programme over them."""
@@ -103,13 +116,26 @@ class PostureGraph:
         }
         return cls(task, layers, spent)
 
-    def chains(self, only: tuple[Hand, ...] | None = None) -> Iterator[Chain]:
+    def chains(
+        self, only: tuple[Hand, ...] | None = None, most: int | None = None
+    ) -> Iterator[Chain]:
         """The cheapest chain of every hand sequence that has one, left before right.
 
-        ``only`` asks for one sequence.
+        ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
+        sequences, goal by goal, as many are kept as are cheapest; none is lost while there
+        are no more than that.
         """
-        start = dict.fromkeys(HANDS, self._start[None, :])
-        yield from self._extend(only, (), start, np.zeros((1, 1)), [])
+        begun = _Begun((), dict.fromkeys(HANDS, self._start[None, :]), np.zeros((1, 1)), ())
+        if only is not None or most is None or len(self.task.hands) ** self._goals <= most:
+            yield from self._every(begun, only)
+            return
+        kept = [begun]
+        for _ in range(self._goals):
+            longer = [more for beginning in kept for more in self._longer(beginning, None)]
+            ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
+            kept = [longer[i] for i in sorted(ranked[:most])]
+        for whole in kept:
+            yield self._chain(whole)
 
     def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
         """Why there is no chain: the first goal without a posture; empty where there is one."""
@@ -126,23 +152,22 @@ class PostureGraph:
     def _start(self) -> Array:
         return np.array(self.task.q0)
 
-    def _extend(
-        self,
-        only: tuple[Hand, ...] | None,
-        hands: tuple[Hand, ...],
-        nodes: dict[Hand, Array],
-        cost: Array,
-        back: list[NDArray[np.intp]],
-    ) -> Iterator[Chain]:
-        """All chains that begin with ``hands``.
+    @property
+    def _goals(self) -> int:
+        return len(self.task.goals)
 
-        ``cost[i, j]`` is the cheapest way to node ``i`` of the hand used last and node
-        ``j`` of the other; ``back`` holds, for each goal, the node that a state came from.
-        """
-        goal = len(hands)
-        if goal == len(self.task.goals):
-            yield self._chain(hands, cost, back)
+    def _every(self, begun: _Begun, only: tuple[Hand, ...] | None) -> Iterator[Chain]:
+        """All chains that begin so, one after another: they share what they begin with."""
+        if len(begun.hands) == self._goals:
+            yield self._chain(begun)
             return
+        for longer in self._longer(begun, only):
+            yield from self._every(longer, only)
+
+    def _longer(self, begun: _Begun, only: tuple[Hand, ...] | None) -> Iterator[_Begun]:
+        """Beginnings by one goal longer."""
+        hands, nodes, cost = begun.hands, begun.nodes, begun.cost
+        goal = len(hands)
         for hand in HANDS if only is None else (only[goal],):
             layer = self.layers.get((goal, hand))
             if layer is None or not len(layer):
@@ -153,7 +178,7 @@ class PostureGraph:
             if hand == last:
                 # (i, j) -> (k, j): the least over i.
                 step = np.sqrt(base + arm)
-                came = np.empty((len(layer), cost.shape[1]), dtype=np.intp)
+                came = np.empty((len(layer), cost.shape[1]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for j in range(cost.shape[1]):
                     total = cost[:, j, None] + step
@@ -161,17 +186,16 @@ class PostureGraph:
                     reached[:, j] = total.min(axis=0)
             else:
                 # (i, j) -> (k, i): the hand comes from its own node j; the least over j.
-                came = np.empty((len(layer), cost.shape[0]), dtype=np.intp)
+                came = np.empty((len(layer), cost.shape[0]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for i in range(cost.shape[0]):
                     total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
                     came[:, i] = total.argmin(axis=0)
                     reached[:, i] = total.min(axis=0)
-            yield from self._extend(
-                only, (*hands, hand), {**nodes, hand: layer}, reached, [*back, came]
-            )
+            yield _Begun((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
-    def _chain(self, hands: tuple[Hand, ...], cost: Array, back: list[NDArray[np.intp]]) -> Chain:
+    def _chain(self, whole: _Begun) -> Chain:
+        hands, cost, back = whole.hands, whole.cost, whole.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
         picked = []
         for goal in reversed(range(len(hands))):

@@ -27,7 +27,6 @@ from baselines.trajectory_problem import (
 )
 from baselines.whole_ticks import Rounding, movements
 from coartic import Movement, Task
-from coartic.initial import too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.movement import follow
 from coartic.robot import Array, Hand
@@ -41,6 +40,10 @@ class TrajectoryParameters(Parameters):
 
     hands: Annotated[str, Field(pattern="^(every|given|[LR]+)$")] = "every"
     """Every hand sequence; the one that the task names; or one such as ``LRLR``."""
+    most_sequences: Annotated[int, Field(ge=1)] = 64
+    """Hand sequences of ``every`` that are planned for: all where there are no more, with two
+    hands up to six goals; else those that a beam of this width over the goals ends
+    with in some graph."""
     other_arm: Literal["free", "still"] = "free"
     nodes: Annotated[int, Field(ge=10, le=1000)] = 150
     """Postures per goal and hand in a graph."""
@@ -78,13 +81,11 @@ class TrajectoryOptimisation(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "hands": "given"}
 
     def why_not(self, task: Task) -> str | None:
-        """A sequence that does not fit the task, or more than can be planned one by one."""
+        """A sequence that does not fit the task."""
         hands = self.parameters.hands
-        if hands == "every":
-            return too_many_sequences(task, len(task.hands))
         if hands == "given" and task.initial_is_policy:
             return f"task {task.name!r} names no hand sequence but {task.initial_hands!r}"
-        if hands != "given" and (
+        if hands not in ("given", "every") and (
             len(hands) != len(task.goals) or not set(hands_of(hands)) <= set(task.hands)
         ):
             return f"hands {hands!r} do not fit task {task.name!r}"
@@ -168,7 +169,7 @@ class TrajectoryOptimisation(Method):
             missing = graph.why_none(only)
             if missing:
                 raise MethodError("infeasible", missing)
-            for chain in graph.chains(only):
+            for chain in graph.chains(only, parameters.most_sequences):
                 known = starts.setdefault(chain.hands, [])
                 known.append(chain.configurations)
                 if parameters.other_arm == "free" and len(task.hands) > 1:

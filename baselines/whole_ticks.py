@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from coartic import MotionModel, Movement, Task
 from coartic.movement import move
 from coartic.robot import Array, Hand
 
+MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals
 _SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
 _BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the rim
 
@@ -61,12 +63,21 @@ class Rounding:
         exact = plan.lengths(self._instance.q0)[:-1] / self._step
         return self._divided(plan, [round(length) for length in exact], merged)
 
-    def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> list[TickPlan]:
-        """All roundings up and down of all but the last segment, the cheapest first."""
+    def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
+        """Roundings up and down of all but the last segment, the nearest first.
+
+        All of them with up to seven goals, else the nearest ``MOST_ROUNDINGS``.
+        """
         exact = plan.lengths(self._instance.q0)[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
-        found = [self._divided(plan, list(steps), merged) for steps in itertools.product(*choices)]
-        return sorted((p for p in found if p is not None), key=lambda plan: plan.ticks)
+        ranked = sorted(
+            itertools.product(*choices),
+            key=lambda steps: float(np.abs(np.array(steps) - exact).sum()),
+        )
+        for steps in ranked[:MOST_ROUNDINGS]:
+            found = self._divided(plan, list(steps), merged)
+            if found is not None:
+                yield found
 
     def least(self, plan: Plan, merged: tuple[int, ...] = ()) -> int:
         """Ticks that no rounding of a plan as long as this one can go below."""
@@ -74,17 +85,29 @@ class Rounding:
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
 
-    def merged_plans(self, plan: Plan, task: Task) -> Iterator[tuple[tuple[int, ...], Plan]]:
-        """Shortest plans in which some goals are hit as their turn comes.
+    def plans(
+        self, plan: Plan, task: Task, worth: Callable[[int], bool]
+    ) -> Iterator[tuple[tuple[int, ...], Plan]]:
+        """The plan itself, and shortest plans in which some goals are hit as their turn comes.
 
-        Worth it where the path grows by less than the ticks it saves.
+        Worth it where the path grows by less than the ticks it saves. It only grows with
+        further such goals, so that sets are left out of which all ticks that could be saved
+        leave more than is ``worth`` it.
         """
         goals = len(self._instance.hands)
-        for merged in mergers(task, self._instance.hands):
-            if merged:
-                found = self._solve(plan.configurations, np.full(goals, np.nan), merged)
+        able = mergeable(task, self._instance.hands)
+        waiting: deque[tuple[tuple[int, ...], Plan]] = deque([((), plan)])
+        while waiting:
+            merged, shortest = waiting.popleft()
+            yield merged, shortest
+            further = [g for g in able if not merged or g > merged[-1]]
+            if not worth(self.least(shortest, merged) - len(further)):
+                continue
+            for g in further:
+                more = (*merged, g)
+                found = self._solve(plan.configurations, np.full(goals, np.nan), more)
                 if found.converged:
-                    yield merged, found
+                    waiting.append((more, found))
 
     def _divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
         """The plan with these steps to all goals but the last, and as few as can be to that."""
@@ -123,22 +146,23 @@ class Rounding:
         return plan
 
 
-def mergers(task: Task, hands: tuple[Hand, ...]) -> Iterator[tuple[int, ...]]:
-    """Every set of goals (0-based) that can be hit without a movement, the empty set first.
+def mergeable(task: Task, hands: Sequence[Hand | None]) -> tuple[int, ...]:
+    """Goals (0-based) that can be hit without a movement; a hand of None is undecided.
 
     A goal can where its hand may be there already: at the start, or because another hand
     hits the goal before, or because the two discs overlap.
     """
-    start = task.robot.forward_kinematics(task.q0, hands[0])
-    able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
+    first = task.hands if hands[0] is None else (hands[0],)
+    starts = [task.robot.forward_kinematics(task.q0, hand) for hand in first]
+    able = [0] if min(math.dist(q, task.goals[0]) for q in starts) <= task.radius else []
     able += [
         g
         for g in range(1, len(hands))
-        if hands[g] != hands[g - 1]
+        if (hands[g] is None and len(task.hands) > 1)
+        or hands[g] != hands[g - 1]
         or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
     ]
-    for count in range(len(able) + 1):
-        yield from itertools.combinations(able, count)
+    return tuple(able)
 
 
 def add(total: dict[str, int], spent: Mapping[str, int]) -> None:

@@ -1,5 +1,6 @@
 """The proof of a lower bound: every half-space, every relaxation, against true points."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,8 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.certificate import _normals, _Relaxation, _roots, _support, certify
-from coartic import PAPER, execute, load_task
+from baselines.certificate import certify
+from baselines.relaxation import Multipliers, Relaxation, _normals, _support
+from baselines.whole_ticks import mergeable
+from coartic import PAPER, Robot, Task, execute, load_task
+from coartic.initial import hand_sequences
 from coartic.robot import directions
 from coartic.solution import Movement
 from coartic.task import hands_of
@@ -56,55 +60,169 @@ def feasible(task, hands, rng, reach):
     return np.array(found)
 
 
+def paths(name):
+    """True paths of a task: hands, configurations ``(G, dof)``, length."""
+    task, rng = load_task(name), np.random.default_rng(len(name))
+    for letters in hand_sequences(task):
+        q = feasible(task, hands_of(letters), rng, 0.3)
+        if q is not None:
+            steps = np.diff(np.vstack([task.q0, q]), axis=0)
+            yield task, hands_of(letters), q, float(np.linalg.norm(steps, axis=1).sum())
+
+
+def undecided(hands, rng):
+    return tuple(hand if rng.random() < 0.6 else None for hand in hands)
+
+
+def bound(root, box, found, longest):
+    lagrangian = root.lagrangian(found, longest)
+    return lagrangian.constant + lagrangian.least(box).sum()
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_relaxation_never_exceeds_a_true_path(name):
-    """For any path and any box around its link angles, and for every split of the box."""
-    task = load_task(name)
-    rng = np.random.default_rng(len(name))
-    checked = 0
-    for root in list(_roots(task, still=True)):
-        if root.moves < len(task.goals):
-            continue
-        hands = hands_of(root.hands)
-        q = feasible(task, hands, rng, 0.3)
-        if q is None:
-            continue
-        length = np.linalg.norm(np.diff(np.vstack([task.q0, q]), axis=0), axis=1).sum()
-        box = root.first_box(length)
-        angles = root._angles[:, : q.size] @ q.ravel()
-        assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
-        for _ in range(5):
-            rows, offsets = root._with_half_spaces(box)
-            spaces = rows[-len(offsets) :]
-            point = np.zeros(root._size)
-            point[: q.size] = q.ravel()
-            point[root._directions], point[root._directions + 1] = directions(angles).T
-            assert (spaces @ point - offsets).max() < 1e-9
-            bound, minimum, _ = root.solve(box)
-            assert bound <= length
-            below, above = root.split(box, minimum)
-            inside = np.all((below[:, 0] <= angles) & (angles <= below[:, 1]))
-            tighter = below if inside else above
-            assert (tighter[:, 1] - tighter[:, 0]).sum() < (box[:, 1] - box[:, 0]).sum()
-            assert np.all((tighter[:, 0] <= angles) & (angles <= tighter[:, 1]))
-            box = tighter
-            checked += 1
+    """For any path, hands undecided, and any box around its link angles and every split.
+
+    What is cut off a box never holds the path, for the least slack that keeps it of interest.
+    """
+    rng = np.random.default_rng(7)
+    checked = cut = 0
+    for task, hands, q, length in paths(name):
+        for chosen in (hands, undecided(hands, rng)):
+            root = Relaxation(task, chosen, (), True)
+            box = root.first_box(length)
+            angles = root._angles[:, : q.size] @ q.ravel()
+            assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
+            for _ in range(5):
+                if len(box):
+                    rows, offsets = root._with_half_spaces(box)
+                    point = np.zeros(root._size)
+                    point[: q.size] = q.ravel()
+                    point[root._directions], point[root._directions + 1] = directions(angles).T
+                    assert (rows[-len(offsets) :] @ point - offsets).max() < 1e-9
+                found, minimum, _ = root.solve(box)
+                least = bound(root, box, found, length)
+                assert least <= length + 1e-9
+                left = root.lagrangian(found, length).within(box, length - least + 1e-9)
+                assert np.all((left[:, 0] <= angles) & (angles <= left[:, 1]))
+                cut += int(np.any(left != box))
+                checked += 1
+                if not len(box):
+                    break
+                below, above = root.split(box, minimum)
+                inside = np.all((below[:, 0] <= angles) & (angles <= below[:, 1]))
+                tighter = below if inside else above
+                assert (tighter[:, 1] - tighter[:, 0]).sum() < (box[:, 1] - box[:, 0]).sum()
+                assert np.all((tighter[:, 0] <= angles) & (angles <= tighter[:, 1]))
+                box = tighter
     assert checked >= 5
+    assert cut
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_multipliers_give_a_bound(name):
+    """Not only those of the solver: what it returns need not be trusted."""
+    rng = np.random.default_rng(3)
+    for task, hands, q, length in paths(name):
+        root = Relaxation(task, undecided(hands, rng), (), True)
+        angles = root._angles[:, : q.size] @ q.ravel()
+        box = np.stack([angles - rng.random(len(angles)), angles + rng.random(len(angles))], 1)
+        best, _, _ = root.solve(box)
+        for size in (0.0, 1e-3, 0.1, 1.0):
+            pulls = best.pulls + size * rng.standard_normal(best.pulls.shape)
+            free = np.where(root._stiff, 0.0, pulls)
+            pulls /= np.maximum(np.linalg.norm(free, axis=1, keepdims=True), 1.0)
+            forces = best.forces + size * rng.standard_normal(best.forces.shape)
+            assert bound(root, box, Multipliers(pulls, forces), length) <= length + 1e-9
+
+
+def test_the_least_of_a_term_is_exact():
+    rng = np.random.default_rng(4)
+    task = load_task("two-armed-2")
+    root = Relaxation(task, hands_of("RLRR"), (), False)
+    for _ in range(40):
+        low = rng.uniform(-8, 8, 16)
+        box = np.stack([low, low + rng.uniform(0, 9, 16)], 1)
+        multipliers = Multipliers(rng.standard_normal((4, 10)), rng.standard_normal((4, 2)))
+        lagrangian = root.lagrangian(multipliers, 1.0)
+        sampled = np.linspace(*box.T, 4001)
+        true = np.min([lagrangian.at(angles) for angles in sampled], axis=0)
+        least = lagrangian.least(box)
+        assert np.all(least <= true + 1e-12)
+        assert least == pytest.approx(true, abs=1e-4)
+        left = lagrangian.within(box, 0.3)
+        gone = (sampled < left[:, 0]) | (sampled > left[:, 1])
+        values = np.array([lagrangian.at(angles) for angles in sampled])
+        assert (values[gone] > np.broadcast_to(least + 0.3, values.shape)[gone] - 1e-9).all()
+        assert gone.any()
 
 
 def test_a_box_around_one_path_bounds_it_tightly():
     task = load_task("ascending")
     q = feasible(task, ("right",) * 3, np.random.default_rng(1), 0.2)
-    (root,) = (r for r in _roots(task, still=True) if r.moves == 3)
+    root = Relaxation(task, ("right",) * 3, (), True)
     angles = root._angles[:, : q.size] @ q.ravel()
     box = np.stack([angles - 1e-4, angles + 1e-4], axis=1)
-    bound, point, _ = root.solve(box)
+    found, point, _ = root.solve(box)
     # What is left free: the base, and the hand within its disc.
-    relaxed = point[: q.size].reshape(q.shape)
+    relaxed = root.configurations(point)
     hand = task.robot.forward_kinematics(relaxed, "right")
     assert np.hypot(*(hand - task.goal_array).T).max() <= task.radius + 1e-3
     steps = np.diff(np.vstack([task.q0, relaxed]), axis=0)
-    assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(bound, abs=1e-4)
+    length = np.linalg.norm(steps, axis=1).sum()
+    assert length == pytest.approx(bound(root, box, found, 5.0), abs=1e-3)
+
+
+SMALL = Robot(left_links=(1.0,), right_links=(1.2,))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_proof_agrees_with_an_exhaustive_search(seed):
+    """Two goals, one link an arm, the base on a rail: every path on a fine grid."""
+    rng = np.random.default_rng(seed)
+    task = Task(
+        name="small",
+        robot=SMALL,
+        locked_base=("y",),
+        start={"base": (0.0, 0.0), "left": (1.2,), "right": (0.4,)},
+        goals=tuple(
+            (round(x, 3), round(y, 3)) for x, y in rng.uniform((-2, -0.7), (2, 0.9), (2, 2))
+        ),
+        initial_hands="RR",
+    )
+    assert not mergeable(task, hands_of("RR"))
+    least = np.inf
+    for hands in itertools.product(task.hands, repeat=2):
+        layers = []
+        for hand, goal in zip(hands, task.goals, strict=True):
+            # All angles and points of the disc: the base follows from the hand's x.
+            angle = np.linspace(-3, 4, 7001)
+            q = np.zeros((angle.size, 4))
+            q[:] = task.q0
+            q[:, task.robot.joints(hand)] = angle[:, None]
+            off = task.robot.forward_kinematics(q, hand) - np.array(goal)
+            half = np.sqrt(np.maximum(task.radius**2 - off[:, 1] ** 2, 0.0))
+            near = np.abs(off[:, 1]) <= task.radius
+            q, off, half = q[near], off[near], half[near]
+            sides = []
+            for part in np.linspace(-1, 1, 9):
+                side = q.copy()
+                side[:, 0] = -off[:, 0] + part * half
+                sides.append(side)
+            layers.append(np.unique(np.vstack(sides).round(3), axis=0))
+        first, second = layers
+        to_first = np.linalg.norm(first - task.q0, axis=1)
+        order = np.argsort(to_first)[:3000]
+        for q, length in zip(first[order], to_first[order], strict=True):
+            if length >= least:
+                break
+            there = np.where(np.isin(np.arange(4), [0, 1, 2 + (hands[1] == "right")]), second, q)
+            least = min(least, length + np.linalg.norm(there - q, axis=1).min())
+    # In steps; the grid is not finer than one.
+    found = certify(task, 5000, still=True, model=PAPER, most_nodes=3000)
+    merged = len(mergeable(task, (None, None)))
+    assert found.ticks <= math.ceil(least / PAPER.step) + 2
+    assert found.ticks >= math.floor(least / PAPER.step) + 2 - merged - 4
 
 
 def test_the_optimum_of_two_goals_is_proven():
@@ -115,7 +233,7 @@ def test_the_optimum_of_two_goals_is_proven():
     assert found.proven
     assert found.ticks == 191
     assert found.open_nodes == 0
-    assert found.nodes > 50
+    assert found.nodes > 5
 
 
 def test_nothing_false_is_proven():
@@ -147,8 +265,9 @@ def test_a_goal_in_line_needs_the_base_alone():
 def test_two_goals_hit_at_once_count_once():
     """Both hands stand at goals already: nothing has to move, so nothing is proven."""
     task = changed("two-armed-2", goals=[[3.5, 0.1], [4.5, 0.1]], initial_hands="LR", radius=0.1)
-    roots = list(_roots(task, still=False))
-    assert {r.hands for r in roots if r.moves == 0} == {"LR"}
+    assert mergeable(task, hands_of("LR")) == (0, 1)
+    assert mergeable(task, hands_of("LL")) == (0,)
+    assert mergeable(task, (None, None)) == (0, 1)
     alone = [Movement(1, "left", "corrective"), Movement(2, "right", "corrective")]
     assert execute(task, alone).ticks == 0
     found = certify(task, 1, still=False, model=PAPER, most_nodes=50)
@@ -159,6 +278,7 @@ def test_two_goals_hit_at_once_count_once():
 
 def test_a_goal_out_of_reach_leaves_no_path():
     task = changed("ascending", goals=[[6, 90]], locked_base=["y"], initial_hands="R")
-    root = _Relaxation(task, ("right",), (), True)
-    bound, _, _ = root.solve(root.first_box(5.0))
-    assert bound == math.inf
+    root = Relaxation(task, ("right",), (), True)
+    box = root.first_box(5.0)
+    found, _, _ = root.solve(box)
+    assert bound(root, box, found, 5.0) > 5.0

@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 from baselines.posture_based import OneGoal, TwoGoals
 from coartic import execute, load_task
 from coartic.method import MethodError, Session
+from coartic.task import letters_of
 from tests.support.strategies import UNEVEN, tiny_task
 
 ACCURACY = 0.09  # θ^g − θ^a
@@ -272,8 +273,19 @@ def test_hands_that_cannot_be_had_are_refused_beforehand():
     assert "names no hand sequence but 'best-of-all'" in named.why_not(policy)
     every = TwoGoals(TwoGoals.Parameters(hands="every"))
     assert every.why_not(policy) is None
-    long = bent(goals=[[5.0, 1.0 + k] for k in range(13)], initial_hands="best-of-all")
-    assert "8192 hand sequences" in every.why_not(long)
+
+
+def test_of_too_many_hand_sequences_some_are_planned():
+    """Those of a beam: here the best one of all is among two."""
+    task = load_task("two-armed-1")
+    every, two, one = (
+        solve(task, OneGoal, hands="every", most_sequences=most, **QUICK)[0] for most in (16, 2, 1)
+    )
+    hands = [letters_of([m.hand for m in result.solution]) for result in (every, two, one)]
+    assert hands[0] == "LRLR"
+    costs = [sum(result.details["expected_ticks"]) for result in (every, two, one)]
+    assert costs[0] <= 1.05 * min(costs[1:])
+    assert all(execute(task, result.solution).reward is not None for result in (two, one))
 
 
 @pytest.mark.parametrize(

@@ -95,3 +95,25 @@ def test_a_goal_without_a_posture_is_named():
     assert graph.why_none().startswith("goal 2: no posture was found that puts the left or")
     assert "the right hand" in graph.why_none(("right", "right"))
     assert list(graph.chains()) == []
+
+
+def test_a_beam_keeps_the_cheapest_beginnings():
+    task = TASKS["two-armed-1"]
+    graph = PostureGraph.sampled(task, 12, np.random.default_rng(8))
+    every = list(graph.chains())
+    for most in (16, 64):
+        assert [c.hands for c in graph.chains(most=most)] == [c.hands for c in every]
+    by_hands = {chain.hands: chain for chain in every}
+    for most in (1, 5, 15):
+        kept = list(graph.chains(most=most))
+        assert len(kept) == most
+        for chain in kept:
+            assert chain.length == by_hands[chain.hands].length
+            assert np.array_equal(chain.configurations, by_hands[chain.hands].configurations)
+    best = min(every, key=lambda chain: chain.length)
+    assert best.hands in {chain.hands for chain in graph.chains(most=5)}
+    # A width of one is the cheapest hand, goal by goal.
+    (greedy,) = graph.chains(most=1)
+    first = {hands[0]: graph.layers[0, hands[0]] for hands in by_hands}
+    nearest = {h: np.linalg.norm(layer - task.q0, axis=1).min() for h, layer in first.items()}
+    assert greedy.hands[0] == min(nearest, key=nearest.get)

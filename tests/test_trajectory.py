@@ -284,3 +284,18 @@ def test_the_rest_of_a_piece_lies_ahead_whether_arrival_costs_a_tick(tick):
     assert (made.completed, made.corrections, made.ticks) == (True, 0, 80 + 2 * tick)
     hit = made.configurations[0]
     np.testing.assert_allclose(second.waypoints, line[line[:, 0] > hit[0]])
+
+
+def test_of_too_many_hand_sequences_a_beam_is_planned():
+    """As many as are asked for, one of which is the best of all; all where there are no more."""
+    task = load_task("two-armed-1")
+    (method,) = (m for m in METHODS if m.name.endswith("path-length"))
+    costs = {}
+    for most in (3, 16, 64):
+        parameters = method.Parameters(nodes=40, graphs=1, noisy_starts=0, most_sequences=most)
+        result = method(parameters).solve(Session(task, 0, method.told, trusted=True))
+        costs[most] = result.details["costs"]
+    assert len(costs[3]) == 3
+    assert len(costs[16]) == 16
+    assert costs[64] == costs[16]
+    assert min(costs[3], key=costs[3].get) == min(costs[16], key=costs[16].get) == "LRLR"
