@@ -28,14 +28,14 @@ from baselines.cascade import Cascade
 from coartic import Movement, Task
 from coartic.method import Session
 from coartic.movement import follow
-from coartic.robot import HANDS, Array, Hand
+from coartic.robot import HANDS, Array, Hand, directions
 
 FACES = 16
 """Of a disc's polygon: it leaves out 2 % of the radius at the most."""
 
 _ANGLES = 2 * np.pi * np.arange(FACES) / FACES
-_NORMALS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
-_INSET = np.cos(np.pi / FACES)
+_NORMALS = directions(_ANGLES)
+_INSET = float(directions(np.pi / FACES)[0])
 _MARGIN = 1e-4  # length unit: the polygon is approached without end, the disc is entered
 _HIT_MARGIN = 1e-9  # the scorer's interpolation along the path rounds
 _STALL_STEPS = 50  # without coming nearer by a tenth of a control step
