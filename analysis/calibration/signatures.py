@@ -12,6 +12,7 @@ import math
 import zlib
 from collections.abc import Callable, Iterator
 from functools import cache, partial
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -300,7 +301,8 @@ def _sacrificing(
     return sacrifices(draw(rng))
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Simulate and print everything."""
     sections = {
         f"Nulls: rejected at {ALPHA:.0%}": tests(planted=False),
         "Planted effects: detected": tests(planted=True),
@@ -311,3 +313,8 @@ if __name__ == "__main__":
     print("\nHand entropy of 20 runs, bit: true, mean estimate")
     for truth, estimate in entropies(asked.simulations, seed=asked.seed):
         print(f"{truth:.3f}  {estimate:.3f}")
+
+
+if __name__ == "__main__":
+    # Other processes import what they are handed: by the module's name, not as __main__.
+    import_module("analysis.calibration.signatures").main()
