@@ -152,7 +152,9 @@ class Judged(Finding):
         if self.holds:
             # NaN: counted exactly, or no spread in any sample.
             return "cannot tell" if self.adjusted_p >= LEVEL else "supported"
-        certain = not self.tests or any(t.estimate < 0 and math.isnan(t.p) for t in self.tests)
+        certain = not self.tests or any(
+            t.estimate <= 0 and math.isnan(t.p) and min(t.n) > 1 for t in self.tests
+        )
         refuted = certain or self.adjusted_contrary_p < LEVEL
         return "not supported" if refuted else "cannot tell"
 

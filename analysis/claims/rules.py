@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -233,6 +233,16 @@ def _enter(name: str) -> None:
     JUDGED[name] = Claim(
         id=name, judge=lambda data: judge(data, JUDGED[name]), **said | {"test": test}
     )
+
+
+def of_task(claim: Claim, task: str) -> Claim:
+    """A claim of comparisons on one task alone; other claims as they are."""
+    if claim.pairs.keys() <= {task}:
+        return claim
+    own = replace(
+        claim, pairs={name: pairs for name, pairs in claim.pairs.items() if name == task}
+    )
+    return replace(own, judge=lambda data: _JUDGES[own.rule](data, own)) if own.pairs else claim
 
 
 for _name in STATEMENTS:

@@ -13,11 +13,15 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
 from analysis.claims.catalogue import CLAIMS, judge
 from analysis.claims.register import Claim, Judged
+from analysis.claims.rules import of_task
+from analysis.reconstruction.constraints import sequences_of, try_sequences
+from analysis.reconstruction.reconstruct import search_for
 from analysis.results.folder import Results
 from analysis.study import Study
 from coartic.members import task_of, with_members
@@ -48,11 +52,12 @@ class Specification:
 def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
     """The specifications in a folder, each as a study of the paper's tasks under it.
 
+    Members that are not admitted are none of them, nor are those with goals that another one has.
     Beside a member of one task are the default goals of the others, where the folder has them.
     """
     plan = study.results.manifest.specification
     own = {name: task_of(name) for name in plan.tasks}
-    members = {name: task for name, task in own.items() if task is not None}
+    members = {name: own[name] or "" for name in _admitted(study)}
     plain = tuple(name for name, task in own.items() if task is None)
     if plain:
         view = _seen_as(study.results, {name: name for name in plain})
@@ -62,6 +67,23 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
         others = {at: t for t, at in default.items() if t != task and at in own}
         view = _seen_as(study.results, {name: task} | others)
         yield Specification(plan.readings, task, name), Study(view)
+
+
+def _admitted(study: Study) -> Iterator[str]:
+    """Members in a folder that meet every constraint, the first of those with the same goals."""
+    for task in with_members():
+        names = [name for name in study.results.manifest.specification.tasks
+                 if task_of(name) == task]  # fmt: skip
+        known = {study.tasks[name].goals: name for name in reversed(names)}
+        if not known:
+            continue
+        search = search_for(task, jobs=1)
+        goals = np.array(list(known))
+        needed = sequences_of(search.constraints)
+        tried = try_sequences(search.task, needed, goals, model=search.model, jobs=1)
+        fits = np.all([constraint.holds(tried) for constraint in search.constraints], axis=0)
+        kept = {name for name, fit in zip(known.values(), fits, strict=True) if fit}
+        yield from (name for name in names if name in kept)
 
 
 def _seen_as(results: Results, names: Mapping[str, str]) -> Results:
@@ -113,7 +135,8 @@ def judged_specifications(
     rows: list[dict[str, Any]] = []
     wanted = [claim.id for claim in claims]
     views = (view for study in studies for view in specifications(study))
-    work = (delayed(_judged)(spec, seen.results, wanted) for spec, seen in views)
+    distinct = {spec: seen.results for spec, seen in views}  # a folder may be named twice
+    work = (delayed(_judged)(spec, results, wanted) for spec, results in distinct.items())
     for spec, found, own in Parallel(jobs, return_as="generator")(work):
         rows += found
         known |= {(spec.task, name) for name in own}
@@ -128,7 +151,10 @@ def _judged(
     """Rows of a specification, and the claims that its own runs can judge."""
     seen, rows, known = Study(results), [], []
     own = set(seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id)
-    for judged in judge(seen, [claim for claim in CLAIMS if claim.id in claims]):
+    wanted = [claim for claim in CLAIMS if claim.id in claims]
+    if spec.task:  # what the default goals of the other task do is no matter of a member's
+        wanted = [of_task(claim, spec.task) for claim in wanted]
+    for judged in judge(seen, wanted):
         if own.intersection(judged.run_ids):
             known.append(judged.claim.id)
         alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
