@@ -487,7 +487,9 @@ def test_shipped_optima_name_their_runs(home):
         found = trace(home, f"coarticTwoArmedOne{name}")
         assert found.sources == ()
         known = ", ".join(shipped_runs("two-armed-1", arm))
-        assert found.how == f"proven; shipped data (analysis/results/optima.json), runs {known}"
+        assert (
+            found.how == f"not proven; shipped data (analysis/results/optima.json), runs {known}"
+        )
         assert trace_text(found).splitlines()[-1].startswith("runs: none; this value is the opt")
     best, best_still = OPTIMUM["two-armed-1"], OPTIMUM_STILL["two-armed-1"]
     for name, reward, arm in (("Gap", best, "free"), ("GapPercentLow", best, "free"),

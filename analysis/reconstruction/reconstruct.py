@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -61,15 +60,6 @@ class Reconstruction:
     def tried(self) -> pd.DataFrame:
         """What was tried: stage, number of sets of goals."""
         return pd.DataFrame(self.search.tried.items(), columns=["stage", "sets of goals"])
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write both tables into a folder; their paths."""
-        folder.mkdir(parents=True, exist_ok=True)
-        name = self.search.task.name
-        paths = [folder / f"{name}-members.csv", folder / f"{name}-tried.csv"]
-        self.members.to_csv(paths[0], index=False, lineterminator="\n")
-        self.tried.to_csv(paths[1], index=False, lineterminator="\n")
-        return paths
 
 
 def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Search:

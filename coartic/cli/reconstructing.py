@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,9 +14,13 @@ from coartic.cli import arguments as given
 from coartic.cli.arguments import check_numbers
 from coartic.cli.terminal import say, show_table
 from coartic.errors import CoarticError
-from coartic.files import folder_named
+from coartic.files import check_folder, folder_named, publish
 from coartic.inputs import MOST_RUNS, MOST_TRIALS
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+_KINDS = (".svg", ".pdf", ".png")
 GROUP = "What is not printed"
 
 
@@ -46,8 +51,7 @@ def readings(
     from analysis.reconstruction.judge import combinations, judge_all, judged_table
 
     check_numbers(jobs, None)
-    folder = folder_named(judge, "--judge")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = _folder(judge, "readings", ["readings.csv"], "--judge")
     judged = judge_all(
         list(combinations(pairs)),
         runs=runs or 1000,
@@ -57,9 +61,13 @@ def readings(
                                   f"p = {each.whole.p:.2g}"),
     )  # fmt: skip
     table = judged_table(judged)
-    table.to_csv(folder / "readings.csv", index=False, lineterminator="\n")
+    publish(folder, {"readings.csv": _csv(table)}, owner="readings", alone=False)
     shown = table[["readings", "log likelihood", "p", "verdict"]]
-    show_table("Readings", tuple(shown.columns), [tuple(map(str, row)) for row in shown.values])
+    show_table(
+        "Readings",
+        tuple(shown.columns),
+        [tuple(map(str, row)) for row in shown.itertuples(index=False)],
+    )
     say("", f"Results in {folder / 'readings.csv'}.")
 
 
@@ -94,13 +102,15 @@ def reconstruct(
     from analysis.reconstruction.reconstruct import reconstruct as perform
 
     check_numbers(jobs, None)
-    out = folder_named(folder, "--out")
+    names = [f"{task}-members.csv", f"{task}-tried.csv"]
     search = search_for(task, readings=tuple(reading or ()), jobs=_threads(jobs))
-    out.mkdir(parents=True, exist_ok=True)
+    out = _folder(folder, "reconstruct", names)
     found = perform(search, effort=Effort(members=members, runs=runs), report=say)
-    paths = found.write(out)
+    tables = zip(names, (found.members, found.tried), strict=True)
+    files = {name: _csv(table) for name, table in tables}
+    publish(out, files, owner="reconstruct", alone=False)
     say("", f"The nearest is {found.nearest.distance:.2f} standard errors from what is printed.")
-    say(f"Results in {paths[0]} and {paths[1]}.")
+    say(f"Results in {out / names[0]} and {out / names[1]}.")
 
 
 def printed(
@@ -115,7 +125,7 @@ def printed(
     from analysis.reconstruction.lines import lines
 
     check_numbers(jobs, None)
-    folder = None if out is None else folder_named(out, "--out")
+    folder = None if out is None else _folder(out, "printed", ["printed.csv"])
     table = lines(
         tasks, readings=tuple(reading or ()), runs=runs, trials=trials, jobs=_threads(jobs),
         progress=say,
@@ -124,8 +134,7 @@ def printed(
     rows = [tuple(map(_short, row)) for row in shown.itertuples(index=False)]
     show_table("What is printed", tuple(shown.columns), rows)
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        table.to_csv(folder / "printed.csv", index=False, lineterminator="\n")
+        publish(folder, {"printed.csv": _csv(table)}, owner="printed", alone=False)
         say("", f"Results in {folder / 'printed.csv'}.")
 
 
@@ -143,7 +152,9 @@ def robustness(
     from analysis.reconstruction.specifications import judged_specifications, shares
 
     check_numbers(jobs, None)
-    folder = folder_named(out, "--out")
+    tables = ("specifications.csv", "shares.csv")
+    pictures = [f"{name}{kind}" for name in ("verdicts", "specification-curve") for kind in _KINDS]
+    folder = _folder(out, "robustness", [*tables, *pictures])
     studies = (load(each) for each in folders)
     table = judged_specifications(
         studies, jobs=_threads(jobs), progress=lambda spec: say(f"judged: {spec.label}")
@@ -153,18 +164,27 @@ def robustness(
             "no claim of the paper can be judged there: run its conditions with its 10 000 trials"
         )
     found = shares(table)
-    folder.mkdir(parents=True, exist_ok=True)
-    table.to_csv(folder / "specifications.csv", index=False, lineterminator="\n")
-    found.to_csv(folder / "shares.csv", index=False, lineterminator="\n")
+    files = dict(zip(tables, map(_csv, (table, found)), strict=True))
     figures = [verdicts(table)]
     if table.effect.notna().any():
         figures.append(specification_curve(table))
     for figure in figures:
-        for name, content in rendered(figure, (".svg", ".pdf", ".png")).items():
-            (folder / name).write_bytes(content)
+        files |= rendered(figure, _KINDS)
+    publish(folder, files, owner="robustness", alone=False)
     rows = [tuple(map(str, row)) for row in found.itertuples(index=False)]
     show_table("Claims", tuple(found.columns), rows)
     say("", f"Results in {folder}.")
+
+
+def _folder(name: str, owner: str, files: Sequence[str], what: str = "--out") -> Path:
+    """A folder in which a command may write its files, looked at before the work is done."""
+    folder = folder_named(name, what)
+    check_folder(folder, owner=owner, alone=False, names=files)
+    return folder
+
+
+def _csv(table: pd.DataFrame) -> bytes:
+    return table.to_csv(index=False, lineterminator="\n").encode()
 
 
 def _short(value: object) -> str:
