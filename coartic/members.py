@@ -2,8 +2,8 @@
 
 ``tasks/members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
 (made by ``coartic reconstruct``; docs/reconstruction.md). A member is a task by the name
-``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one nearest to what is printed, and the
-task itself; v0.1 is what the task was in the first release.
+``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one that the search chose, and the
+task itself; v0.1 is what the task was in the first release, and not admitted.
 """
 
 from __future__ import annotations

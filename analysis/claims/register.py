@@ -33,11 +33,11 @@ RULES = (
 )
 """How verdicts are reached, in inline markup."""
 FITTED = (
-    "† rests on the two-armed tasks, whose goals are not printed. The default ones are, of all "
-    "that give what is printed of the corrective process alone, those whose learned rewards and "
-    "hand sequences come nearest to the printed ones: no independent test. Beside it, in how many "
-    "of the other admissible sets of goals the claim holds, by uncorrected tests "
-    "(docs/reconstruction.md)."
+    "† rests on the two-armed tasks, whose goals are not printed. The default ones give "
+    "what is printed of the corrective process alone, and were chosen because learned rewards and "
+    "hand sequences come near to the printed ones: no independent test. Beside it, in how many of "
+    "the admissible sets of goals that are kept the claim holds, by uncorrected tests with 20 "
+    "runs (docs/reconstruction.md)."
 )
 """What the mark of a fitted claim means."""
 CHOSEN = (
