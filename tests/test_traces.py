@@ -497,13 +497,13 @@ def test_shipped_optima_name_their_runs(home):
         method = "ECThree" if arm == "still" else "ECFour"
         how = trace(home, f"coarticTwoArmedOne{method}{name}").how
         assert how.startswith("mean, BCa bootstrap")
-        assert f"from the optimum {reward}: proven; shipped data" in how
+        assert f"from the optimum {reward}: not proven; shipped data" in how
         assert ", ".join(shipped_runs("two-armed-1", arm)) in how
     cell = trace(home, "tasks-in-short", ("two-armed-1", "optimum"))
     assert cell.sources == ()
     assert ", ".join(shipped_runs("two-armed-1", "free")) in cell.how
     still = trace(home, "methods-two-armed-1", ("dual-process/EC3", "gap_still")).how
-    assert f"other arm still, {best_still}: proven; shipped data" in still
+    assert f"other arm still, {best_still}: not proven; shipped data" in still
     assert ", ".join(shipped_runs("two-armed-1", "still")) in still
 
 
