@@ -306,11 +306,6 @@ RULES_IN_WORDS = {
 }
 
 
-def broken_rule(candidate: Candidate) -> str | None:
-    """The first rule that a candidate breaks, by its id; None for one that is good."""
-    return judged(candidate)[0]
-
-
 def judged(candidate: Candidate) -> tuple[str | None, str]:
     """The first rule that a candidate breaks, and the initial hands of one that breaks none."""
     for rule, breaks in RULES.items():
