@@ -30,7 +30,7 @@ from coartic.exploration import (
 )
 from coartic.initial import InitialSearch, search_initial_hands
 from coartic.lanes import LANES
-from coartic.learning import METHOD_PREFIX, TRIALS, LearningRun, learn_many
+from coartic.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.task import Task
 
@@ -137,6 +137,7 @@ def _result(session: Session, run: LearningRun) -> Result | MethodError:
         run.learned,
         initial=run.initial,
         replay=run.replay if run.replay_completed else (),
+        details={CORRECTIONS: run.corrections.tolist()},
     )
 
 

@@ -88,6 +88,7 @@ class Kept(NamedTuple):
     best_trial: Any  # (N,), -1 for none
     replayed: Any  # (N,) whether the replay hit every goal
     counts: Any  # (N, counters) what was spent, without the replay
+    corrections: Any  # (N, 1 + PARTS) made until the end of trial 0, and of each part of the rest
     first: Log
     best: Log
     replay: Log
@@ -105,6 +106,8 @@ class Count(NamedTuple):
 
 
 COUNT = Count()
+PARTS = 10
+"""Equal parts of the trials after trial 0, of which corrections are counted apart."""
 
 
 class Work(NamedTuple):
@@ -481,7 +484,10 @@ def _copy(run: int, source: Any, destination: Any) -> None:
 @inlined
 def _learn_from(trial: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*."""
+    others = max(1, kept.rewards.shape[1] - 1)
+    part = 0 if trial == 0 else 1 + (trial - 1) * PARTS // others
     for run in range(len(work.q)):
+        kept.corrections[run, part] = work.counts[run, COUNT.corrections]
         reward = -work.total[run]
         kept.rewards[run, trial] = reward
         kept.completed[run, trial] = work.going[run]

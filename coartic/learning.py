@@ -21,6 +21,7 @@ from coartic.lanes import LANES
 from coartic.learner import (
     COUNT,
     LEARNED,
+    PARTS,
     Kept,
     Log,
     empty_log,
@@ -39,6 +40,8 @@ from coartic.trials import make_trials
 
 TRIALS = 10_000  # trials of one run (printed)
 METHOD_PREFIX = "dual-process/"
+CORRECTIONS = "corrections"
+"""Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,8 @@ class LearningRun:
     rewards, or returns from that goal on where the condition credits subtasks."""
     targets: Array
     """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
     counters: Counters
     wall_s: float
     """Its share of the time that it and the runs beside it took."""
@@ -268,6 +273,7 @@ class _Learning:
             best_trial=np.full(runs, -1),
             replayed=np.zeros(runs, dtype=np.bool_),
             counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
+            corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
             first=empty_log(runs, goals, dof),
             best=empty_log(runs, goals, dof),
             replay=empty_log(runs, goals, dof),
@@ -309,6 +315,7 @@ class _Learning:
             replay_completed=bool(kept.replayed[number]),
             values=self._tables.value[number],
             targets=self._tables.target[number],
+            corrections=np.diff(np.maximum.accumulate(kept.corrections[number]), prepend=0),
             counters=_counters(kept.rewards.shape[1], kept.counts[number]),
             wall_s=wall / runs,
             cpu_s=cpu / runs,

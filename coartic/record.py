@@ -19,7 +19,8 @@ from pydantic import Field
 from pydantic_core import to_json
 
 from coartic.errors import CoarticError
-from coartic.learning import METHOD_PREFIX
+from coartic.learner import PARTS
+from coartic.learning import CORRECTIONS, METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
 from coartic.scores import Solved, Unscored, scored_together
@@ -358,14 +359,34 @@ def _broken_by_learning(record: Record) -> Iterator[str]:
             yield "its counts of trials are not those of its rewards"
         if not failed and spent.movement_ticks != -sum(known):
             yield "its ticks are not those of its trials"
-    if (record.solution and record.solution.reward) != max(known, default=None):
+    if asked.parameters.get("learned") == "replay":
+        if record.solution != record.replay:
+            yield "what was learned is not its replay"
+    elif (record.solution and record.solution.reward) != max(known, default=None):
         yield "the learned reward is not the best of its trials"
     if rewards and rewards[0] != (record.initial and record.initial.reward):
         yield "the initial reward is not that of trial 0"
+    counts = corrections_of(record)
+    if record.status == "ok" and rewards and counts is None:
+        yield "its corrections by trial are no counts"
+    if spent and counts and not policy and sum(counts) != spent.corrections:
+        yield "its corrections by trial do not add up to those it spent"
     if spent is None or not rewards or asked.trial_budget is not None:
         return
     if len(rewards) != asked.parameters.get("trials"):
         yield "its trials are not those it was asked for"
+
+
+def corrections_of(record: Record) -> list[int] | None:
+    """Corrective movements of a learner in trial 0 and in each tenth of the others.
+
+    None for other methods, and where they are not stored.
+    """
+    counts = record.details.get(CORRECTIONS)
+    if not record.method.startswith(METHOD_PREFIX) or not isinstance(counts, list):
+        return None
+    whole = [n for n in counts if isinstance(n, int) and not isinstance(n, bool) and n >= 0]
+    return whole if len(whole) == len(counts) == 1 + PARTS else None
 
 
 def _trials(record: Record) -> tuple[list[int], int]:

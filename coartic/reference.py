@@ -34,6 +34,7 @@ class ReferenceRun(NamedTuple):
     targets: dict[tuple[State, Hand], Array]
     movement_ticks: int
     corrections: int
+    corrections_by_trial: NDArray[np.int64]
     corrective_iterations: int
     biased_movements: int
 
@@ -112,6 +113,7 @@ def learn(
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
     ticks = corrections = iterations = biased = 0
+    by_trial = np.zeros(trials, dtype=np.int64)
     for trial in range(trials):
         q = np.array(task.q0)
         total = 0
@@ -152,6 +154,7 @@ def learn(
                 q, total = result.q, total - result.ticks
                 ticks += result.ticks
                 corrections += 1
+                by_trial[trial] += 1
                 if not result.hit:
                     break
             visited.append((state, hand, q))
@@ -171,7 +174,7 @@ def learn(
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
-        rewards, completed, values, targets, ticks, corrections, iterations, biased
+        rewards, completed, values, targets, ticks, corrections, by_trial, iterations, biased
     )
 
 

@@ -24,13 +24,13 @@ from coartic.initial import hand_sequences, ranked_sequences
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
 from coartic.readings import load_readings, model_under
-from coartic.record import RECORD_FORMAT, Asked, Environment, Record, run_seeds
+from coartic.record import RECORD_FORMAT, Asked, Environment, Record, corrections_of, run_seeds
 from coartic.scores import PlainMovement
 from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
 from coartic.task import parse_task
 from coartic.text import Line
 
-FORMAT: Literal[7] = 7  # of manifest and tables; raised when one of them changes its meaning
+FORMAT: Literal[8] = 8  # of manifest and tables; raised when one of them changes its meaning
 
 RUNS = pa.schema(
     [
@@ -53,6 +53,8 @@ RUNS = pa.schema(
         ("best_trial", pa.int64()),  # first trial with the solution's reward, if any
         *((name, pa.int64()) for name in Meter.COUNTS),
         ("solution_corrections", pa.int64()),  # corrective movements the solution needed
+        ("early_corrections", pa.int64()),  # in a learner's first tenth of trials after trial 0
+        ("late_corrections", pa.int64()),  # in the last tenth
         ("other_arm_travel", pa.float64()),  # of the arm that is not chosen, rad
         ("proven_bound", pa.int64()),  # reward that no solution exceeds, where proven
         ("told", pa.string()),  # what the method was told, comma-separated
@@ -181,7 +183,7 @@ class PlanLimits(Plain):
 class Manifest(Plain):
     """``manifest.json``: what was asked for and with what it was made."""
 
-    format: Literal[7] = FORMAT
+    format: Literal[8] = FORMAT
     specification: Plan
     limits: PlanLimits
     environment: Environment
@@ -320,7 +322,7 @@ def parquet_options(name: str) -> dict[str, Any]:
 def _run_row(suite: str, cell: PlannedCell, record: Record) -> dict[str, Any]:
     solution, replay, initial = record.solution, record.replay, record.initial
     specification, environment = record.specification, record.environment
-    commit = environment.commit
+    commit, by_trial = environment.commit, corrections_of(record)
     return {
         "run_id": record.run_id,
         "suite": suite,
@@ -341,6 +343,8 @@ def _run_row(suite: str, cell: PlannedCell, record: Record) -> dict[str, Any]:
         "best_trial": _best_trial(record),
         **(vars(record.meter) if record.meter else dict.fromkeys(vars(Meter()))),
         "solution_corrections": solution and solution.corrections,
+        "early_corrections": by_trial and by_trial[1],
+        "late_corrections": by_trial and by_trial[-1],
         "other_arm_travel": solution and solution.other_arm_travel,
         "proven_bound": record.bound,
         "told": ", ".join(record.told),

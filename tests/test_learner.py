@@ -36,6 +36,11 @@ def same_run(a, b):
         np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
 
 
+def _tenths(values):
+    part = np.arange(len(values)) * 10 // max(1, len(values))
+    return [values[part == number] for number in range(10)]
+
+
 def assert_equals_reference(task, condition, trials, seed=11):
     model = MotionModel(max_iterations=400)  # failures soon enough for the slow side
     fast = learn(task, condition, seed=seed, trials=trials, model=model)
@@ -44,6 +49,8 @@ def assert_equals_reference(task, condition, trials, seed=11):
     counters = fast.counters
     assert counters.movement_ticks == slow.movement_ticks
     assert counters.corrections == slow.corrections
+    parts = [slow.corrections_by_trial[:1], *_tenths(slow.corrections_by_trial[1:])]
+    assert fast.corrections.tolist() == [part.sum() for part in parts]
     assert counters.corrective_iterations == counters.jacobians - slow.biased_movements
     assert counters.corrective_iterations <= slow.corrective_iterations
     if slow.completed.all():  # else the kernel leaves a stationary point sooner

@@ -179,11 +179,25 @@ def test_distances_are_in_standard_errors() -> None:
     better = Learned(rewards + 5.0, cell.hands)
     cells = {"EC3": cell, "EC4": better}
     assert compared([Order("EC4", "EC3")], cells)[0].distance == 0.0
-    assert compared([Order("EC3", "EC4")], cells)[0].distance < -10.0
+    theirs, ours = 2 * rewards.var(ddof=1) / 20, 2 * rewards.var(ddof=1) / 400
+    missing = -5.0 / math.sqrt(theirs + ours)
+    assert compared([Order("EC3", "EC4")], cells)[0].distance == pytest.approx(missing)
+    # Printed with a p, it has to be so clear with the printed runs, on average.
+    clear = Order("EC4", "EC3", p_below=0.01)
+    assert compared([clear], cells)[0].distance == 0.0
+    two = Learned(rewards + 1.0, cell.hands)
+    short = 1.0 - stats.norm.isf(0.01) * math.sqrt(theirs)
+    assert compared([clear], {"EC3": cell, "EC4": two})[0].distance == pytest.approx(
+        short / math.sqrt(theirs + ours)
+    )
+    of_hands = Order("EC3", "EC3", (11, 9), "LRLR", "RRRR")
+    assert compared([of_hands], cells)[0].ours == rewards[:300].mean() - rewards[300:].mean()
     assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
     # To lose a sequence is never better than to learn it with figures far off.
     far = Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
     assert distance(compared([far], cells)) == distance(compared([absent], cells)) == FARTHEST
+    # What follows from other figures is shown and not counted.
+    assert distance(compared([replace(far, implied=True), share], cells)) == 0.0
     failing = Learned(rewards, cell.hands, failed=400)
     assert share.ours(failing) == 0.375
 
@@ -267,10 +281,15 @@ def test_a_reconstruction_is_found_and_scored(search: Search) -> None:
     small = replace(search, tried=Counter())
     found = reconstruct(small, effort=effort)
     members = found.members
-    assert list(members.member) == ["m001", "m002", "m003", "m004", *search.layout.known]
+    # Four that are spread, and the nearest where it is none of them.
+    ours = members.member.str.startswith("m")
+    assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
+    assert ours.sum() in (4, 5)
+    assert list(members.member[~ours]) == list(search.layout.known)
+    assert members.distance[0] == round(found.nearest.distance, 3)
     known = members.set_index("member").loc["F2", ["x3", "y3"]]
     assert known.tolist() == [2.38, 2.96]
-    for _, row in members[:4].iterrows():
+    for _, row in members[ours].iterrows():
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
@@ -281,8 +300,15 @@ def test_a_reconstruction_is_found_and_scored(search: Search) -> None:
 def test_what_is_printed_is_what_is_searched_for() -> None:
     found = {str(c) for c in search_for("two-armed-1").constraints}
     assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < found
-    labels = [test.label for test in targets.tests_of("two-armed-2")]
-    assert len(set(labels)) == len(labels) == 9
+    tests = targets.tests_of("two-armed-2")
+    assert len({test.label for test in tests}) == len(tests) == 10
+    # 11 and 9 of 20 are one figure, and all 20 runs have what their parts have.
+    implied = [test.label for test in tests if isinstance(test, Figure) and test.implied]
+    assert implied == ["EC3 mean", "EC3 sd", "EC3 RLRR share"]
+    beside = [test for test in targets.tests_of("two-armed-1") if isinstance(test, Figure)]
+    assert [test.label for test in beside if test.implied] == ["EC2 RRRR share"]
+    clear = [test.p_below for test in tests if isinstance(test, Order)]
+    assert clear == [0.01, 0.01]
     with pytest.raises(CoarticError, match="nothing to reconstruct of task 'ascending'"):
         search_for("ascending")
 

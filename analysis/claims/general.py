@@ -15,7 +15,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
-from analysis.claims.evidence import exceeds, shown
+from analysis.claims.evidence import all_hold, exceeds, shown
 from analysis.claims.register import Finding
 from analysis.claims.statements import MARGINS, decides, decides_apart
 from analysis.methods import LEARNER
@@ -26,6 +26,7 @@ from analysis.signatures.subtasks import postures_before
 from analysis.statistics.estimates import SEED
 from analysis.words import short
 from coartic import Hand, Task
+from coartic.learner import PARTS
 from coartic.record import SEARCH
 from coartic.robot import Array, Robot
 from coartic.task import hands_of
@@ -252,12 +253,20 @@ def _not_normal(data: Data, cells: Cells) -> Finding:
 
 @decides_apart("corrections", CELLS)
 def _corrections(data: Data, cells: Cells) -> Finding:
-    parts = []
+    tests, parts = [], []
     for task, condition in cells:
-        runs, goals = data.learned(task, condition), len(data.task(task).goals)
-        share = runs.corrections.sum() / (runs.trials.sum() * goals)
-        last = runs.solution_corrections.sum() / (len(runs) * goals)
-        parts.append(f"{task} {condition} {share:.0%}, {last:.0%}")
-    return Finding(
-        None, f"all in trial 0; over all trials, in the learned solution: {'; '.join(parts)}"
+        runs = data.learned(task, condition)
+        movements = (runs.trials - 1) * len(data.task(task).goals) / PARTS
+        early, late = (
+            (runs[name] / movements).to_numpy(dtype=np.float64)
+            for name in ("early_corrections", "late_corrections")
+        )
+        tests.append(exceeds(early - late, 0.0))
+        last = runs.solution_corrections.mean() / len(data.task(task).goals)
+        parts.append(f"{task} {condition} {early.mean():.1%}, {late.mean():.1%}, {last:.0%}")
+    return all_hold(
+        tests,
+        parts,
+        "movements to goals that were corrected, in the first and the last tenth of the trials "
+        "and in the learned solution: ",
     )

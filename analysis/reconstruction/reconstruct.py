@@ -15,7 +15,15 @@ from analysis.reconstruction.layout import layouts
 from analysis.reconstruction.scoring import Figure
 from analysis.reconstruction.search import Search
 from analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
-from analysis.reconstruction.waves import PLAN, REPORTED, Scored, Wave, best_of_waves, scored
+from analysis.reconstruction.waves import (
+    ENSEMBLE,
+    PLAN,
+    Scored,
+    Wave,
+    best_of_waves,
+    described,
+    scored,
+)
 from coartic import CoarticError, load_task
 from coartic.readings import load_readings, task_under
 from coartic.text import did_you_mean
@@ -49,10 +57,10 @@ class Reconstruction:
 
     search: Search
     nearest: Scored
-    """The point that is nearest to what is printed, by seeds that selected nothing."""
+    """The point that the waves ended with, by the seeds of the ensemble."""
     members: pd.DataFrame
-    """A row a member: coordinates, figures and distances; the nearest one is the first, each of
-    the others as far as possible from those before it; known sets of goals come last."""
+    """A row a member: coordinates, figures and distances. That point is the first, each of the
+    others as far as possible from those before it; known sets of goals come last."""
     pool: int
     """Admissible points among which the members are spread."""
 
@@ -84,43 +92,52 @@ def reconstruct(
     effort: Effort = FULL,
     report: Callable[[str], None] = lambda text: None,
 ) -> Reconstruction:
-    """Search, choose and score: the admissible region, the point nearest to what is printed,
-    and from there an ensemble spread over the region.
+    """Search, spread, score and choose.
 
-    The layout's known sets of goals compete with what is found where they meet every constraint,
-    and are scored beside it. The result depends on the arguments and on nothing else.
+    The admissible region, an ensemble spread over it by what the corrective process alone
+    does, and by waves from there the point nearest to what is printed.
+
+    The layout's known sets of goals compete where they meet every constraint, and are scored
+    beside it. The result depends on the arguments and on nothing else.
     """
     name = search.task.name
     tests, conditions = tests_of(name), conditions_of(name)
-    pool = _pool(search, report)
     layout = search.layout
     known = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
     compete = layout.points(known)
     compete = search.admitted(compete[layout.allowed(compete)], "known")
-    begin = pool[_apart(search, pool, effort.plan[0].points - len(compete))]
-    begin = np.concatenate([compete, begin])
-    best = best_of_waves(
-        search, begin, tests, conditions=conditions, plan=effort.plan, report=report,
-        trials=effort.trials,
+    pool = _pool(search, report)
+    pool = np.concatenate([compete[:1], _without(pool, compete[:1])])
+    spread = pool[_apart(search, pool, effort.members, first=0 if len(compete) else None)]
+    scores: dict[bytes, Scored] = {}
+
+    def score(places: Array) -> list[Scored]:
+        fresh = {goals.tobytes(): goals for goals in places if goals.tobytes() not in scores}
+        found = scored(
+            search, fresh.values(), tests, conditions=conditions, wave=ENSEMBLE,
+            runs=effort.runs, trials=effort.trials,
+        )  # fmt: skip
+        scores.update(zip(fresh, found, strict=True))
+        return [scores[goals.tobytes()] for goals in places]
+
+    begin = np.concatenate([spread, _without(compete, spread)])
+    results = score(layout.places(begin))
+    report(described(results, effort.runs))
+    nearest = best_of_waves(
+        search, begin, results, tests, conditions=conditions, plan=effort.plan,
+        report=report, trials=effort.trials,
     )[:1]  # fmt: skip
-    pool = np.concatenate([best, pool[~(pool == best).all(axis=1)]])
-    members = pool[_apart(search, pool, effort.members, first=0)]
+    members = np.concatenate([nearest, _without(spread, nearest)])
     names = [*(f"m{k:03d}" for k in range(1, len(members) + 1)), *layout.known]
-    goals = dict(zip(names, [*layout.places(members), *known], strict=True))
-    results = scored(
-        search, goals.values(), tests, conditions=conditions, wave=REPORTED,
-        runs=effort.runs, trials=effort.trials,
-    )  # fmt: skip
-    report(f"{len(results)} members, {effort.runs} runs a condition")
-    rows = [_row(*pair) for pair in zip(goals.items(), results, strict=True)]
+    goals = np.concatenate([layout.places(members), known])
+    results = score(goals)
+    rows = [_row(*each) for each in zip(names, goals, results, strict=True)]
     if search.readings:
         rows = [{"readings": " ".join(map(str, search.readings))} | row for row in rows]
     return Reconstruction(search, results[0], pd.DataFrame(rows), len(pool))
 
 
-def _apart(
-    search: Search, points: Array, count: int, first: int | None = None
-) -> NDArray[np.int64]:
+def _apart(search: Search, points: Array, count: int, first: int | None) -> NDArray[np.int64]:
     """Indices of points that are far from each other in what the corrective process does."""
     hands = tuple(sorted({c.hands for c in search.printed}))
     return spread_out(features(search.every_sequence(points), hands), count, first)
@@ -151,8 +168,12 @@ def _pool(search: Search, report: Callable[[str], None]) -> Array:
     return found[rng.permutation(len(found))[:_POOL]]
 
 
-def _row(member: tuple[str, Array], result: Scored) -> dict[str, Any]:
-    name, goals = member
+def _without(points: Array, others: Array) -> Array:
+    """The points that are none of the others."""
+    return np.asarray(points[~(points[:, None] == others).all(axis=2).any(axis=1)])
+
+
+def _row(name: str, goals: Array, result: Scored) -> dict[str, Any]:
     row: dict[str, Any] = {"member": name}
     for number, (x, y) in enumerate(goals.tolist(), 1):
         row |= {f"x{number}": round(x, DECIMALS), f"y{number}": round(y, DECIMALS)}

@@ -35,6 +35,11 @@ class Learned(NamedTuple):
         """All of them."""
         return len(self.hands) + self.failed
 
+    def beside(self, others: Learned) -> Learned:
+        """These runs and others of the same cell."""
+        rewards = np.concatenate([self.rewards, others.rewards])
+        return Learned(rewards, self.hands + others.hands, self.failed + others.failed)
+
     def with_hands(self, hands: str | None) -> NDArray[np.float64]:
         """Rewards of the runs that learned a sequence; of all for None."""
         chosen = np.array([hands in (None, own) for own in self.hands], dtype=bool)
@@ -56,6 +61,8 @@ class Figure:
     """Printed SD of the runs, for a mean."""
     digits: int = 0
     """Decimals that are printed."""
+    implied: bool = False
+    """It follows from others (the last share, all runs beside their parts): shown, not counted."""
 
     @property
     def label(self) -> str:
@@ -96,15 +103,41 @@ class Figure:
 
 @dataclass(frozen=True)
 class Order:
-    """A condition's mean reward is printed as higher than another's."""
+    """A mean reward is printed as higher than another, of conditions or of hand sequences."""
 
     condition: str
     than: str
+    runs: tuple[int, int] = (20, 20)
+    """Printed runs of both."""
+    hands: str | None = None
+    than_hands: str | None = None
+    p_below: float | None = None
+    """What the printed p of the one-tailed test lies below; None where none is printed."""
 
     @property
     def label(self) -> str:
         """Such as ``EC4 above EC3``."""
-        return f"{self.condition} above {self.than}"
+        first = " ".join(filter(None, (self.condition, self.hands)))
+        second = " ".join(filter(None, (self.than, self.than_hands)))
+        return f"{first} above {second}"
+
+    def seen(self, cells: Mapping[str, Learned]) -> tuple[float, float]:
+        """Difference of our means, and how far the printed test falls short of its p.
+
+        In SDs of its z, ours being as uncertain as our runs are; 0 where it would not on
+        average. NaN with too few runs.
+        """
+        above = cells[self.condition].with_hands(self.hands)
+        below = cells[self.than].with_hands(self.than_hands)
+        if min(len(above), len(below)) < 2:
+            return math.nan, math.nan
+        difference = float(above.mean() - below.mean())
+        parts = float(above.var(ddof=1)) + 1e-9, float(below.var(ddof=1)) + 1e-9
+        theirs = sum(part / n for part, n in zip(parts, self.runs, strict=True))
+        ours = parts[0] / len(above) + parts[1] / len(below)
+        wanted = 0.0 if self.p_below is None else float(stats.norm.isf(self.p_below))
+        missing = difference - wanted * math.sqrt(theirs)
+        return difference, min(0.0, missing / math.sqrt(theirs + ours))
 
 
 Test = Figure | Order
@@ -160,16 +193,18 @@ def _compared(test: Test, cells: Mapping[str, Learned]) -> Compared:
     if isinstance(test, Figure):
         cell = cells[test.condition]
         return Compared(test, test.ours(cell), test.distance(cell))
-    above, below = cells[test.condition].rewards, cells[test.than].rewards
-    if min(len(above), len(below)) < 2:
-        return Compared(test, math.nan, math.nan)
-    difference = float(above.mean() - below.mean())
-    error = math.sqrt(above.var(ddof=1) / len(above) + below.var(ddof=1) / len(below) + 1e-12)
-    return Compared(test, difference, min(0.0, difference / error))
+    return Compared(test, *test.seen(cells))
 
 
 def distance(comparisons: Iterable[Compared]) -> float:
-    """Root mean square of the distances, standard errors; none counts as more than FARTHEST."""
-    values = [abs(each.distance) for each in comparisons]
+    """Root mean square of the distances, standard errors; none counts as more than FARTHEST.
+
+    What follows from other figures is not counted a second time.
+    """
+    values = [
+        abs(each.distance)
+        for each in comparisons
+        if not (isinstance(each.test, Figure) and each.test.implied)
+    ]
     squares = [FARTHEST**2 if math.isnan(value) else min(value, FARTHEST) ** 2 for value in values]
     return math.sqrt(sum(squares) / len(squares))

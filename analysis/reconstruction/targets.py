@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from analysis import printed
 from analysis.published import RUNS
@@ -50,8 +51,17 @@ def tests_of(task: str) -> tuple[Test, ...]:
         for entry in entries
         if isinstance(entry, printed.Sd)
     }
-    found = (made for entry in entries for made in _tests(entry, counts, spreads))
-    return tuple(dict.fromkeys(found))
+    found = [made for entry in entries for made in _tests(entry, counts, spreads)]
+    return tuple(_implied(test, counts) for test in dict.fromkeys(found))
+
+
+def _implied(test: Test, counts: Mapping[_Cell, int]) -> Test:
+    """Marked where it follows from others: parts that make up all runs are all of a condition."""
+    parts = {cell: n for cell, n in counts.items() if cell[0] == test.condition and cell[1]}
+    if not isinstance(test, Figure) or len(parts) < 2 or sum(parts.values()) != RUNS:
+        return test
+    follows = test.kind == "share" and (test.condition, test.hands) == list(parts)[-1]
+    return replace(test, implied=follows or test.hands is None)
 
 
 def _tests(
@@ -74,9 +84,12 @@ def _tests(
             yield Figure(condition, "share", int(entry.value) / RUNS, RUNS, entry.hands)
         case printed.Sequences(condition=condition, found=(only,)):
             yield Figure(condition, "share", 1.0, RUNS, only)
-        case printed.Order(condition=str(condition), hands=None) if not entry.sample:
-            if entry.than.condition is not None and entry.than.hands is None:
-                yield Order(condition, entry.than.condition)
+        case printed.Order(condition=str(condition), than=than) if not entry.sample:
+            if than.condition is not None and entry.goal is None:
+                both = runs, counts.get((than.condition, than.hands), RUNS)
+                below = None if entry.p_below is None else float(entry.p_below)
+                hands = entry.hands, than.hands
+                yield Order(condition, than.condition, both, *hands, p_below=below)
 
 
 def conditions_of(task: str) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 """Which admissible coordinates give what is printed about learning: waves of learning runs.
 
-Each wave performs more runs of fewer points, with seeds that no other wave uses; between the
-waves the neighbourhood of the best is searched. Figures to report come from seeds that have
-selected nothing.
+They begin with the ensemble; each wave performs further runs of fewer points, with seeds that no
+other wave uses, and a point is judged by all its runs so far. Between the waves the neighbourhood
+of the best is searched.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,8 @@ from coartic.readings import condition_under
 
 Array = NDArray[np.float64]
 _SEEDS = 1_000_000  # of a wave begin at a multiple of this
-REPORTED = 0
-"""The wave whose seeds select nothing."""
+ENSEMBLE = 0
+"""The wave that scores the members of the ensemble."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,9 @@ class Wave:
     """A step of the search."""
 
     points: int
-    """Of how many points, the best of the wave before; the first wave takes a spread."""
+    """Of how many points, the best of the wave before."""
     runs: int
-    """Runs a condition."""
+    """Further runs a condition."""
     around: int = 0
     """Further points, in random steps from them."""
     step: float = 0.0
@@ -47,7 +48,6 @@ class Wave:
 
 
 PLAN = (
-    Wave(points=300, runs=6),
     Wave(points=60, runs=20),
     Wave(points=12, runs=20, around=60, step=0.1),
     Wave(points=12, runs=20, around=60, step=0.03),
@@ -79,8 +79,12 @@ def scored(
     wave: int,
     runs: int,
     trials: int = 10_000,
+    before: Mapping[bytes, Scored] = MappingProxyType({}),
 ) -> list[Scored]:
-    """Learning runs at sets of goals (G, 2), with the seeds of a wave; in their order."""
+    """Learning runs at sets of goals (G, 2), with the seeds of a wave; in their order.
+
+    Runs ``before``, by the bytes of the goals, count with them.
+    """
     seeds = range(_SEEDS * wave, _SEEDS * wave + runs)
     explored = {
         name: replace(CONDITIONS[name], **condition_under(search.readings)) for name in conditions
@@ -92,6 +96,8 @@ def scored(
             name: learned(task, condition, seeds, model=search.model, trials=trials)
             for name, condition in explored.items()
         }
+        if (known := before.get(places.tobytes())) is not None:
+            cells = {name: known.cells[name].beside(own) for name, own in cells.items()}
         return Scored(places, cells, compared(tests, cells))
 
     with ThreadPoolExecutor(search.jobs) as pool:
@@ -101,6 +107,7 @@ def scored(
 def best_of_waves(
     search: Search,
     points: Array,
+    results: Sequence[Scored],
     tests: Sequence[Test],
     *,
     conditions: Sequence[str],
@@ -111,16 +118,16 @@ def best_of_waves(
 ) -> Array:
     """Points by their distance to what is printed, the nearest first; those of the last wave.
 
-    ``points`` (N, P) are admissible and spread out, the first ones most; coordinates are
-    rounded to ``decimals``.
+    ``points`` (N, P) are admissible and scored before; coordinates are rounded to ``decimals``.
     """
-    for number, wave in enumerate(plan, 1):
-        points = points[: wave.points]
+    known = {result.goals.tobytes(): result for result in results}
+    for number, wave in enumerate(plan, ENSEMBLE + 1):
+        points = points[_by_distance(results)[: wave.points]]
         if wave.around:
             rng = np.random.default_rng([number, wave.around])
             found = np.round(search.spread(points, wave.around, rng, wave.step), decimals)
             found = search.admitted(found[search.layout.allowed(found)], "around the best")
-            points = np.concatenate([points, found])
+            points = np.unique(np.concatenate([points, found]), axis=0)
         results = scored(
             search,
             search.layout.places(points),
@@ -129,12 +136,21 @@ def best_of_waves(
             wave=number,
             runs=wave.runs,
             trials=trials,
+            before=known,
         )
-        distances = np.array([result.distance for result in results])
-        order = np.argsort(distances, kind="stable")
-        points = points[order]
-        report(
-            f"wave {number}: {len(results)} sets of goals, {wave.runs} runs a condition; "
-            f"distances {distances[order[0]]:.2f} to {distances[order[-1]]:.2f}"
-        )
-    return points
+        known |= {result.goals.tobytes(): result for result in results}
+        report(f"wave {number}: {described(results, wave.runs)}")
+    return points[_by_distance(results)]
+
+
+def _by_distance(results: Sequence[Scored]) -> NDArray[np.intp]:
+    return np.argsort([result.distance for result in results], kind="stable")
+
+
+def described(results: Sequence[Scored], runs: int) -> str:
+    """How many sets of goals were scored, by how many further runs, and how far they are."""
+    distances = [result.distance for result in results]
+    return (
+        f"{len(results)} sets of goals, {runs} runs a condition; "
+        f"distances {min(distances):.2f} to {max(distances):.2f}"
+    )
