@@ -170,7 +170,10 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     """An error for a name that is not among the known ones, with the nearest of them."""
     names = list(known)
     hint = did_you_mean(name, names) or "."
-    return CoarticError(f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}.")
+    more = f" and {len(names) - _MOST_NAMED} others" if len(names) > _MOST_NAMED else ""
+    return CoarticError(
+        f"unknown {kind} {name!r}{hint} Known: {', '.join(names[:_MOST_NAMED])}{more}."
+    )
 
 
 @cache
@@ -200,6 +203,7 @@ def _described(foreign: Foreign, origin: str) -> tuple[Declaration, ...]:
 
 
 _asked: dict[Foreign, Sandbox] = {}
+_MOST_NAMED = 40  # in an error
 _VALUES: TypeAdapter[dict[str, Any]] = TypeAdapter(Values)
 _lock = threading.Lock()
 

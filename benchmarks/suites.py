@@ -43,7 +43,7 @@ from coartic.inputs import (
     read_toml,
 )
 from coartic.learning import METHOD_PREFIX
-from coartic.members import members
+from coartic.members import members, task_of
 from coartic.readings import ChosenReading, condition_under, model_under, task_under
 from coartic.record import run_seeds
 from coartic.robot import Finite
@@ -262,7 +262,8 @@ def select_cells(
     A method of ``methods`` that the suite does not have runs on all of the suite's
     tasks that it applies to. A task from a file runs under every applicable method of
     ``methods``, or of all methods of the suite where none are named; so does an instance of a
-    family that ``tasks`` names, alone or in a range, and the suite does not. Raises CoarticError
+    family that ``tasks`` names, alone or in a range, or a member of an ensemble, and the suite
+    does not. Raises CoarticError
     for unknown names, for a task file whose name is taken, for parameters that a method
     does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
     by one name, and where nothing is left to run.
@@ -274,7 +275,7 @@ def select_cells(
     own |= {
         name: load_task(name)
         for name in tasks
-        if address_of(name) and name not in there | set(own)
+        if (address_of(name) or task_of(name)) and name not in there | set(own)
     }
     _check_size(suite, known, own)
     cells = [cell for block in suite.cells for cell in _block_cells(suite, block, known, own)]

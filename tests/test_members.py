@@ -18,10 +18,12 @@ from analysis.reconstruction.specifications import (
 )
 from analysis.results.folder import Results
 from analysis.study import Study
-from coartic import PAPER, TaskError, load_task
+from benchmarks.suites import load_suite, select_cells
+from coartic import PAPER, CoarticError, TaskError, load_task
 from coartic.members import members, members_file, task_of, with_members
 from coartic.tables import DeclaredMethod
 from tests.support.made_up import manifest_for, replanned, row
+from tests.support.suites import KNOWN
 
 
 @pytest.fixture(params=with_members())
@@ -57,6 +59,16 @@ def test_a_member_that_is_not_there_is_said():
         load_task("two-armed-1-m999")
     assert task_of("ascending") is None
     assert members("ascending") == {}
+
+
+def test_a_member_runs_in_any_suite():
+    cells = select_cells(load_suite("comparison"), KNOWN, tasks=["two-armed-1-m017"])
+    assert {cell.task.goals for cell in cells} == {load_task("two-armed-1-m017").goals}
+    families = {cell.method.partition("/")[0] for cell in cells}
+    assert {"dual-process", "cma-es", "trajectory-optimisation"} <= families
+    # Of many names an error shows some.
+    with pytest.raises(CoarticError, match=r"m040 and \d+ others\.$"):
+        select_cells(load_suite("reconstructions"), KNOWN, tasks=["ascending"])
 
 
 def test_figures_of_members_are_complete(ensemble):

@@ -15,7 +15,7 @@ from coartic.text import one_line
 
 if TYPE_CHECKING:
     from analysis.figures.animation import Panel
-    from coartic import Task
+    from coartic import MotionModel, Task
 
 GROUP = "Draw"
 
@@ -77,7 +77,7 @@ def animate(
         title = one_line(f"{found.task.name}: {record.method}, run {record.run}")
         panels.append(Panel(title, found))
     if initial:
-        panels.insert(0, _initial_panel(panels[0].trajectory.task))
+        panels.insert(0, _initial_panel(panels[0].trajectory.task, record.model))
     timed = animate(panels, out, speed=speed, width=width, replace=replace)
     say(
         f"{' beside '.join(panel.title for panel in panels)} in {out}: "
@@ -85,12 +85,12 @@ def animate(
     )
 
 
-def _initial_panel(task: Task) -> Panel:
+def _initial_panel(task: Task, model: MotionModel) -> Panel:
     from analysis.figures.animation import Panel
     from coartic import corrective_trial, initial_hands, trajectory
 
-    movements = corrective_trial(task, initial_hands(task)).movements
-    return Panel(f"{task.name}: initial solution", trajectory(task, movements))
+    movements = corrective_trial(task, initial_hands(task, model=model), model=model).movements
+    return Panel(f"{task.name}: initial solution", trajectory(task, movements, model=model))
 
 
 COMMANDS = (draw, animate)
