@@ -127,9 +127,10 @@ def over_tasks(scores: pd.DataFrame) -> pd.DataFrame:
 
     ``tasks``, ``runs`` (of all tasks), ``failed`` (without a solution); ``gap``: mean gap as a
     share of the optimum, the headline measure; ``score``: interquartile mean of the normalised
-    scores, which of few tasks with one run each drops the best and the worst; ``within_1``, ``_2``, ``_5``, ``_10``: share of runs whose gap is at most so many %, a
-    failed run's never. Each with ``_low`` and ``_high`` (95 %, stratified bootstrap) and
-    ``_note``, why there is no interval. ``score`` and ``gap`` are missing where runs failed.
+    scores, which of few tasks with one run each drops the best and the worst; ``within_1``,
+    ``_2``, ``_5``, ``_10``: share of runs whose gap is at most so many %, a failed run's never.
+    Each with ``_low`` and ``_high`` (95 %, stratified bootstrap) and ``_note``, why there is no
+    interval. ``score`` and ``gap`` are missing where runs failed.
     """
     rows = []
     for method in everywhere(scores):

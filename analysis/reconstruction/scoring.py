@@ -62,7 +62,7 @@ class Figure:
     digits: int = 0
     """Decimals that are printed."""
     implied: bool = False
-    """It follows from others (the last share, all runs beside their parts): shown, not counted."""
+    """It follows from others, as the mean of all runs from those of their parts: not counted."""
 
     @property
     def label(self) -> str:

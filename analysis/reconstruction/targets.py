@@ -56,12 +56,13 @@ def tests_of(task: str) -> tuple[Test, ...]:
 
 
 def _implied(test: Test, counts: Mapping[_Cell, int]) -> Test:
-    """Marked where it follows from others: parts that make up all runs are all of a condition."""
-    parts = {cell: n for cell, n in counts.items() if cell[0] == test.condition and cell[1]}
-    if not isinstance(test, Figure) or len(parts) < 2 or sum(parts.values()) != RUNS:
-        return test
-    follows = test.kind == "share" and (test.condition, test.hands) == list(parts)[-1]
-    return replace(test, implied=follows or test.hands is None)
+    """Marked where it follows from others: of all runs, beside parts that make up all runs."""
+    parts = [
+        n for (condition, hands), n in counts.items() if condition == test.condition and hands
+    ]
+    if isinstance(test, Figure) and test.hands is None and sum(parts) == RUNS:
+        return replace(test, implied=True)
+    return test
 
 
 def _tests(
