@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
 
-from coartic.errors import CoarticError
+from coartic.errors import CoarticError, need
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -153,9 +153,11 @@ VARIANTS = {condition.id: condition for base in ("EC1", "EC4") for condition in 
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition or variant by its id; raises CoarticError for an unknown one."""
+    """A condition or variant by its id; raises CoarticError for an unknown one, TypeError for
+    what is neither."""
     if isinstance(condition, ExplorationCondition):
         return condition
+    need(condition, str, "a condition goes by its id, such as EC1")
     try:
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
-from coartic.errors import NotApplicableError
+from coartic.errors import LOADED, NotApplicableError, need
 from coartic.model import PAPER, MotionModel
 from coartic.robot import HANDS, Hand
 from coartic.solution import Execution, Movement, execute
@@ -33,8 +33,9 @@ def corrective_trial(task: Task, hands: str, *, model: MotionModel = PAPER) -> E
 def hand_sequences(task: Task, hands: Iterable[Hand] | None = None) -> list[str]:
     """All hand sequences of a task, left before right; 2^G of them for two hands.
 
-    Raises NotApplicableError above ``MOST_SEQUENCES``.
+    Raises NotApplicableError above ``MOST_SEQUENCES``, TypeError for what is no task.
     """
+    need(task, Task, LOADED)
     allowed = task.hands if hands is None else tuple(hands)
     ordered = [hand for hand in HANDS if hand in allowed]
     reason = too_many_sequences(task, len(ordered))

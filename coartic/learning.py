@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from coartic.compiled import addresses
 from coartic.corrective import correct
-from coartic.errors import CoarticError, NotApplicableError
+from coartic.errors import LOADED, CoarticError, NotApplicableError, need
 from coartic.exploration import ExplorationCondition, load_condition
 from coartic.initial import InitialSearch, search_initial_hands
 from coartic.lanes import LANES
@@ -188,9 +188,9 @@ def learn(
     """Run the learner on a task under an exploration condition.
 
     The result depends on the arguments alone. Raises NotApplicableError where the
-    condition does not fit the task, CoarticError for an unknown condition and
-    ValueError for a negative seed, fewer than one trial, or a model that no movement can
-    be made with. Source: paper, Figure 3.
+    condition does not fit the task, CoarticError for an unknown condition, TypeError for what
+    is no task or model, and ValueError for a negative seed, fewer than one trial, or a model
+    that no movement can be made with. Source: paper, Figure 3.
     """
     return learn_many(task, condition, seeds=[seed], trials=trials, model=model, jobs=1)[0]
 
@@ -211,6 +211,7 @@ def learn_many(
     anything but the time. ``on_done`` is called with each run that has ended. Raises what
     :func:`learn` does.
     """
+    need(task, Task, LOADED)
     condition = load_condition(condition)
     reason = condition.why_not(task)
     if reason is not None:

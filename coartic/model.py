@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from coartic.errors import need
+
 
 class MotionModel(NamedTuple):
     """Constants of the paper's model; what each one rests on is in docs/model.md.
@@ -45,11 +47,13 @@ PAPER = MotionModel()
 
 
 def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """The model itself; ValueError for constants no movement can be made with.
+    """The model itself; ValueError for constants no movement can be made with, TypeError for
+    what is no model.
 
     ``radius`` of the goals, where known: a corrective process that ends farther from a
     goal's centre than that never hits it.
     """
+    need(model, MotionModel, "PAPER is the paper's")
     for name in ("step", "gain", "correction_tolerance"):
         value = getattr(model, name)
         if not 1e-6 <= value <= 1e6:

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from coartic.corrective import correct
-from coartic.errors import SolutionError
+from coartic.errors import LOADED, SolutionError, need
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import MoveResult, configuration, follow, move
 from coartic.robot import Array, Hand
@@ -99,8 +99,9 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     the execution ends there with a reason. Raises SolutionError for a solution that
     breaks the task's rules: goals missing or out of order, a hand the robot does not
     have, a target of the wrong shape or not finite, a locked base that moves. Raises
-    ValueError for a model that no movement can be made with.
+    ValueError for a model that no movement can be made with, TypeError for what is no task.
     """
+    need(task, Task, LOADED)
     run = _Run(task, checked_model(model, radius=task.radius))
     for number, movements in _by_goal(task, list(solution)):
         run.reach(number, movements)

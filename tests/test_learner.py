@@ -17,6 +17,7 @@ from coartic import (
     NotApplicableError,
     corrective_trial,
     execute,
+    hand_sequences,
     learn,
     learn_many,
     load_task,
@@ -518,3 +519,18 @@ def test_without_corrective_process_a_missed_goal_ends_the_trial():
     assert run.reward > run.initial_reward
     assert {movement.kind for movement in run.solution} == {"learned"}
     assert run.execute().corrections == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: learn("ascending", "EC1", seed=0), "'ascending' is no Task; load_task makes"),
+        (lambda: learn(load_task("ascending"), 7, seed=0), "7 is no str; a condition goes by"),
+        (lambda: learn(load_task("ascending"), "EC1", seed=0, model=3), "3 is no MotionModel"),
+        (lambda: execute("ascending", []), "'ascending' is no Task"),
+        (lambda: hand_sequences("x"), "'x' is no Task"),
+    ],
+)
+def test_what_is_handed_over_is_said_where_it_is_of_another_kind(call, words):
+    with pytest.raises(TypeError, match=words):
+        call()
