@@ -19,6 +19,8 @@ import psutil
 
 _LOOK_S = 0.2  # between looks at the parent
 _END_LIMIT_S = 5.0
+# What is imported stays: to look through it for garbage would be a fifth of a worker's start.
+_WORKER = "import gc; gc.disable(); from benchmarks.worker import main; main()"
 
 
 def end_below(process: psutil.Process, *, patience_s: float = _END_LIMIT_S) -> None:
@@ -68,9 +70,7 @@ def main() -> None:
         parent = psutil.Process(int(sys.argv[1]))
     except psutil.NoSuchProcess:  # it ended before we looked
         return
-    worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", "benchmarks.worker"], start_new_session=True
-    )
+    worker = subprocess.Popen([sys.executable, "-P", "-c", _WORKER], start_new_session=True)
     with open(os.devnull, "r+b") as nothing:  # the streams are the worker's: it ends them
         for stream in (0, 1, 2):
             os.dup2(nothing.fileno(), stream)

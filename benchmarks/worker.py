@@ -1,12 +1,13 @@
 """The process that methods run in: it describes them, asks them, lets them solve.
 
-``python -m benchmarks.worker`` reads questions and writes answers, one JSON line each. It may
-run code that nobody has read, so nothing that it says is more than a statement: what it hands
-over as a solution is executed and scored elsewhere.
+Its guard starts it (:mod:`benchmarks.guard`). It reads questions and writes answers, one JSON
+line each. It may run code that nobody has read, so nothing that it says is more than a
+statement: what it hands over as a solution is executed and scored elsewhere.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import time
@@ -246,6 +247,9 @@ def main() -> None:
         said: dict[str, Any] = {"error": None, "answer": None}
         question = json.loads(line)
         token = question.pop("token")
+        if question["question"] != "prepare" and not gc.isenabled():
+            gc.freeze()  # what was imported and compiled until now
+            gc.enable()
         try:
             said["answer"] = answer(question)
             text = _json(said)
@@ -263,7 +267,3 @@ def _json(said: dict[str, Any]) -> bytes:
         return to_json(said)  # a tenth of the time of what comes next
     except PydanticSerializationError:  # half a character, say
         return json.dumps(said, allow_nan=False).encode()
-
-
-if __name__ == "__main__":
-    main()

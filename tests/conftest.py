@@ -10,6 +10,9 @@ from hypothesis import settings
 
 from benchmarks.sandbox import THREADS
 
+# While modules are imported and tests collected, nothing is garbage: see the end of this file.
+gc.disable()
+
 # What the fixtures need is imported in them: the process that hands out the tests to
 # workers reads this file, too, and runs none.
 
@@ -125,6 +128,6 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     """What is imported and collected stays: looking through it again and again takes long."""
-    gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 50, 1_000)
+    gc.enable()
