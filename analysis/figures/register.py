@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from analysis.figures.bars import bars
 from analysis.figures.configurations import PAPER, paper_configurations
 from analysis.figures.context import context
+from analysis.figures.families import family_exploration, family_gaps
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
 from analysis.figures.plot import Plot
@@ -25,7 +26,14 @@ from coartic import CoarticError
 from coartic.text import did_you_mean
 
 Section = Literal[
-    "tasks-drawn", "paper", "movements", "learning", "methods", "cost", "coarticulation"
+    "tasks-drawn",
+    "families",
+    "paper",
+    "movements",
+    "learning",
+    "methods",
+    "cost",
+    "coarticulation",
 ]
 """Of a report that shows figures, by id."""
 
@@ -57,6 +65,8 @@ REGISTER = (
     Entry("published", published, "paper"),
     Entry("learning-curves", learning_curves, "learning"),
     Entry("recruitment", recruitment, "paper"),
+    Entry("family-gaps", family_gaps, "families"),
+    Entry("family-exploration", family_exploration, "families"),
     Entry("context", context, "coarticulation"),
     Entry("signatures", signature_matrix, "coarticulation", by_task=True),
     Entry("frontier", frontier, "cost"),

@@ -29,6 +29,7 @@ from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
 from analysis.report.pages.claims import claim_section, claims_table
 from analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
+from analysis.report.pages.families import families_section
 from analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
 from analysis.report.player import player_json
 from analysis.report.summary import (
@@ -112,6 +113,7 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
 
     sections = (
         _summary(study),
+        families_section(study, drawn("families")),
         _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
         _section("paper", "Published and ours", [*drawn("paper"), *_tables(*beside_paper(study))]),
         _claims(study, {} if figures is None else figures.like_the_paper),
