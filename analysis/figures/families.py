@@ -30,7 +30,7 @@ def _sample(study: Study) -> Sample:
 
 
 @style.styled
-def family_gaps(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """Gap to the best known reward of each instance, by method and family.
 
     By default of methods without variants. Raises CoarticError where the folder has no instances.
@@ -76,7 +76,7 @@ def family_gaps(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     style.letters(panels)
     joined = data.merge(ends, on=["method", "family"])
     told = spoken(ends, "{method}, {family}: {mean:.1%}")
-    return worded("family-gaps", figure, joined, seed=SEED, resamples=RESAMPLES, means=told)
+    return worded("gaps-by-family", figure, joined, seed=SEED, resamples=RESAMPLES, means=told)
 
 
 def _means(sample: Sample, labels: Sequence[str]) -> pd.DataFrame:
@@ -98,7 +98,7 @@ def _means(sample: Sample, labels: Sequence[str]) -> pd.DataFrame:
 
 
 @style.styled
-def family_exploration(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """What one condition gains over another on each instance, by family.
 
     ``methods`` chooses nothing here: pairs of the paper's conditions are shown, without those
@@ -154,4 +154,6 @@ def family_exploration(study: Study, *, methods: Sequence[str] | None = None) ->
     style.letters(panels)
     ends = data.drop_duplicates(["method", "family"])
     told = spoken(ends, "{method}, {family}: {mean:+.1%}")
-    return worded("family-exploration", figure, data, seed=SEED, resamples=RESAMPLES, means=told)
+    return worded(
+        "exploration-by-family", figure, data, seed=SEED, resamples=RESAMPLES, means=told
+    )

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from analysis.figures.bars import bars
 from analysis.figures.configurations import PAPER, paper_configurations
 from analysis.figures.context import context
-from analysis.figures.families import family_exploration, family_gaps
+from analysis.figures.families import exploration_by_family, gaps_by_family
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
 from analysis.figures.plot import Plot
@@ -65,8 +65,8 @@ REGISTER = (
     Entry("published", published, "paper"),
     Entry("learning-curves", learning_curves, "learning"),
     Entry("recruitment", recruitment, "paper"),
-    Entry("family-gaps", family_gaps, "families"),
-    Entry("family-exploration", family_exploration, "families"),
+    Entry("gaps-by-family", gaps_by_family, "families"),
+    Entry("exploration-by-family", exploration_by_family, "families"),
     Entry("context", context, "coarticulation"),
     Entry("signatures", signature_matrix, "coarticulation", by_task=True),
     Entry("frontier", frontier, "cost"),

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pandas as pd
 
 from analysis.methods import LEARNER
@@ -169,10 +168,10 @@ class Sample:
         solved = runs[runs.status == "ok"][columns]
         every = pd.concat([solved, sequences[sequences.reward.notna()][columns]])
         every = every[every.task.isin(list(self.references))]
-        best = every.astype({"reward": np.int64}).groupby(["task", "hands"]).reward.max()
         found: dict[str, dict[str, int]] = {}
-        for (name, hands), reward in best.to_dict().items():
-            found.setdefault(str(name), {})[str(hands)] = int(reward)
+        for name, own in every.groupby("task"):
+            best = own.groupby("hands").reward.max()
+            found[str(name)] = {str(hands): int(reward) for hands, reward in best.items()}
         return found
 
 

@@ -176,7 +176,11 @@ def _summary(study: Study) -> Section:
     if unlike:
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         items = (*items, note)
-    blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study)), Bullets(items)]
+    blocks: list[Block] = [
+        Prose((facts,)),
+        *_tables(tasks_table(study), folded=_many(study)),
+        Bullets(items),
+    ]
     overall = overall_table(study)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
@@ -200,6 +204,8 @@ def _by_task(
 ) -> Iterator[Section]:
     """A section a task, where there is something to show of it."""
     for task, slug in table_ids(study).items():
+        if _many(study) and study.tasks[task].family is not None:
+            continue  # the section of families has them together
         blocks = blocks_of(task)
         if blocks:
             yield _section(f"on-{slug}-{name}", task, blocks)

@@ -90,8 +90,9 @@ def _exploration(study: Study, by_pair: dict[tuple[str, str], Contrast]) -> Iter
         hands = f"{100 * found.hands:+.1f}{NARROW_SPACE}%"
         yield escaped(
             f"{what} ({short_name(first)} over {short_name(second)}): "
-            f"{_share(found.difference, '+')}, {true_minus(hands)} of it by the hands that are learned; better on "
-            f"{found.better}, worse on {found.worse} of {counted(found.instances, 'instance')}; "
+            f"{_share(found.difference, '+')}, {true_minus(hands)} of it by the hands that are "
+            f"learned; better on {found.better}, worse on {found.worse} of "
+            f"{counted(found.instances, 'instance')}; "
             f"by family {' and '.join(parts) or 'told apart in none'}."
         )
 
