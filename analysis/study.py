@@ -24,10 +24,13 @@ from analysis.comparisons.pairs import compared, pairs_table
 from analysis.comparisons.pareto import pareto_sets
 from analysis.comparisons.progress import best_so_far
 from analysis.comparisons.targets import targets
+from analysis.generality.exploration import Contrast, contrasts
+from analysis.generality.presence import Signs, signs
+from analysis.generality.sample import sample
 from analysis.results.folder import CellKey, CellRuns, Results, load_results
 from analysis.results.optima import optima
 from analysis.signatures.register import signature_rows, signatures_table
-from analysis.signatures.trajectories import all_trajectories
+from analysis.signatures.trajectories import all_trajectories, movements_by_run
 from coartic import MotionModel, Task
 from coartic.files import folder_named
 from coartic.text import counted, did_you_mean
@@ -80,6 +83,7 @@ class Study:
         """Ids of the runs of every cell."""
         return {key: tuple(map(str, cell.runs.run_id)) for key, cell in self.cells.items()}
 
+    movements = cached_property(movements_by_run)
     trajectories = cached_property(all_trajectories)
     optima = cached_property(optima)
     method_rows = cached_property(method_rows)
@@ -90,7 +94,18 @@ class Study:
     areas = cached_property(areas)
     pareto = cached_property(pareto_sets)
     signature_rows = cached_property(signature_rows)
+    instances = cached_property(sample)
     judged = cached_property(judge)
+
+    @cached_property
+    def contrasts(self) -> list[Contrast]:
+        """More exploration against less on instances of families; none without any."""
+        return contrasts(self.instances) if self.instances else []
+
+    @cached_property
+    def signs(self) -> dict[CellKey, Signs]:
+        """Hands and signatures of the learner's runs on instances of families."""
+        return signs(self.instances) if self.instances else {}
 
     @cached_property
     def methods(self) -> pd.DataFrame:

@@ -14,6 +14,7 @@ from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     beyond,
     coarticulation,
     costs,
+    families,
     general,
     one_armed,
     presence,
@@ -21,8 +22,8 @@ from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     two_armed,
 )
 from analysis.claims.data import Data, MissingError
-from analysis.claims.power import Chances, powers
-from analysis.claims.register import Claim, Judged
+from analysis.claims.power import Chances, over_instances, powers
+from analysis.claims.register import Claim, Correction, Judged
 from analysis.claims.statements import JUDGED, STATEMENTS
 from analysis.statistics.hypotheses import holm
 
@@ -41,20 +42,32 @@ _COLUMNS = (
 )
 
 
-def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
+def asked(study: Study) -> tuple[Claim, ...]:
+    """Claims about such tasks as a folder has: instances of families, or others."""
+    drawn = {task.family is not None for task in study.tasks.values()}
+    return tuple(claim for claim in CLAIMS if bool(claim.families) in (drawn or {False}))
+
+
+def judge(study: Study, claims: Iterable[Claim] | None = None) -> list[Judged]:
     """Every claim with its verdict, p-values corrected over its family of ``claims`` (Holm).
 
-    A family are the tested claims on the paper's cells, or those that take other runs as well,
-    whether the folder can judge them or not.
+    By default those that are :func:`asked`. A family are the tested claims on the paper's cells,
+    those that take other runs as well, or those on random tasks, whether the folder can judge them
+    or not.
     """
-    claims = tuple(claims)
+    claims = asked(study) if claims is None else tuple(claims)
     sizes = family_sizes(claims)
     runs = {key: len(cell.good) for key, cell in study.cells.items() if len(cell.good)}
     chances = powers(claims, runs)
     found = [_seen(claim, Data(study)) for claim in claims]
+    chances |= {
+        entry.claim.id: over_instances(entry.claim.effect, entry.samples, sizes["families"])
+        for entry in found
+        if entry.samples
+    }
     adjusted: dict[tuple[int, str], float] = {}
-    for beside, size in sizes.items():
-        own = [entry for entry in found if entry.claim.tested and entry.claim.beside == beside]
+    for correction, size in sizes.items():
+        own = [e for e in found if e.claim.tested and e.claim.correction == correction]
         for name in ("p", "contrary_p"):
             of_claims = holm([getattr(entry, name) for entry in own], size)
             adjusted |= {(id(entry), name): p for entry, p in zip(own, of_claims, strict=True)}
@@ -70,9 +83,9 @@ def judge(study: Study, claims: Iterable[Claim] = CLAIMS) -> list[Judged]:
     ]
 
 
-def family_sizes(claims: Iterable[Claim] = CLAIMS) -> dict[bool, int]:
-    """Tested claims on the paper's cells alone (False), and on runs beside them (True)."""
-    return Counter(claim.beside for claim in claims if claim.tested)
+def family_sizes(claims: Iterable[Claim] = CLAIMS) -> dict[Correction, int]:
+    """Tested claims by what they are corrected with."""
+    return Counter(claim.correction for claim in claims if claim.tested)
 
 
 def _seen(claim: Claim, data: Data) -> Judged:

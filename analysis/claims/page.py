@@ -55,8 +55,9 @@ def _lines() -> Iterator[str]:
     )
     yield from ("", "## Verdicts", "", RULES, "", FITTED, "", CHOSEN, "")
     yield (
-        f"Families: {sizes[False]} claims with a test on the paper's own cells, {sizes[True]} "
-        "that take other runs beside them (suites `comparison`, `ablations`)."
+        f"Families: {sizes['paper']} claims with a test on the paper's own cells, "
+        f"{sizes['beside']} that take other runs beside them (suites `comparison`, `ablations`), "
+        f"{sizes['families']} on families of random tasks (suite `families`)."
     )
     yield from ("", "## Margins", "", "Each is set once.", "")
     for name, said in REASONS.items():
@@ -78,13 +79,20 @@ def _lines() -> Iterator[str]:
     needed = runs_needed(CLAIMS)
     for name, chances in powers(CLAIMS, {}).items():
         yield f"| {name} | {_row(chances)} | {needed[name] or f'more than {TRIED[-1]}'} |"
-    level = LEVEL / sizes[False]
+    level = LEVEL / sizes["paper"]
     one, two = (smallest_difference(1.0, sd, RUNS, level) for sd in (0.0, 1.0))
     yield ""
     yield (
         "Of the other claims with a test the paper prints no numbers. With a correction for all "
         f"of the family a test of the mean of {RUNS} runs finds, with {POWER:.0%}, a mean that is "
         f"{one:.1f} SD beyond its bound, a test of two means a difference of {two:.1f} SD."
+    )
+    yield ""
+    yield (
+        "Claims on families of random tasks are judged over instances, and their power depends on "
+        "how much instances differ: a folder states it for a true effect in each family of 1 % of "
+        "the best known reward, of a quarter of the runs more than half, of one tick, or of a "
+        "tenth of the way."
     )
     for section, claims in itertools.groupby(CLAIMS, lambda claim: claim.section):
         yield from ("", f"## {section}", "")

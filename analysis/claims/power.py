@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from analysis.claims.register import Claim
+from analysis.claims.register import Claim, Correction
 from analysis.claims.rules import (
     FEW,
     MOST,
@@ -39,7 +39,9 @@ from analysis.printed import ENTRIES, Order
 from analysis.published import RUNS, published_cell
 from analysis.statistics.estimates import FEWEST, LEVEL, SEED
 from analysis.statistics.hypotheses import independence_test, share_p
+from analysis.statistics.instances import chance
 from analysis.statistics.power import POWER
+from analysis.statistics.spread import sd
 from coartic.robot import Array
 
 SIMULATIONS = 2_000
@@ -79,8 +81,9 @@ def powers(claims: Iterable[Claim], runs: Sizes) -> dict[str, Chances]:
     claims = tuple(claims)
     sizes = {(task, label.removeprefix(LEARNER)): n for (task, label), n in runs.items()}
     found: dict[str, Chances] = {}
-    for beside in (False, True):
-        family = [claim for claim in claims if claim.tested and claim.beside == beside]
+    corrections: tuple[Correction, ...] = "paper", "beside"
+    for correction in corrections:
+        family = [c for c in claims if c.tested and c.correction == correction]
         drawn = {claim.id: _drawn_p(claim, sizes) for claim in family}
         known = {name: p for name, p in drawn.items() if p is not None}
         if not known:
@@ -91,6 +94,20 @@ def powers(claims: Iterable[Claim], runs: Sizes) -> dict[str, Chances]:
             refuted = min(1.0, float(weights[p * len(family) < LEVEL].sum()))
             found[name] = Chances(float(passed[:, place].mean()), refuted)
     return found
+
+
+def over_instances(effect: float, samples: Sequence[Array], family: int) -> Chances:
+    """Of a claim whose tests are of values of instances (n,), if the true means are the effect.
+
+    By the SDs that the samples show, for t-tests at the level that Holm's correction leaves the
+    last of ``family`` claims, the tests being of different instances. Of the contrary: if all true
+    means are minus the effect.
+    """
+    level, sds = LEVEL / family, [sd(values) for values in samples]
+    both = list(zip(sds, map(len, samples), strict=True))
+    holds = [chance(effect, spread, n, level, tails=1) for spread, n in both]
+    fails = [chance(effect, spread, n, level / len(samples), tails=1) for spread, n in both]
+    return Chances(float(np.prod(holds)), 1 - float(np.prod([1 - found for found in fails])))
 
 
 def runs_needed(claims: Sequence[Claim]) -> dict[str, int | None]:
@@ -215,6 +232,8 @@ def _printed(task: str, side: Side) -> bool:
 
 def _least_p(bound: float, rng: np.random.Generator, runs: int) -> Array:
     """p-values where the true difference is the least that the paper's runs show with a bound."""
+    if runs < FEWEST:
+        return np.ones(SIMULATIONS)
     shift = stats.t.isf(bound, 2 * RUNS - 2) * np.sqrt(runs / RUNS)
     freedom = 2 * runs - 2
     scale = np.sqrt(rng.chisquare(freedom, SIMULATIONS) / freedom)

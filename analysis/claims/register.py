@@ -11,9 +11,15 @@ from analysis.claims.data import Data
 from analysis.claims.reconstructions import held_by
 from analysis.report.document import DataTable
 from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
+from coartic.robot import Array
 
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
-Section = Literal["One-armed tasks", "Two-armed tasks", "General", "Beyond the paper"]
+Section = Literal[
+    "One-armed tasks", "Two-armed tasks", "General", "Families of tasks", "Beyond the paper"
+]
+Correction = Literal["paper", "beside", "families"]
+"""Which claims are corrected together: on the paper's cells, with runs beside them, on families of
+random tasks."""
 Rule = Literal["higher", "most", "few", "about", "differ", "tested", "counted", "measured"]
 """How a claim is decided; ``claims.toml`` says what each is."""
 
@@ -25,8 +31,9 @@ RULES = (
     "What is counted exactly, or shows no spread over runs, needs no test and is supported or "
     "not as it is. *Cannot tell*: neither, or the folder lacks the runs. What the goals of the "
     "two-armed tasks were chosen to give is *measured* where it is so: no support. Each of the "
-    "two corrections is over a family that the register fixes: its claims with a test on the "
-    "paper's own seven cells, or those that take other runs beside them. A claim that a folder "
+    "three corrections is over a family that the register fixes: its claims with a test on the "
+    "paper's own seven cells, those that take other runs beside them, or those on families of "
+    "random tasks, whose tests are over instances. A claim that a folder "
     "cannot test counts in its family all the same, with a p-value of 1, so that what is decided "
     "stays decided whatever is run beside. Where no rule could come out both ways, and where the "
     "paper compares nothing, things are *measured*, without a verdict."
@@ -61,6 +68,9 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Inference, ...] | None = None
     """Tests of the contrary, any of which refutes it; None: the other tails of ``tests``."""
+    samples: tuple[Array, ...] = ()
+    """What the tests are of, where its power is that of a stated effect: values of instances (n,)
+    less their bound."""
     table: DataTable | None = None
     """Numbers that are more than a sentence can hold; its id is ``evidence-`` and the claim's."""
 
@@ -80,6 +90,12 @@ class Claim:
     """Whether it takes runs beside the paper's cells."""
     pairs: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """Comparisons by task, of the rule that names them."""
+    families: Sequence[str] = ()
+    """Families of random tasks that it is about, with their versions."""
+    compared: Sequence[str] = ()
+    """Comparisons on each of their instances."""
+    effect: float = math.nan
+    """True effect for which its power is stated, in the unit of its tests."""
     runs: Mapping[str, str] = field(default_factory=dict)
     """Condition and hands by task, of a rule that counts runs."""
     place: str = ""
@@ -100,6 +116,13 @@ class Claim:
         return "; ".join(map(str, held_by(self.id))) if self.fitted else ""
 
     @property
+    def correction(self) -> Correction:
+        """Which claims it is corrected with."""
+        if self.families:
+            return "families"
+        return "beside" if self.beside else "paper"
+
+    @property
     def tested(self) -> bool:
         """Whether its rule gives p-values, so that it is one of its family."""
         return self.rule not in ("counted", "measured")
@@ -117,8 +140,8 @@ class Judged(Finding):
     """:attr:`p`, adjusted over its family (Holm)."""
     adjusted_contrary_p: float = math.nan
     power: float = math.nan
-    """Chance of *supported* with so many runs if the paper's numbers are exactly right; NaN
-    where the paper prints none that the rule takes."""
+    """Chance of *supported* with so many runs if the paper's numbers are exactly right, or the
+    claim's effect is; NaN where there is neither."""
     contrary_power: float = math.nan
     """Chance of *not supported* if the contrary holds: :mod:`analysis.claims.power`."""
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from analysis.figures.bars import bars
 from analysis.figures.configurations import PAPER, paper_configurations
 from analysis.figures.context import context
+from analysis.figures.families import exploration_by_family, gaps_by_family
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
 from analysis.figures.plot import Plot
@@ -20,12 +21,20 @@ from analysis.figures.recruitment import recruitment
 from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_of
+from analysis.generality.sample import one_by_one
 from analysis.study import Study
 from coartic import CoarticError
 from coartic.text import did_you_mean
 
 Section = Literal[
-    "tasks-drawn", "paper", "movements", "learning", "methods", "cost", "coarticulation"
+    "tasks-drawn",
+    "families",
+    "paper",
+    "movements",
+    "learning",
+    "methods",
+    "cost",
+    "coarticulation",
 ]
 """Of a report that shows figures, by id."""
 
@@ -57,6 +66,8 @@ REGISTER = (
     Entry("published", published, "paper"),
     Entry("learning-curves", learning_curves, "learning"),
     Entry("recruitment", recruitment, "paper"),
+    Entry("gaps-by-family", gaps_by_family, "families"),
+    Entry("exploration-by-family", exploration_by_family, "families"),
     Entry("context", context, "coarticulation"),
     Entry("signatures", signature_matrix, "coarticulation", by_task=True),
     Entry("frontier", frontier, "cost"),
@@ -141,7 +152,10 @@ class Figures(Mapping[str, Figure]):
         """The figures of a row, drawn once, or why there are none."""
         if entry.name not in self._drawn:
             tasks = len(self._study.tasks)
+            together = tasks - len(one_by_one(self._study))
             try:
+                if together and self._most is not None and entry.section != "families":
+                    raise CoarticError(f"{together} instances of families are shown together")
                 if entry.by_task and self._most is not None and tasks > self._most:
                     raise CoarticError(f"there would be one for each of {tasks} tasks")
                 found = entry.draw(self._study, methods=self._methods)

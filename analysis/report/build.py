@@ -12,6 +12,7 @@ import pandas as pd
 from analysis.figures import Figures, Plot
 from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.figures.register import Section as FigureSection
+from analysis.generality.sample import one_by_one
 from analysis.markup import escaped, words
 from analysis.report.document import (
     Block,
@@ -29,6 +30,7 @@ from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
 from analysis.report.pages.claims import claim_section, claims_table
 from analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
+from analysis.report.pages.families import families_section
 from analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
 from analysis.report.player import player_json
 from analysis.report.summary import (
@@ -112,6 +114,7 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
 
     sections = (
         _summary(study),
+        families_section(study, drawn("families")),
         _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
         _section("paper", "Published and ours", [*drawn("paper"), *_tables(*beside_paper(study))]),
         _claims(study, {} if figures is None else figures.like_the_paper),
@@ -174,7 +177,11 @@ def _summary(study: Study) -> Section:
     if unlike:
         note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
         items = (*items, note)
-    blocks: list[Block] = [Prose((facts,)), *_tables(tasks_table(study)), Bullets(items)]
+    blocks: list[Block] = [
+        Prose((facts,)),
+        *_tables(tasks_table(study), folded=_many(study)),
+        Bullets(items),
+    ]
     overall = overall_table(study)
     if overall is not None:
         blocks += _tables(*without_variants(overall))
@@ -197,7 +204,10 @@ def _by_task(
     study: Study, name: str, blocks_of: Callable[[str], Sequence[Block]]
 ) -> Iterator[Section]:
     """A section a task, where there is something to show of it."""
+    alone = one_by_one(study)
     for task, slug in table_ids(study).items():
+        if task not in alone:
+            continue  # the section of families has them together
         blocks = blocks_of(task)
         if blocks:
             yield _section(f"on-{slug}-{name}", task, blocks)

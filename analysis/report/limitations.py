@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.generality.sample import one_by_one
 from analysis.markup import code, escaped
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
@@ -48,8 +49,10 @@ def _said(sentence: str, **facts: Any) -> str:
 
 def _learned(study: Study) -> Iterator[str]:
     """What a learned reward is, beside what a learner would do without its noise."""
-    parts = []
+    parts, alone = [], one_by_one(study)
     for (task, label), cell in study.cells.items():
+        if task not in alone:
+            continue
         replays = cell.good.replay_reward.dropna()
         if label.startswith(LEARNER) and not cell.variant and len(replays) == len(cell.good) > 0:
             learned, replayed = (
@@ -62,7 +65,12 @@ def _learned(study: Study) -> Iterator[str]:
 
 
 def _reconstructed(study: Study) -> Iterator[str]:
+    alone = one_by_one(study)
+    if len(alone) < len(study.tasks):
+        yield _said("drawn", count=len(study.tasks) - len(alone))
     for name, task in study.results.tasks.items():
+        if name not in alone:
+            continue
         entries = task.provenance.items()
         inferred = [
             f"{key} ({entry.source.rstrip('.')})"
@@ -131,7 +139,8 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
     learner = {key: cell for key, cell in study.cells.items() if key[1].startswith(LEARNER)}
     if any((cell.runs.trials != TRIALS).any() for cell in learner.values()):
         yield _said("trials", trials=TRIALS)
-    found = [text for key in learner for text in _detectable(study, key)]
+    alone = one_by_one(study)
+    found = [text for key in learner if key[0] in alone for text in _detectable(study, key)]
     if found:
         yield _said("detectable", power=_percent(POWER), cells="; ".join(found))
     few = sorted({len(cell.runs) for cell in learner.values() if len(cell.runs) < RUNS})
@@ -166,8 +175,20 @@ def _optima(study: Study) -> Iterator[str]:
     without = [task for task in study.results.tasks if (task, "free") not in study.optima]
     if without:
         yield _said("no_optimum", tasks=escaped(", ".join(without)))
+    alone = one_by_one(study)
+    others = [
+        best
+        for (task, arm), best in study.optima.items()
+        if arm == "free" and task not in alone and not best.proven
+    ]
+    if others:
+        bounded = sum(best.bound is not None for best in others)
+        drawn = len(study.tasks) - len(alone)
+        yield _said("unproven_instances", count=len(others), drawn=drawn, bounded=bounded)
     for task in study.results.tasks:
         for arm in ("free", "still"):
+            if task not in alone:
+                continue
             best = study.optima.get((task, arm))
             if best is not None and not best.proven:
                 bound = "" if best.bound is None else f"; none above {best.bound} is proven"

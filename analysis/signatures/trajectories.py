@@ -130,19 +130,31 @@ def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
 
 def all_trajectories(study: Study) -> dict[tuple[str, str], Trajectories]:
     """By task and label, in the order of the plan; those without a solution have no runs."""
+    return {key: trajectories_of(study, key) for key in study.cells}
+
+
+def trajectories_of(study: Study, key: tuple[str, str]) -> Trajectories:
+    """Of one cell, by task and label."""
+    cell, task, model = study.cells[key], study.tasks[key[0]], study.model
+    solutions, paths = study.movements
+    runs = tuple(
+        trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)), model)
+        for run_id in cell.good.run_id
+    )
+    best = best_sequences(study.results.sequences, cell.task)
+    return Trajectories(task, cell.method, cell.variant, runs, tuple(best), model)
+
+
+def movements_by_run(
+    study: Study,
+) -> tuple[dict[str, pd.DataFrame], dict[str, pd.DataFrame]]:
+    """Movements of each run's solution, and waypoints of those that follow a path, by run id."""
     movements, waypoints = (
         table[table.run_id.isin(study.runs.run_id)]  # a study may be of some of a folder's runs
         for table in (study.results.solutions(), study.results.paths())
     )
-    solutions = dict(list(movements.groupby("run_id")))
-    paths = dict(list(waypoints.groupby("run_id"))) if len(waypoints) else {}
-    found, model = {}, study.model
-    for key, cell in study.cells.items():
-        task = study.tasks[cell.task]
-        runs = tuple(
-            trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)), model)
-            for run_id in cell.good.run_id
-        )
-        best = best_sequences(study.results.sequences, cell.task)
-        found[key] = Trajectories(task, cell.method, cell.variant, runs, tuple(best), model)
-    return found
+    return _by_run(movements), _by_run(waypoints)
+
+
+def _by_run(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    return {str(run_id): own for run_id, own in table.groupby("run_id")} if len(table) else {}

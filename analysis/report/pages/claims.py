@@ -19,7 +19,7 @@ from analysis.words import NONE, slugs
 
 def claims_table(study: Study) -> DataTable | None:
     """Every claim with its verdict, p-values and place; rows lead to the claims' sections."""
-    layout, rows = LAYOUTS["claims"], []
+    layout, rows, sizes = LAYOUTS["claims"], [], family_sizes()
     by_run = {str(run): key for key, cell in study.cells.items() for run in cell.runs.run_id}
     for entry in study.judged:
         row = layout.row(
@@ -32,14 +32,14 @@ def claims_table(study: Study) -> DataTable | None:
             reconstructions=entry.claim.reconstructions or None,
             place=", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
         )
-        tested = "beside" if entry.claim.beside else "paper"
-        family = entry.claim.id if math.isnan(entry.p) else tested
+        family = entry.claim.id if math.isnan(entry.p) else entry.claim.correction
         rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
     return layout.table(
         rows,
         rules=RULES,
-        paper=family_sizes()[False],
-        beside=family_sizes()[True],
+        paper=sizes["paper"],
+        beside=sizes["beside"],
+        families=sizes["families"],
         tested=sum(not math.isnan(entry.p) for entry in study.judged),
         fitted=FITTED,
         chosen=CHOSEN,
@@ -88,10 +88,13 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
             f"{escaped('; '.join(entry.methods))}."
         )
     if not math.isnan(entry.power):
+        right = "the paper's numbers are exactly right"
+        if claim.families:
+            right = f"the true effect is {claim.effect:g} in each family"
         items.append(
-            f"With so many runs it is supported with a chance of {entry.power:.0%} if the paper's "
-            f"numbers are exactly right, refuted with {entry.contrary_power:.0%} if the contrary "
-            "holds."
+            f"With so many {'instances' if claim.families else 'runs'} it is supported with a "
+            f"chance of {entry.power:.0%} if {right}, refuted with {entry.contrary_power:.0%} if "
+            "the contrary holds."
         )
     items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
     if claim.reconstructions:

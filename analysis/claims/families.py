@@ -1,0 +1,174 @@
+"""The paper's general hypotheses, judged over families of random tasks: each test is of instances.
+
+A claim holds in general if it holds in every family that it names; development instances, on which
+methods were tuned, are not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.claims.data import Data, MissingError
+from analysis.claims.evidence import all_hold, exceeds, shown
+from analysis.claims.register import Finding
+from analysis.claims.statements import MARGINS, STATEMENTS, decides
+from analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from analysis.methods import LEARNER
+from analysis.signatures.subtasks import ROUNDING
+from analysis.statistics import spread
+from analysis.statistics.estimates import FEWEST
+from analysis.words import tally
+from coartic.robot import Array
+
+COMPARED = (
+    "one-tailed bootstrap tests over instances of the mean difference, as a share of the best "
+    "known reward, in each family"
+)
+"""What comparisons on instances test."""
+_JERK = "trajectory-optimisation/jerk"
+
+
+def _sample(data: Data) -> Sample:
+    if data.study.instances is None:
+        raise MissingError("this folder has no instances of families of tasks")
+    return data.study.instances
+
+
+def _judged(data: Data, family: str) -> tuple[str, ...]:
+    """Names of the instances of a family that are there to be reported."""
+    sample = _sample(data)
+    names = sample.families.get(family, ())
+    return tuple(name for name in names if sample.tasks[name].split != "development")
+
+
+def _over(data: Data, family: str, values: Sequence[float | None]) -> Array:
+    """Values of the instances that have one, shape ``(n,)``."""
+    known = np.array([value for value in values if value is not None])
+    if len(known) < FEWEST:
+        raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
+    return known
+
+
+def _learner(data: Data, name: str) -> str:
+    """Of the paper's conditions the one that explores most."""
+    label = CONDITIONS[-1] if len(data.task(name).hands) > 1 else ONE_ARMED
+    return label.removeprefix(LEARNER)
+
+
+def _reward(data: Data, name: str, side: str) -> float | None:
+    """Mean reward of one side on an instance; None where it cannot be judged."""
+    *replay, what = side.split()
+    try:
+        if what == "initial":
+            return float(data.runs(name, INITIAL).reward.iloc[0])
+        if what == "best":
+            return data.best_sequences(name)[1]
+        if what == "jerk":
+            return float(data.runs(name, _JERK).reward.mean())
+        condition = _learner(data, name) if what == "EC" else what
+        found = data.replays(name, condition) if replay else data.rewards(name, condition)
+    except MissingError:
+        return None
+    return float(spread.mean(found))
+
+
+def _gain(data: Data, name: str, pair: str) -> float | None:
+    first, second = (_reward(data, name, side) for side in pair.split(" > "))
+    if first is None or second is None:
+        return None
+    return (first - second) / abs(_sample(data).references[name].best)
+
+
+def _compared(data: Data, families: Sequence[str], compared: Sequence[str]) -> Finding:
+    samples, parts = [], []
+    for pair in compared:
+        for family in families:
+            names = _judged(data, family)
+            own = _over(data, family, [_gain(data, name, pair) for name in names])
+            samples.append(own)
+            parts.append(f"{family} {pair}: {shown(100 * own)} % on {len(own)} instances")
+    return _held(samples, parts)
+
+
+def _held(samples: Sequence[Array], parts: Sequence[str]) -> Finding:
+    """Whether the mean of every sample is above 0."""
+    found = all_hold([exceeds(values, 0.0) for values in samples], parts)
+    return replace(found, samples=tuple(samples))
+
+
+for _name, _said in STATEMENTS.items():
+    if "compared" in _said:
+        decides(_name, families=_said["families"], compared=_said["compared"])(_compared)
+
+
+def _signs(data: Data, family: str, sign: str) -> Iterator[float | None]:
+    """Mean of a signature over the runs of the learner, of each instance."""
+    for name in _judged(data, family):
+        condition = _learner(data, name)
+        try:
+            data.learned(name, condition)
+        except MissingError:
+            yield None
+            continue
+        values = data.study.signs[name, LEARNER + condition].values.get(sign)
+        yield None if values is None else float(spread.mean(values))
+
+
+def _families(claim: str) -> Sequence[str]:
+    found: Sequence[str] = STATEMENTS[claim]["families"]
+    return found
+
+
+def _sign(data: Data, claim: str, sign: str, bound: float, unit: str) -> Finding:
+    """Whether a signature is beyond a bound in every family."""
+    samples, parts = [], []
+    for family in _families(claim):
+        own = _over(data, family, list(_signs(data, family, sign)))
+        samples.append(own - bound)
+        parts.append(f"{family} {shown(own, '.2f')}{unit} on {len(own)} instances")
+    return _held(samples, parts)
+
+
+@decides("first-movement-sacrificed-in-general")
+def _first_movement(data: Data) -> Finding:
+    claim = "first-movement-sacrificed-in-general"
+    first = _sign(data, claim, "first", ROUNDING, " ticks longer")
+    whole = _sign(data, claim, "whole", 0.0, " ticks shorter in all")
+    return _held((*first.samples, *whole.samples), (first.evidence, whole.evidence))
+
+
+@decides("hand-coarticulation-in-general")
+def _hands(data: Data) -> Finding:
+    return _sign(data, "hand-coarticulation-in-general", "hand", MARGINS["majority"], " of runs")
+
+
+@decides("arm-coarticulation-in-general")
+def _arm(data: Data) -> Finding:
+    return _sign(data, "arm-coarticulation-in-general", "arm", 0.0, " ticks")
+
+
+@decides("other-arm-coarticulation-in-general")
+def _other_arm(data: Data) -> Finding:
+    return _sign(data, "other-arm-coarticulation-in-general", "other arm", 0.0, " of the way")
+
+
+@decides("corrective-ensures-in-general")
+def _ensures(data: Data) -> Finding:
+    failed: dict[str, int] = {}
+    trials = 0
+    for family in _families("corrective-ensures-in-general"):
+        names = _judged(data, family)
+        if not names:
+            raise MissingError(f"this folder has no instances of {family} that can be judged")
+        for name in names:
+            for label in (ONE_ARMED, *CONDITIONS):
+                if (name, label) in data.study.cells:
+                    runs = data.learned(name, label.removeprefix(LEARNER))
+                    trials += int(runs.trials.sum())
+                    failed[family] = failed.get(family, 0) + int(runs.failed_trials.sum())
+    count = sum(failed.values())
+    text = f"{count} of {trials} trials do not hit every goal ({tally(failed)})"
+    return Finding(not count, text)

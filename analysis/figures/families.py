@@ -1,0 +1,159 @@
+"""What holds over instances of families: gaps by method, and more exploration, pair by pair."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.figures import style
+from analysis.figures.plot import Plot, spoken, worded
+from analysis.figures.selection import missing
+from analysis.generality.exploration import CONTRASTS, gains
+from analysis.generality.sample import INITIAL, Sample
+from analysis.methods import short_name
+from analysis.statistics.estimates import SEED
+from analysis.statistics.instances import RESAMPLES, other_tasks, value
+from analysis.study import Study
+
+_FARTHEST = 1.0
+"""Gap at the right end; what is beyond stands at the end."""
+
+
+def _sample(study: Study) -> Sample:
+    if study.instances is None:
+        raise missing(study, "no instances of a family of tasks")
+    return study.instances
+
+
+@style.styled
+def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """Gap to the best known reward of each instance, by method and family.
+
+    By default of methods without variants. Raises CoarticError where the folder has no instances.
+    """
+    sample = _sample(study)
+    labels = [label for label in methods or sample.labels if methods or " " not in label]
+    data = pd.DataFrame(
+        [
+            {"method": label, "family": family, "task": name, "gap": float(np.mean(gap))}
+            for family, names in sample.families.items()
+            for label in labels
+            for name in names
+            if (gap := sample.gap(name, label)) is not None
+        ]
+    )
+    if data.empty:
+        raise missing(study, f"no solved runs of {', '.join(labels)} on instances of families")
+    ends = _means(sample, labels)
+    order = data.groupby("method").gap.mean().sort_values().index.tolist()
+    looks = style.looks(order)
+    families = list(sample.families)
+    figure = Figure(figsize=(style.TWO, 0.9 + 0.19 * len(order)), layout="constrained")
+    panels = figure.subplots(1, len(families), sharey=True, squeeze=False)[0]
+    dot: Any = {"markersize": 2.4, "alpha": 0.5, "markeredgewidth": 0, "linestyle": ""}
+    mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
+    for axes, family in zip(panels, families, strict=True):
+        for place, label in enumerate(order):
+            own = data[(data.method == label) & (data.family == family)].gap.to_numpy()
+            if not len(own):
+                continue
+            heights = -place + 0.12 * (np.arange(len(own)) % 3 - 1)
+            axes.plot(np.minimum(own, _FARTHEST), heights, "o", color=looks[label].color, **dot)
+            row = ends[(ends.method == label) & (ends.family == family)].iloc[0]
+            axes.plot([row.low, row.high], [-place, -place], color=style.INK, linewidth=1)
+            axes.plot(row["mean"], -place, "D", color=style.INK, **mean)
+        axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
+        axes.set_xlim(-0.004, _FARTHEST * 1.15)
+        axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"], minor=False)
+        axes.minorticks_off()
+        axes.set_title(family.partition("/")[0])
+    style.name_rows(panels[0], [short_name(label) for label in order])
+    panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
+    style.letters(panels)
+    joined = data.merge(ends, on=["method", "family"])
+    told = spoken(ends, "{method}, {family}: {mean:.1%}")
+    return worded("gaps-by-family", figure, joined, seed=SEED, resamples=RESAMPLES, means=told)
+
+
+def _means(sample: Sample, labels: Sequence[str]) -> pd.DataFrame:
+    rows = []
+    for label in labels:
+        for family, own in sample.gaps(label).items():
+            found = other_tasks({family: own}, seed=SEED)
+            rows.append(
+                {
+                    "method": label,
+                    "family": family,
+                    "mean": found.estimate,
+                    "low": found.low,
+                    "high": found.high,
+                    "instances": len(own),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+@style.styled
+def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """What one condition gains over another on each instance, by family.
+
+    ``methods`` chooses nothing here: pairs of the paper's conditions are shown, without those
+    against the initial solution. Raises CoarticError where the folder has no such pairs.
+    """
+    sample = _sample(study)
+    pairs = [pair for pair in CONTRASTS if pair[1] != INITIAL]
+    rows = []
+    for first, second in pairs:
+        names = sample.shared(first, second)
+        scores = gains(sample, first, second, names)
+        for family, own in scores.items():
+            found = other_tasks({family: own}, seed=SEED)
+            rows += [
+                {
+                    "method": f"{short_name(first)} over {short_name(second)}",
+                    "family": family,
+                    "task": name,
+                    "gain": value(runs),
+                    "mean": found.estimate,
+                    "low": found.low,
+                    "high": found.high,
+                }
+                for name, runs in zip(names[family], own, strict=True)
+            ]
+    if not rows:
+        raise missing(study, "no two of the paper's conditions on an instance of a family")
+    data = pd.DataFrame(rows)
+    families = list(dict.fromkeys(data.family))
+    order = list(dict.fromkeys(data.method))
+    figure = Figure(figsize=(style.TWO, 2.0), layout="constrained")
+    panels = figure.subplots(1, len(order), sharey=True, sharex=True, squeeze=False)[0]
+    dot: Any = {"markersize": 2.6, "alpha": 0.55, "markeredgewidth": 0, "linestyle": ""}
+    mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
+    for axes, pair in zip(panels, order, strict=True):
+        axes.axvline(0, **style.INITIAL)
+        for place, family in enumerate(families):
+            own = data[(data.method == pair) & (data.family == family)]
+            if not len(own):
+                continue
+            color = style.PALETTE[place % len(style.PALETTE)]
+            heights = -place + 0.1 * (np.arange(len(own)) % 5 - 2)
+            axes.plot(own.gain, heights, "o", color=color, **dot)
+            row = own.iloc[0]
+            axes.plot([row.low, row.high], [-place, -place], color=style.INK, linewidth=1)
+            axes.plot(row["mean"], -place, "D", color=style.INK, **mean)
+        axes.set_xscale("symlog", linthresh=0.05, linscale=1.0)
+        axes.minorticks_off()
+        axes.set_xticks([-0.5, -0.1, 0, 0.1, 0.5], ["−50", "−10", "0", "10", "50"])
+        axes.set_title(pair)
+    style.name_rows(panels[0], [family.partition("/")[0] for family in families])
+    panels[len(panels) // 2].set_xlabel("gain (% of the best known reward)")
+    style.letters(panels)
+    ends = data.drop_duplicates(["method", "family"])
+    told = spoken(ends, "{method}, {family}: {mean:+.1%}")
+    return worded(
+        "exploration-by-family", figure, data, seed=SEED, resamples=RESAMPLES, means=told
+    )

@@ -1,0 +1,174 @@
+"""More exploration, instance by instance: whether it is better, and where not, why not."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from analysis.statistics.estimates import LEVEL, SEED, Inference
+from analysis.statistics.hypotheses import bootstrap_test
+from analysis.statistics.instances import Scores, other_tasks, value
+from coartic.robot import Array
+
+BUDGETS = (1_000, 10_000, 100_000)
+"""Trials at which learning curves are read, as far as the runs went."""
+EC2, EC3, EC4 = CONDITIONS
+CONTRASTS = (
+    (EC2, INITIAL),
+    (ONE_ARMED, INITIAL),
+    (EC3, EC2),
+    (EC4, EC3),
+    (EC4, EC2),
+)
+"""More exploration against less: learning at all; random hands in place of the closest, the other
+arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
+differ in nothing but the hands that they try."""
+
+
+class Contrast(NamedTuple):
+    """One condition less another, as a share of the best known reward; positive: better."""
+
+    first: str
+    second: str
+    family: str
+    """Empty over all of them, each counting alike."""
+    instances: int
+    difference: Inference
+    hands: float
+    """Part of it that the hand sequences make: as if each run got the best that is known with
+    its hands. The rest is what joints make of them."""
+    better: int
+    """Instances on which the first has the higher mean reward."""
+    worse: int
+    told: int
+    """Instances on which the runs tell the two apart, in either direction."""
+
+
+def contrasts(sample: Sample) -> list[Contrast]:
+    """Every contrast of :data:`CONTRASTS` in every family, then over all of them."""
+    found = []
+    for first, second in CONTRASTS:
+        names = sample.shared(first, second)
+        own = [_contrast(sample, first, second, {family: names[family]}) for family in names]
+        found += own
+        if len(own) > 1:
+            found.append(_contrast(sample, first, second, names))
+    return found
+
+
+def gains(sample: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]) -> Scores:
+    """Rewards of both as shares of the best known, by family: what the first gains."""
+
+    def share(name: str, label: str) -> Array:
+        gap = sample.gap(name, label)
+        assert gap is not None  # of shared instances
+        return -gap
+
+    return {
+        family: [(share(name, first), share(name, second)) for name in own]
+        for family, own in names.items()
+    }
+
+
+def _contrast(
+    sample: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]
+) -> Contrast:
+    scores = gains(sample, first, second, names)
+    values = [value(runs) for own in scores.values() for runs in own]
+    hands = [
+        float(np.mean([_by_hands(sample, n, first) - _by_hands(sample, n, second) for n in own]))
+        for own in names.values()
+    ]
+    return Contrast(
+        first,
+        second,
+        next(iter(names)) if len(names) == 1 else "",
+        len(values),
+        other_tasks(scores, seed=SEED),
+        sum(hands) / len(hands),
+        sum(v > 0 for v in values),
+        sum(v < 0 for v in values),
+        sum(_apart(*runs) for own in scores.values() for runs in own),
+    )
+
+
+def _by_hands(sample: Sample, name: str, label: str) -> float:
+    """Mean over runs of the best known reward with their hands, as a share of the best known."""
+    known, best = sample.by_hands[name], sample.references[name].best
+    hands = sample.study.cells[name, label].good.hands
+    return float(np.mean([known[str(own)] for own in hands])) / abs(best) + 1
+
+
+def _apart(first: Array, second: Array) -> bool:
+    """Whether runs on one instance tell two methods apart, at 5 % and by itself."""
+    if len(second) == 1:
+        first, other = first, float(second[0])
+        if not np.ptp(first):
+            return bool(first[0] != other)
+        return bool(bootstrap_test(first, other, "two-sided", seed=SEED, resamples=999).p < LEVEL)
+    if not np.ptp(first) and not np.ptp(second):
+        return bool(first[0] != second[0])
+    test = bootstrap_test(first, second, "two-sided", seed=SEED, resamples=999)
+    return bool(test.p < LEVEL)
+
+
+class Budget(NamedTuple):
+    """What is left to the best known after so many trials; or the difference of two conditions."""
+
+    family: str
+    label: str
+    second: str
+    """Empty for one method's gap; else what the first, ``label``, gains over this."""
+    trials: int
+    instances: int
+    value: Inference
+
+
+def budgets(sample: Sample) -> list[Budget]:
+    """Mean gap of methods that learn after each of :data:`BUDGETS`, and contrasts, by family.
+
+    Noise included: the best trial so far. A method has a value where all of its runs on all of
+    its instances made so many trials.
+    """
+    found = []
+    curves = {label: _curves(sample, label) for label in sample.labels}
+    pairs = [(label, "") for label in sample.labels]
+    pairs += [pair for pair in CONTRASTS if pair[1] != INITIAL]
+    variants = [label for label in sample.labels if " " in label]
+    pairs += [(label, label.partition(" ")[0]) for label in variants]
+    for trials in BUDGETS:
+        for first, second in pairs:
+            sides = [curves.get(label, {}).get(trials, {}) for label in (first, second) if label]
+            shared = [name for name in sides[0] if all(name in side for side in sides)]
+            for family, names in sample.families.items():
+                own = [
+                    tuple(-side[name] if second else side[name] for side in sides)
+                    for name in names
+                    if name in shared
+                ]
+                if own:
+                    mean = other_tasks({family: own}, seed=SEED)
+                    found.append(Budget(family, first, second, trials, len(own), mean))
+    return found
+
+
+def _curves(sample: Sample, label: str) -> dict[int, dict[str, Array]]:
+    """Gap of every run (n,) by trials and instance, for runs that made so many."""
+    found: dict[int, dict[str, Array]] = {}
+    for name, reference in sample.references.items():
+        cell = sample.study.cells.get((name, label))
+        if cell is None or not len(cell.runs):
+            continue
+        runs = [sample.study.best_so_far[str(run)] for run in cell.runs.run_id]
+        if not all(run.learns and run.solved for run in runs):
+            continue
+        made = min(int(run.total["trials"]) for run in runs)
+        within = np.array([budget for budget in BUDGETS if budget <= made], dtype=np.float64)
+        best = np.array([run.best("trials", within) for run in runs])
+        for place, budget in enumerate(within.astype(int).tolist()):
+            if np.isfinite(best[:, place]).all():
+                gaps = (reference.best - best[:, place]) / abs(reference.best)
+                found.setdefault(budget, {})[name] = gaps
+    return found

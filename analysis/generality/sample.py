@@ -1,0 +1,189 @@
+"""The instances of a folder with the best known of each, and how far methods stay behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from analysis.methods import LEARNER
+from analysis.results.optima import locks_base
+from analysis.statistics.across_tasks import gap_share
+from analysis.statistics.instances import Runs, Scores
+from coartic import Task
+from coartic.record import SEARCH
+from coartic.robot import Array
+
+if TYPE_CHECKING:
+    from analysis.study import Study
+
+MOST_INSTANCES = 8
+"""Instances that a report has one by one; more are shown together, by family."""
+INITIAL = "corrective-alone/given"
+"""Whose solution is the initial one."""
+CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in (2, 3, 4))
+"""The learner's with two arms, those that explore more behind."""
+ONE_ARMED = f"{LEARNER}EC1"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the solutions of an instance are measured by."""
+
+    best: int
+    """Highest reward of any run of the folder, or of the search for the optimum."""
+    bound: int | None
+    """Reward that is proven never to be exceeded; None where nothing is."""
+    searched: int | None
+    """Best reward of the search for the optimum; None where the folder has none."""
+
+    @property
+    def proven(self) -> bool:
+        """Whether the best known reward is the optimum."""
+        return self.bound == self.best
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Instances of families: the tasks of a folder that were drawn."""
+
+    study: Study
+
+    @cached_property
+    def tasks(self) -> dict[str, Task]:
+        """The instances by name."""
+        found = self.study.tasks.items()
+        return {name: task for name, task in found if task.family is not None}
+
+    @cached_property
+    def families(self) -> dict[str, tuple[str, ...]]:
+        """Names of the instances with a reference, by family with its version."""
+        found: dict[str, list[str]] = {}
+        for name in self.references:
+            found.setdefault(str(self.tasks[name].family), []).append(name)
+        return {family: tuple(names) for family, names in found.items()}
+
+    @cached_property
+    def splits(self) -> dict[str, int]:
+        """How many instances are for what: development, test or fresh ones."""
+        kinds = [str(task.split) for task in self.tasks.values()]
+        return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+
+    @cached_property
+    def references(self) -> dict[str, Reference]:
+        """What the solutions of each instance are measured by, where there is any."""
+        runs = self.study.runs
+        solved = runs[(runs.status == "ok") & runs.task.isin(list(self.tasks))]
+        highest = solved.groupby("task").reward.max()
+        found = {}
+        for name in self.tasks:
+            optimum = self.study.optima.get((name, "free"))
+            known = [int(highest[name])] if name in highest.index else []
+            if optimum is not None:
+                known.append(optimum.reward)
+            if known and max(known) < 0:
+                found[name] = Reference(
+                    max(known),
+                    optimum.bound if optimum else None,
+                    optimum.reward if optimum else None,
+                )
+        return found
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Methods with their variants but for searches for the optimum, in the plan's order."""
+        cells = self.study.cells.items()
+        return tuple(
+            dict.fromkeys(
+                label
+                for (name, label), cell in cells
+                if name in self.references
+                and not label.startswith(SEARCH)
+                and not locks_base(cell.runs)
+                and len(cell.good)
+            )
+        )
+
+    def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
+        """Of each solved run (n,), as a share of the best known reward; None without any.
+
+        The gap to the optimum is at least this. To the proven bound, which it is at most, it is
+        None where nothing is proven.
+        """
+        cell, reference = self.study.cells.get((name, label)), self.references.get(name)
+        if cell is None or reference is None or not len(cell.good):
+            return None
+        to = reference.bound if to_bound else reference.best
+        return None if to is None else gap_share(cell.rewards, to)
+
+    def gaps(
+        self, *labels: str, families: Sequence[str] | None = None, to_bound: bool = False
+    ) -> Scores:
+        """Gaps by family, on the instances that all of the methods solved in some run.
+
+        A family without one is left out.
+        """
+        found: dict[str, list[Runs]] = {}
+        for family in families if families is not None else self.families:
+            for name in self.families.get(family, ()):
+                own = [self.gap(name, label, to_bound=to_bound) for label in labels]
+                known = tuple(runs for runs in own if runs is not None)
+                if len(known) == len(labels):
+                    found.setdefault(family, []).append(known)
+        return found
+
+    def shared(self, *labels: str) -> dict[str, tuple[str, ...]]:
+        """Names of the instances that all of the methods solved in some run, by family."""
+        found = {
+            family: tuple(
+                n for n in names if all(self.gap(n, label) is not None for label in labels)
+            )
+            for family, names in self.families.items()
+        }
+        return {family: names for family, names in found.items() if names}
+
+    @cached_property
+    def beaten(self) -> dict[str, int]:
+        """Instances on which a method found more than the search for the optimum, by label."""
+        found = {}
+        for label in self.labels:
+            cells = (self.study.cells.get((name, label)) for name in self.references)
+            searched = (reference.searched for reference in self.references.values())
+            found[label] = sum(
+                cell is not None and of is not None and bool((cell.rewards > of).any())
+                for cell, of in zip(cells, searched, strict=True)
+            )
+        return {label: count for label, count in found.items() if count}
+
+    @cached_property
+    def by_hands(self) -> dict[str, dict[str, int]]:
+        """Best reward of any run of the folder with each hand sequence, by instance.
+
+        The corrective process alone with every sequence counts as well. The best that a sequence
+        can give is at least that.
+        """
+        runs, sequences = self.study.runs, self.study.results.sequences
+        columns = ["task", "hands", "reward"]
+        solved = runs[runs.status == "ok"][columns]
+        every = pd.concat([solved, sequences[sequences.reward.notna()][columns]])
+        every = every[every.task.isin(list(self.references))]
+        found: dict[str, dict[str, int]] = {}
+        for name, own in every.groupby("task"):
+            best = own.groupby("hands").reward.max()
+            found[str(name)] = {str(hands): int(reward) for hands, reward in best.items()}
+        return found
+
+
+def one_by_one(study: Study) -> set[str]:
+    """Names of the tasks that a report has one by one: all, but instances of families if many."""
+    drawn = {name for name, task in study.tasks.items() if task.family is not None}
+    return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
+
+
+def sample(study: Study) -> Sample | None:
+    """The instances of a folder; None where it has none with a solution."""
+    found = Sample(study)
+    return found if found.tasks and found.references else None

@@ -1,0 +1,358 @@
+"""What holds over instances of families: planted runs, and a small folder through a report."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.claims import CLAIMS, Claim, Finding, judge
+from analysis.claims.catalogue import family_sizes
+from analysis.claims.power import over_instances
+from analysis.generality.exploration import EC2, EC3, EC4, budgets, contrasts
+from analysis.generality.precision import RUNS, needed, variance_shares
+from analysis.generality.presence import Signs, presence, recruitment
+from analysis.generality.properties import properties, what_pays
+from analysis.generality.sample import INITIAL, ONE_ARMED
+from analysis.report.build import build
+from analysis.report.formats.markdown import markdown
+from analysis.results.folder import Results
+from analysis.results.optima import Optimum
+from analysis.statistics.estimates import Inference
+from analysis.study import Study
+from analysis.words import true_minus
+from coartic import load_task
+from coartic.families import names_in
+from tests.support.made_up import MadeUp, manifest_for, row
+from tests.support.suites import run_and_write, suite_of
+
+ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
+COUNT = 5
+BEST, ALONE = -500, -600
+NOISE = (-4, -2, 0, 2, 4)
+
+
+def hands_of(name, letter="R"):
+    return letter * len(load_task(name).goals)
+
+
+def runs_of(name, label, centre, *, hands=None, noise=NOISE, **more):
+    return [
+        row(
+            label, round(centre) + off, task=name, run=k, trials=10_000, initial_reward=ALONE,
+            replay_reward=round(centre) + off, hands=hands or hands_of(name),
+            initial_hands=hands_of(name), failed_trials=0,
+            **{"run_id": f"{name} {label} {k}", **more},
+        )
+        for k, off in enumerate(noise)
+    ]  # fmt: skip
+
+
+def study_of(tmp_path, centres, *, families=ONE + TWO, split="i", optima=True, **parts):
+    """Rewards of conditions by label: a number, or a function of the instance's number."""
+    rows, tasks, known = [], [], {}
+    for family in families:
+        for number, name in enumerate(names_in(f"{family}/{split}000..{split}{COUNT - 1:03d}")):
+            tasks.append(load_task(name))
+            known[name, "free"] = Optimum(BEST, hands_of(name), BEST if number % 2 else BEST + 50)
+            for label, centre in centres.items():
+                if (label == ONE_ARMED) == (family in ONE) or label == INITIAL:
+                    value = centre(number) if callable(centre) else centre
+                    noise = (0,) if label == INITIAL else NOISE
+                    rows += runs_of(name, label, value, noise=noise)
+    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    sequences = pd.DataFrame(
+        {"task": task.name, "hands": hands_of(task.name), "reward": ALONE} for task in tasks
+    )
+    results = Results(tmp_path, manifest_for(tasks, runs), runs, sequences)
+    return MadeUp(results, **({"optima": known} if optima else {}), **parts)
+
+
+RISING = {INITIAL: ALONE, ONE_ARMED: -540, EC2: -560, EC3: -550, EC4: -540}
+
+
+def test_gaps_are_between_the_best_known_and_the_bound(tmp_path):
+    sample = study_of(tmp_path, RISING).instances
+    name = "two-armed/v1/i000"
+    np.testing.assert_allclose(sample.gap(name, EC4).mean(), 40 / 500)
+    np.testing.assert_allclose(sample.gap(name, EC4, to_bound=True).mean(), 90 / 450)
+    assert not sample.references[name].proven
+    assert sample.references["two-armed/v1/i001"].proven
+    assert sample.gap(name, ONE_ARMED) is None
+    assert sample.splits == {"test": 25}
+    assert list(sample.families) == [*ONE, *TWO]
+    assert sample.beaten == {}
+
+
+def test_a_method_that_beats_the_search_makes_the_best_known(tmp_path):
+    """Never a gap below 0, and it is counted."""
+    study = study_of(tmp_path, {**RISING, EC4: lambda n: -480 if n == 2 else -540})
+    sample = study.instances
+    assert sample.references["long/v1/i002"].best == -476
+    assert sample.references["long/v1/i002"].searched == BEST
+    assert sample.gap("long/v1/i002", EC4).min() == 0
+    assert sample.beaten == {EC4: 4}
+    without = study_of(tmp_path, RISING, optima=False).instances
+    assert without.references["long/v1/i002"].searched is None
+    assert without.gap("long/v1/i002", EC4, to_bound=True) is None
+
+
+def test_planted_contrasts(tmp_path):
+    """EC4 over EC3: 10 of 500 on all instances but the last of each family, where it loses 20."""
+    study = study_of(tmp_path, {**RISING, EC4: lambda n: -540 if n < 4 else -570})
+    found = {(c.first, c.second, c.family): c for c in contrasts(study.instances)}
+    mixed = found[EC4, EC3, "aligned/v1"]
+    assert mixed.difference.estimate == pytest.approx((4 * 0.02 - 0.04) / 5)
+    assert (mixed.better, mixed.worse, mixed.instances, mixed.told) == (4, 1, 5, 5)
+    assert mixed.difference.low < 0 < mixed.difference.high
+    rising = found[EC3, EC2, ""]
+    assert rising.difference.estimate == pytest.approx(0.02)
+    assert (rising.instances, rising.better) == (20, 20)
+    assert found[ONE_ARMED, INITIAL, "one-armed/v1"].difference.estimate == pytest.approx(0.12)
+    assert (EC3, EC2, "one-armed/v1") not in found
+
+
+def test_what_hands_make_of_a_contrast(tmp_path):
+    """EC2 learns hands with which nobody gets beyond -560, EC4 those of the best known."""
+    study = study_of(tmp_path, RISING)
+    runs = study.results.runs
+    of_two = runs.method == EC2
+    runs.loc[of_two, "hands"] = [hands_of(task, "L") for task in runs.task[of_two]]
+    (found,) = [
+        c for c in contrasts(study.instances) if (c.first, c.second, c.family) == (EC4, EC2, "")
+    ]
+    assert found.difference.estimate == pytest.approx(0.04)
+    assert found.hands == pytest.approx((-536 + 556) / 500)  # the best run of either
+
+
+def test_learning_curves_are_read_at_budgets(tmp_path):
+    study = study_of(tmp_path, {EC3: -540, EC4: -530}, families=TWO[:1])
+    curve = np.concatenate([np.full(1_000, -600.0), np.full(9_000, -540.0)])
+    ends = {EC3: 0.0, EC4: 10.0}
+    runs = study.results.runs
+    rewards = {
+        str(run): curve + (np.arange(10_000) >= 1_000) * ends[label]
+        for run, label in zip(runs.run_id, runs.method, strict=True)
+    }
+    object.__setattr__(study.results, "rewards", lambda: rewards.items())
+    found = {(b.label, b.second, b.trials): b.value.estimate for b in budgets(study.instances)}
+    assert found[EC3, "", 1_000] == found[EC4, "", 1_000] == pytest.approx(0.2)
+    assert found[EC4, "", 10_000] == pytest.approx(0.06)
+    assert found[EC4, EC3, 10_000] == pytest.approx(0.02)
+    assert max(trials for _, _, trials in found) == 10_000
+
+
+def test_variance_and_precision(tmp_path):
+    """Instances as hard as planted, methods as far apart, one seed's noise; no interaction."""
+    hard = (0, -20, -40, -60, -80)
+    centres = {EC2: -560, EC3: -550, EC4: -540}
+    study = study_of(
+        tmp_path,
+        {label: (lambda n, c=centre: c + hard[n]) for label, centre in centres.items()},
+        families=TWO[:2],
+    )
+    for found in variance_shares(study.instances):
+        assert (found.methods, found.instances) == (3, 5)
+        assert found.components.instance == pytest.approx(np.var(hard, ddof=1) / 500**2, rel=0.01)
+        assert found.components.method == pytest.approx(100 / 500**2, rel=0.01)
+        assert found.components.seed == pytest.approx(10 / 500**2)
+        assert found.components.interaction == 0
+    pair = next(n for n in needed(study.instances) if (n.first, n.second) == (EC3, EC4))
+    assert pair.difference == pytest.approx(0.02)
+    assert pair.between == 0
+    assert pair.within == pytest.approx(math.sqrt(20) / 500)
+    assert list(pair.needed) == sorted(pair.needed, reverse=True)
+    assert len(pair.needed) == len(RUNS)
+    assert pair.needed[-1] == 3
+
+
+def test_properties_are_those_of_the_task_alone():
+    known = properties(load_task("ascending"))
+    assert known == {
+        "distance": pytest.approx(1.95 / 4), "spread": pytest.approx(0.05 / 4), "goals": 3,
+        "redundancy": 2, "base": 2, "hands": 1,
+    }  # fmt: skip
+    assert properties(load_task("two-armed-1"))["base"] == 1
+
+
+def test_a_planted_property_pays(tmp_path):
+    """Rewards of the best known rise by 2 % of it for each goal; nothing else pays."""
+    study = study_of(tmp_path, RISING)
+    goals = {name: len(task.goals) for name, task in study.tasks.items()}
+    sequences = study.results.sequences
+    sequences["reward"] = [BEST * (1 + 0.02 * goals[name]) for name in sequences.task]
+    found = {(p.outcome, p.name): p for p in what_pays(study.instances)}
+    assert found["worth", "goals"].effect.slope == pytest.approx(0.02)
+    assert found["worth", "distance"].effect.slope == pytest.approx(0, abs=1e-9)
+    assert found["learned", "goals"].effect.slope == pytest.approx(0.02, abs=0.01)
+    assert found["worth", "goals"].explained == pytest.approx(1)
+
+
+def made_up_signs(study, hand=1.0, waiting=0.3):
+    found = {}
+    for name in study.tasks:
+        for label in (ONE_ARMED, EC2, EC3, EC4):
+            if (name, label) in study.cells:
+                number = int(name[-3:])
+                values = {
+                    "arm": np.array([2.0, 3.0 + 0.1 * number]),
+                    "first": np.array([5.0, 6.0 + 0.1 * number]),
+                    "whole": np.array([9.0, 8.0 + 0.1 * number]),
+                }
+                if label != ONE_ARMED:
+                    values["hand"] = np.array([hand, hand, hand - 0.1 * (number == 0)])
+                    values["other arm"] = np.array([waiting + 0.01 * number])
+                own = hands_of(name)
+                sequences = (own,) * 4 + (hands_of(name, "L"),)
+                found[name, label] = Signs(values, sequences, own, (own,))
+    return found
+
+
+def test_presence_and_hands(tmp_path):
+    study = study_of(tmp_path, RISING)
+    signs = made_up_signs(study, waiting=0.07)
+    found = {(p.sign, p.label, p.family): p for p in presence(study.instances, signs)}
+    waiting = found["other arm", EC4, "long/v1"]
+    assert waiting.value.estimate == pytest.approx(0.09)
+    assert (waiting.instances, waiting.there) == (5, 1)  # the last beyond a tenth of the way
+    assert found["hand", EC4, ""].there == 20
+    assert ("hand", ONE_ARMED, "one-armed/v1") not in found
+    hands = {(r.label, r.family): r for r in recruitment(study.instances, signs)}
+    own = hands[EC3, "aligned/v1"]
+    assert (own.leaves_initial, own.as_corrective, own.consistent, own.both_hands) == (
+        0,
+        5,
+        5,
+        0.0,
+    )
+    assert own.as_best_known == 0  # nobody of these runs reached it
+
+
+def verdicts(study):
+    return {entry.claim.id: entry for entry in study.judged}
+
+
+def test_claims_of_generality(tmp_path):
+    study = study_of(tmp_path, {**RISING, EC4: lambda n: -540 - n})
+    vars(study)["signs"] = made_up_signs(study)
+    found = verdicts(study)
+    assert all(entry.claim.families for entry in found.values())
+    for name in (
+        "learning-improves",
+        "proficiency-rises",
+        "other-arm-coarticulation",
+        "arm-coarticulation",
+    ):
+        entry = found[f"{name}-in-general"]
+        assert entry.verdict == "supported", entry.evidence
+        assert entry.adjusted_p < 0.05
+    ensured = found["corrective-ensures-in-general"]
+    assert ensured.verdict == "supported"
+    assert "0 of 3250000 trials" in ensured.evidence
+    jerk = found["beats-inaccurate-in-general"]
+    assert jerk.verdict == "cannot tell"
+    assert "fewer than 3 instances of one-armed/v1" in jerk.evidence
+
+
+def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general(tmp_path):
+    falling = study_of(tmp_path, {**RISING, EC4: lambda n: -570 - n})
+    found = verdicts(MadeUp(falling.results, optima=falling.optima, signs=made_up_signs(falling)))
+    assert found["other-arm-pays-in-general"].verdict == "not supported"
+    assert found["proficiency-rises-in-general"].verdict == "not supported"
+    assert found["random-hands-pay-in-general"].verdict == "not supported"
+    mixed = study_of(tmp_path, {**RISING, EC4: lambda n: -540 if n % 2 else -560})
+    found = verdicts(MadeUp(mixed.results, optima=mixed.optima, signs=made_up_signs(mixed)))
+    assert found["other-arm-pays-in-general"].verdict == "cannot tell"
+
+
+def test_development_instances_are_not_judged(tmp_path):
+    study = study_of(tmp_path, RISING, split="d", signs={})
+    assert study.instances.splits == {"development": 25}
+    assert {entry.verdict for entry in study.judged} == {"cannot tell"}
+
+
+def test_claims_of_generality_change_no_verdict_of_the_paper(tmp_path):
+    """They are a family of their own, and stand in reports of instances alone."""
+    assert family_sizes() == {"paper": 21, "beside": 7, "families": 10}
+    study = study_of(tmp_path, RISING, families=TWO[:1])
+    vars(study)["signs"] = made_up_signs(study)
+    here = [claim for claim in CLAIMS if claim.families]
+    assert [entry.claim for entry in study.judged] == here
+    test = Inference(1.0, (20,), "planted", p=0.02)
+    paper = Claim(
+        *("p", "It is so.", "General", "tested", "planted"),
+        lambda data: Finding(True, "planted", (test,)),
+        place="here",
+    )
+    assert [judge(study, claims)[0].adjusted_p for claims in ([paper], [paper, *here])] == [
+        0.02
+    ] * 2
+    assert not any(claim.fitted for claim in here)
+
+
+def test_power_over_instances():
+    """Half a SD above the bound on 200 instances is found for certain, a tenth on 10 hardly."""
+    rng = np.random.default_rng(0)
+    many, few = rng.normal(0, 1, 200), rng.normal(0, 1, 10)
+    assert min(over_instances(0.5, [many, many], 10)) > 0.99
+    sure, refuted = over_instances(0.1, [few, few], 10)
+    assert sure < 0.01
+    assert sure < refuted < 0.05
+    assert over_instances(0.1, [np.zeros(10)], 10) == (1, 1)
+
+
+BLOCKS = (
+    'tasks = ["one-armed/v1/i000..i002"]\n'
+    'methods = ["dual-process/EC1", "corrective-alone/given"]',
+    'tasks = ["two-armed/v1/i003", "two-armed/v1/i006", "two-armed/v1/i009"]\n'
+    'methods = ["dual-process/EC2", "dual-process/EC3", "dual-process/EC4", '
+    '"corrective-alone/given"]',
+    'tasks = ["two-armed/v1/i003"]\nmethods = ["optimum/dynamic-programming"]\n'
+    "parameters = { nodes = 10, graphs = 1 }",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    home = tmp_path_factory.mktemp("families")
+    return run_and_write(home / "out", suite_of(home, *BLOCKS), runs=3, trials=40)
+
+
+def test_a_small_folder_through_a_report(folder, undrawn):
+    study = Study(folder)
+    document = build(study).document
+    (section,) = [s for s in document.sections if s.id == "families"]
+    assert document.sections.index(section) == 1
+    (lead,) = section.blocks[0].paragraphs
+    assert lead.startswith("On 6 random tasks (6 test; one-armed 3, two-armed 3)")
+    assert "the learner (EC1 on one arm, EC4 on two) stays" in lead
+    tables = {table.id: table for table in document.tables()}
+    assert {"family-gaps", "family-exploration", "family-references", "family-hands"} <= set(
+        tables
+    )
+    gaps = {row.key: row for row in tables["family-gaps"].rows}
+    (shown,) = (value for value in gaps[EC4].values[2:3])  # noqa: PD011
+    own = study.instances.gaps(EC4)["two-armed/v1"]
+    assert shown.value == pytest.approx(np.mean([runs[0].mean() for runs in own]))
+    page = true_minus(markdown(document))
+    assert "## Beyond the paper" in page
+    assert "claim-proficiency-rises-in-general" in {s.id for s in document.walk()}
+    assert "claim-proficiency-rises" not in {s.id for s in document.walk()}
+
+
+def test_a_folder_without_instances_has_no_such_section(tmp_path, undrawn):
+    results = run_and_write(tmp_path / "out", runs=1, trials=5)
+    study = Study(results)
+    assert study.instances is None
+    assert study.contrasts == []
+    sections = {section.id for section in build(study).document.walk()}
+    assert "families" not in sections
+    assert "claim-proficiency-rises" in sections
+    assert not any("in-general" in name for name in sections)
+
+
+def test_figures_of_families(folder):
+    study = Study(folder)
+    gaps, exploration = (study.figures[f"{name}-by-family"] for name in ("gaps", "exploration"))
+    assert [axes.get_title(loc="left")[-9:] for axes in gaps.axes] == ["one-armed", "two-armed"]
+    assert len(exploration.axes) == 3
