@@ -71,7 +71,7 @@ def setup(app):
             re.sub(r"(?<![`\\\w])\|(?=\S)|(?<=\S)\|(?![`\w])", r"\|", line) for line in lines
         ]
 
-    def example(app, error):  # noqa: ANN001, ANN202
+    def example(app, error):
         # The player works as it is. The name report.html is that of the page on reports.
         shutil.copy(ROOT / "benchmarks/example/report.html", app.outdir / "example.html")
 
