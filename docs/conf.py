@@ -30,7 +30,7 @@ myst_enable_extensions = ["colon_fence", "fieldlist"]
 
 # Notebooks are text, and run whenever the site is built: what they show is what came out.
 nb_execution_mode = "force"
-nb_execution_timeout = 300
+nb_execution_timeout = 900  # a busy machine is slow
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
 nb_merge_streams = True
