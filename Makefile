@@ -37,8 +37,7 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 
 # Notebooks are run, warnings are errors, and what pages link to is there.
-docs: $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+docs: $(VENV)/.docs
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx -q -W --keep-going -d build/doctrees \
 	  docs build/docs
 	$(BIN)/python docs/check_links.py build/docs
@@ -58,6 +57,10 @@ $(READY): pyproject.toml constraints.txt
 	  { echo "coartic needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) --version). Try: make PYTHON=python3.12 ..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@
+
+$(VENV)/.docs: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	@touch $@
 
 clean:
