@@ -2,6 +2,7 @@
 
 import itertools
 import os
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -224,7 +225,7 @@ def test_command(folder, tmp_path, monkeypatch, capsys):
             (("abcdef", "--in", place, "--out", out), "no run 'abcdef' below"),
             ((one, "abcdef", "--in", place, "--out", out), "no run 'abcdef' below"),
             ((one, "--in", tmp_path / "nowhere", "--out", out), "no run"),
-            ((one, "--in", place, "--out", "a.png"), "must end in .gif or .mp4"),
+            ((one, "--in", place, "--out", "a.png"), "must end in .gif, .mp4, .svg"),
             ((one, "--in", place, "--out", "a.mp4"), "MP4 needs ffmpeg; install it, or"),
             ((one, "--in", place, "--out", "/dev/null/a.gif"), "cannot write /dev/null/a.gif"),
             ((one, other, "--initial", "--in", place, "--out", out), "give one run id"),
@@ -237,3 +238,33 @@ def test_command(folder, tmp_path, monkeypatch, capsys):
             assert code == 2, arguments
             assert words in " ".join(error.replace("│", " ").split())
             assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_a_moving_picture(moves, tmp_path):
+    """Its frames are the film's: base, arms and goals where they are, at the time they are."""
+    timed = animate([Panel("<here> & there", moves)], tmp_path / "a.svg", speed=300, width=400)
+    root = ElementTree.parse(tmp_path / "a.svg").getroot()
+    assert root[0].text == "<here> & there"
+    drawn = {kind: root.findall(f".//*[@class='{kind}']") for kind in ("base", "arm", "goal")}
+    assert {kind: len(found) for kind, found in drawn.items()} == {"base": 1, "arm": 2, "goal": 4}
+    frames = len(timed.rows) + timed.held
+    for element in (*drawn["base"], *drawn["arm"]):
+        values = element[0].get("values").split(";")
+        assert len(values) == frames
+        assert values[-1] == element.get("points")  # the end, where nothing moves
+    q = moves.configurations[-1]
+    joints = moves.task.robot.joint_positions(q, "right")
+    shown = np.array([point.split(",") for point in drawn["arm"][1].get("points").split()], float)
+    scale = np.ptp(shown[:, 0]) / np.ptp(joints[:, 0])
+    assert shown[:, 0] - shown[0, 0] == pytest.approx(
+        scale * (joints[:, 0] - joints[0, 0]), abs=0.2
+    )
+    assert shown[:, 1] - shown[0, 1] == pytest.approx(
+        scale * (joints[0, 1] - joints[:, 1]), abs=0.2
+    )
+    hit = [float(goal[0].get("keyTimes").split(";")[1]) for goal in drawn["goal"]]
+    rows = np.array([*timed.rows, *timed.rows[-1:] * timed.held])
+    for when, row in zip(hit, moves.hits, strict=True):
+        first = round(when * frames)
+        assert rows[first] >= row
+        assert first == 0 or rows[first - 1] < row

@@ -357,6 +357,18 @@ def test_the_readme_picture_is_what_the_project_draws(monkeypatch, capsys, tmp_p
     assert (tmp_path / "tasks.svg").read_bytes() == (ROOT / "docs" / "tasks.svg").read_bytes()
 
 
+def test_the_moving_picture_is_what_the_project_draws(
+    monkeypatch, capsys, tmp_path, in_this_process
+):
+    """docs/race.svg, of the first run of condition 4 on two-armed task 1."""
+    monkeypatch.chdir(tmp_path)
+    run = ("run", "paper", "--tasks", "two-armed-1", "--methods", "EC4", "--runs", 1)
+    call(monkeypatch, capsys, *run, "--out", "results")
+    (id_,) = pd.read_parquet("results/runs.parquet").run_id
+    call(monkeypatch, capsys, "animate", id_, "--in", "results", "--initial", "--out", "race.svg")
+    assert Path("race.svg").read_bytes() == (ROOT / "docs" / "race.svg").read_bytes()
+
+
 def test_entry_points():
     """The installed script and ``python -m coartic``, in processes of their own."""
     for command in (

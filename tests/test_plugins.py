@@ -269,20 +269,21 @@ def test_parameters_are_validated():
         entry.complete({"reluctant": 1.0})
 
 
-def test_the_readme_shows_the_example_as_it_is():
-    """The README's method and task are those that the tests run."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    shown = re.findall(r"```(?:python|toml)\n(.*?)```", readme, re.DOTALL)
+def test_the_pages_show_the_example_as_it_is():
+    """Method and task of the how-to pages are those that the tests run."""
+    pages = [ROOT / "docs" / "howto" / name for name in ("method.md", "task.md")]
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
+    shown = re.findall(r"```(?:python|toml)\n(.*?)```", text, re.DOTALL)
     assert any(METHOD.read_text(encoding="utf-8").strip() in block for block in shown)
     task = (EXAMPLE / "shelf.toml").read_text(encoding="utf-8").strip()
     assert any(task in re.sub(r"\n?# shelf.toml\n", "", block) for block in shown)
 
 
-def test_the_readme_suite_can_be_used(tmp_path):
+def test_the_suite_of_the_page_can_be_used(tmp_path):
     from benchmarks.suites import load_suite, select_cells
 
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```toml\n(# noise.toml.*?)```", readme, re.DOTALL)
+    page = (ROOT / "docs" / "howto" / "suite.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(# noise.toml.*?)```", page, re.DOTALL)
     path = tmp_path / "noise.toml"
     path.write_text(block, encoding="utf-8")
     cells = select_cells(load_suite(str(path)), registry())

@@ -1,4 +1,4 @@
-"""The README's table "to add": each thing is added by its steps alone, and is in a report."""
+"""The table "to add" of CONTRIBUTING: what is added by its steps alone is in a report."""
 
 import os
 import shutil

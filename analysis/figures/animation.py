@@ -1,4 +1,4 @@
-"""Movements tick by tick as a GIF or MP4, by the conventions of the paper's figures.
+"""Movements tick by tick as a GIF, an MP4 or an SVG, by the conventions of the paper's figures.
 
 Open squares mark the left arm, closed circles the right one; goals are numbered circles,
 filled from the tick at which they are hit. Thin lines trace both hands.
@@ -21,11 +21,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
+from analysis.figures.moving import moving_picture
 from analysis.figures.robot import MARKERS, box, numbered_below
 from coartic import CoarticError, Trajectory
 from coartic.files import check_outputs, write_outputs
 
-FORMATS = (".gif", ".mp4")
+FORMATS = (".gif", ".mp4", ".svg")
 LASTS_S = 10.0
 """Seconds that the longest movement takes unless a speed is given."""
 HOLD_S = 2.0
@@ -90,6 +91,9 @@ def animate(
     if not any(panel.trajectory.ticks for panel in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
     timed = timing(max(len(panel.trajectory.configurations) for panel in panels), speed)
+    if path.suffix.lower() == ".svg":
+        write_outputs({path: moving_picture(panels, timed, width)}, replace=replace)
+        return timed
     figure, scenes = _figure(panels, width)
     writer = _writer(path, timed)
     try:
@@ -114,7 +118,7 @@ def check_output(path: Path, *, replace: bool = False) -> None:
     An ending that is not supported, MP4 without ffmpeg, what :func:`check_outputs` refuses.
     """
     if path.suffix.lower() not in FORMATS:
-        raise CoarticError(f"--out {path}: the name must end in {' or '.join(FORMATS)}")
+        raise CoarticError(f"--out {path}: the name must end in {', '.join(FORMATS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_outputs([path], replace=replace)

@@ -48,7 +48,7 @@ def draw(
 
 def animate(
     run_id: given.RunId,
-    out: Annotated[Path, typer.Option(help="Film to write: .gif or .mp4 (needs ffmpeg).")],
+    out: Annotated[Path, typer.Option(help="Film to write: .gif, .svg or .mp4 (needs ffmpeg).")],
     other: Annotated[
         str | None, typer.Argument(metavar="[OTHER_RUN_ID]", help="A run to show beside it.")
     ] = None,

@@ -1,0 +1,105 @@
+"""Wheel and source distribution: built, installed into empty environments, and run.
+
+That takes minutes and a package index, so it is done where COARTIC_PACKAGES=1 says so.
+"""
+
+import os
+import subprocess
+import sys
+import tarfile
+import zipfile
+
+import pytest
+
+from tests.support.suites import ROOT
+
+pytestmark = pytest.mark.skipif(
+    os.environ.get("COARTIC_PACKAGES") != "1", reason="minutes: only with COARTIC_PACKAGES=1"
+)
+OWN = ()
+"""Folders of the user's own in the place where commands are run."""
+
+
+def do(*command, cwd):
+    """A command that works, without what the tests' environment would give it."""
+    env = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    done = subprocess.run(
+        [*map(str, command)], cwd=cwd, env=env, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The two files, of what git has."""
+    folder = tmp_path_factory.mktemp("built")
+    do("git", "clone", "--quiet", ROOT, folder / "clone", cwd=folder)
+    do(sys.executable, "-m", "hatchling", "build", "-d", folder / "dist", cwd=folder / "clone")
+    (sdist,) = (folder / "dist").glob("*.tar.gz")
+    (wheel,) = (folder / "dist").glob("*.whl")
+    return sdist, wheel
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory, built):
+    """An environment with the wheel and what it depends on, of the versions that are pinned."""
+    _, wheel = built
+    folder = tmp_path_factory.mktemp("environment")
+    do(sys.executable, "-m", "venv", folder, cwd=folder)
+    pins = ROOT / "constraints.txt"
+    do(folder / "bin" / "python", "-m", "pip", "install", "-q", "-c", pins, wheel, cwd=folder)
+    return folder
+
+
+def works(environment, place):
+    """A task, a method and a report, from a folder with things of the user's own."""
+    for name in OWN:
+        (place / name).mkdir()
+        (place / name / "__init__.py").write_text("raise ImportError('the user has one')\n")
+    coartic = environment / "bin" / "coartic"
+    assert "two-armed-2" in do(coartic, "list", cwd=place)
+    small = ("--tasks", "ascending", "--runs", 2, "--trials", 20)
+    methods = ("--methods", "dual-process/EC1,corrective-alone/given")
+    do(coartic, "run", "quick", *small, *methods, "--out", "results", cwd=place)
+    do(coartic, "report", "results", "--formats", "svg", cwd=place)
+    assert (place / "results" / "report" / "report.html").stat().st_size > 100_000
+    found = do(environment / "bin" / "python", "-m", "coartic", "--version", cwd=place)
+    assert found.startswith("coartic ")
+
+
+def test_wheel(libraries, tmp_path):
+    works(libraries, tmp_path)
+
+
+def test_source_distribution(built, libraries, tmp_path):
+    """Installed by its own build, beside the libraries that are there already."""
+    sdist, _ = built
+    own, place = tmp_path / "environment", tmp_path / "place"
+    place.mkdir()
+    do(sys.executable, "-m", "venv", own, cwd=tmp_path)
+    (site,) = (own / "lib").glob("python*/site-packages")
+    (others,) = (libraries / "lib").glob("python*/site-packages")
+    do(own / "bin" / "python", "-m", "pip", "install", "-q", "--no-deps", sdist, cwd=tmp_path)
+    (site / "libraries.pth").write_text(f"{others}\n")  # after its own
+    where = "import coartic; print(coartic.__file__)"
+    assert str(own) in do(own / "bin" / "python", "-c", where, cwd=place)
+    works(own, place)
+
+
+def test_what_is_in_them(built):
+    sdist, wheel = built
+    with zipfile.ZipFile(wheel) as file:
+        names = file.namelist()
+    assert not [name for name in names if "example" in name or name.startswith("tests")]
+    assert any(name.endswith("analysis/results/optima.json") for name in names)
+    assert any(name.endswith("benchmarks/suites/quick.toml") for name in names)
+    with tarfile.open(sdist) as file:
+        inside = {name.partition("/")[2] for name in file.getnames()}
+    assert {
+        "README.md",
+        "Makefile",
+        "constraints.txt",
+        "docs/conf.py",
+        "tests/conftest.py",
+    } <= inside
