@@ -20,9 +20,17 @@ from analysis.reconstruction.layout import Layout, layouts
 from analysis.reconstruction.likelihood import likelihoods, together
 from analysis.reconstruction.lines import lines
 from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
-from analysis.reconstruction.scoring import FARTHEST, Figure, Learned, Order, compared, distance
+from analysis.reconstruction.scoring import (
+    FARTHEST,
+    Figure,
+    Learned,
+    Order,
+    compared,
+    distance,
+    distance_error,
+)
 from analysis.reconstruction.search import Search
-from analysis.reconstruction.waves import Wave, scored
+from analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from coartic import (
     PAPER,
     CoarticError,
@@ -276,7 +284,7 @@ def test_a_task_with_other_goals_is_another_task() -> None:
 
 
 def test_a_reconstruction_is_found_and_scored(search: Search) -> None:
-    effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30)
+    effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30, last=2)
     small = replace(search, tried=Counter())
     found = reconstruct(small, effort=effort)
     members = found.members
@@ -350,3 +358,22 @@ def test_tables_of_others_are_not_written_over(
     assert "printed.csv" in said(other)
     assert (other / "printed.csv").read_text(encoding="utf-8") == "mine"
     assert str(own / "printed.csv") in said(own / "printed.csv")
+
+
+def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:
+    rng = np.random.default_rng(1)
+    mean = Figure("EC3", "mean", -500.0, 20, sd=4.0)
+
+    def scored_at(offset: float, runs: int) -> Scored:
+        cell = Learned(rng.normal(-500.0 + offset, 4.0, runs), ("LRLR",) * runs)
+        return Scored(np.zeros((4, 2)), {"EC3": cell}, compared([mean], {"EC3": cell}))
+
+    near, far = scored_at(0.5, 300), scored_at(4.0, 300)
+    assert clearly_nearer(near, far)
+    assert not clearly_nearer(far, near)
+    assert not clearly_nearer(scored_at(0.5, 300), scored_at(0.7, 300))
+    # Of few runs the same difference is no more than chance.
+    assert not clearly_nearer(scored_at(0.5, 4), scored_at(2.0, 4))
+    # A distance in units of the error of a mean of n runs has that error over it.
+    error = math.sqrt(16 / 20 + 16 / 300 + 1 / 12)
+    assert distance_error([mean], far.cells) == pytest.approx(4 / math.sqrt(300) / error, rel=0.3)

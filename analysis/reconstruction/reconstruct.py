@@ -17,10 +17,12 @@ from analysis.reconstruction.search import Search
 from analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
 from analysis.reconstruction.waves import (
     ENSEMBLE,
+    LAST,
     PLAN,
     Scored,
     Wave,
     best_of_waves,
+    clearly_nearer,
     described,
     scored,
 )
@@ -44,6 +46,8 @@ class Effort:
     members: int = 240
     runs: int = 20
     """A condition, for the figures of each member."""
+    last: int = 300
+    """A condition, for the nearest set beside the one that stands."""
     plan: Sequence[Wave] = PLAN
     trials: int = 10_000
 
@@ -57,7 +61,7 @@ class Reconstruction:
 
     search: Search
     nearest: Scored
-    """The point that the waves ended with, by the seeds of the ensemble."""
+    """The point that was chosen, by the seeds of the ensemble."""
     members: pd.DataFrame
     """A row a member: coordinates, figures and distances. That point is the first, each of the
     others as far as possible from those before it; known sets of goals come last."""
@@ -98,7 +102,8 @@ def reconstruct(
     does, and by waves from there the point nearest to what is printed.
 
     The layout's known sets of goals compete where they meet every constraint, and are scored
-    beside it. The result depends on the arguments and on nothing else.
+    beside it; the first of them stands unless another one is nearer beyond chance. The result
+    depends on the arguments and on nothing else.
     """
     name = search.task.name
     tests, conditions = tests_of(name), conditions_of(name)
@@ -127,6 +132,17 @@ def reconstruct(
         search, begin, results, tests, conditions=conditions, plan=effort.plan,
         report=report, trials=effort.trials,
     )[:1]  # fmt: skip
+    if len(compete) and not (nearest == compete[:1]).all():
+        found, standing = scored(
+            search, layout.places(np.concatenate([nearest, compete[:1]])), tests,
+            conditions=conditions, wave=LAST, runs=effort.last, trials=effort.trials,
+        )  # fmt: skip
+        better = clearly_nearer(found, standing)
+        report(
+            f"the nearest {found.distance:.2f}, the one that stands {standing.distance:.2f}, "
+            f"{effort.last} runs a condition: {'it is replaced' if better else 'it stands'}"
+        )
+        nearest = nearest if better else compete[:1]
     members = np.concatenate([nearest, _without(spread, nearest)])
     names = [*(f"m{k:03d}" for k in range(1, len(members) + 1)), *layout.known]
     goals = np.concatenate([layout.places(members), known])

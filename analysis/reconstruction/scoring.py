@@ -35,6 +35,13 @@ class Learned(NamedTuple):
         """All of them."""
         return len(self.hands) + self.failed
 
+    def drawn(self, rng: np.random.Generator) -> Learned:
+        """As many of its runs, drawn with replacement."""
+        chosen = rng.integers(self.runs, size=self.runs)
+        good = chosen[chosen < len(self.hands)]
+        hands = tuple(self.hands[number] for number in good)
+        return Learned(self.rewards[good], hands, len(chosen) - len(good))
+
     def beside(self, others: Learned) -> Learned:
         """These runs and others of the same cell."""
         rewards = np.concatenate([self.rewards, others.rewards])
@@ -141,6 +148,8 @@ class Order:
 
 
 Test = Figure | Order
+RESAMPLES = 200
+"""Of the runs, for the standard error of a distance."""
 FARTHEST = 5.0
 """Standard errors that a figure counts at most, and where too few runs learned its hands: a
 sequence that is not learned is as bad as one with a figure far off, never better."""
@@ -208,3 +217,10 @@ def distance(comparisons: Iterable[Compared]) -> float:
     ]
     squares = [FARTHEST**2 if math.isnan(value) else min(value, FARTHEST) ** 2 for value in values]
     return math.sqrt(sum(squares) / len(squares))
+
+
+def distance_error(tests: Sequence[Test], cells: Mapping[str, Learned]) -> float:
+    """Standard error of :func:`distance` by the bootstrap over the runs of each cell."""
+    rng = np.random.default_rng(0)
+    drawn = ({name: cell.drawn(rng) for name, cell in cells.items()} for _ in range(RESAMPLES))
+    return float(np.std([distance(compared(tests, own)) for own in drawn], ddof=1))

@@ -7,6 +7,7 @@ of the best is searched.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from analysis.reconstruction.scoring import (
     Test,
     compared,
     distance,
+    distance_error,
     learned,
 )
 from analysis.reconstruction.search import Search
@@ -29,8 +31,10 @@ from coartic.readings import condition_under
 
 Array = NDArray[np.float64]
 _SEEDS = 1_000_000  # of a wave begin at a multiple of this
-ENSEMBLE = 0
-"""The wave that scores the members of the ensemble."""
+ENSEMBLE, LAST = 0, 99
+"""Waves that score the members of the ensemble, and the nearest point beside one that stands."""
+CLEARLY = 2.0
+"""Standard errors by which another point has to be nearer."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,15 @@ def best_of_waves(
         known |= {result.goals.tobytes(): result for result in results}
         report(f"wave {number}: {described(results, wave.runs)}")
     return points[_by_distance(results)]
+
+
+def clearly_nearer(found: Scored, standing: Scored) -> bool:
+    """Whether a point is nearer to what is printed than one that stands, beyond chance."""
+    errors = [
+        distance_error([each.test for each in scored.comparisons], scored.cells)
+        for scored in (found, standing)
+    ]
+    return standing.distance - found.distance > CLEARLY * math.hypot(*errors)
 
 
 def _by_distance(results: Sequence[Scored]) -> NDArray[np.intp]:
