@@ -22,7 +22,7 @@
   name();
 
   const contents = document.querySelector("#contents details");
-  if (window.matchMedia("(max-width: 64rem)").matches) contents.open = false;
+  if (window.matchMedia("(max-width: 56rem)").matches) contents.open = false;
 
   /* A link to something folded away unfolds it. */
   const reveal = () => {
@@ -40,4 +40,14 @@
   });
   window.addEventListener("afterprint", () => folded.forEach((at) => { at.open = false; }));
   if (window.location.hash) reveal();
+
+  /* Charts in the place of the drawings of the same data. */
+  document.querySelectorAll("figure .chart").forEach((place) => {
+    const still = place.parentElement.querySelector(".still");
+    const said = JSON.parse(place.nextElementSibling.textContent);
+    place.hidden = false;
+    still.hidden = true;
+    window.vegaEmbed(place, said, { renderer: "svg", actions: false, tooltip: { theme: "custom" } })
+      .catch(() => { place.hidden = true; still.hidden = false; });
+  });
 })();

@@ -18,7 +18,7 @@ from analysis.markup import inline
 from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
 from analysis.report.formats.templates import LATEX, template
-from analysis.report.text import Part, parts
+from analysis.report.text import METHOD_COLUMNS, Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
 
@@ -33,7 +33,6 @@ MOST_ROWS = 35
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
-_LABELS = {"method", "first", "second"}  # columns of methods with their variants
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
@@ -99,7 +98,7 @@ def _head(part: Part, table: DataTable) -> str:
 def _words(part: Part, value: Value) -> str:
     """A value as it is printed, before LaTeX."""
     text = part.text(value)
-    return short_name(text) if part.column.name in _LABELS and text != NONE else text
+    return short_name(text) if part.column.name in METHOD_COLUMNS and text != NONE else text
 
 
 def latex_text(text: str) -> str:

@@ -1,0 +1,261 @@
+"""Charts to explore, as specifications of Vega-Lite, of the data that printed figures show.
+
+Altair states them; Vega draws them in the reader's browser, from a bundle that is part of the
+page (``html.py``). Text and axes have the page's ink, so that light and dark need no other chart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import altair as alt
+import pandas as pd
+
+from analysis.comparisons.methods import INFORMED, UNTOLD
+from analysis.comparisons.progress import SPENDS
+from analysis.comparisons.reached import ALL_TASKS
+from analysis.figures import style
+from analysis.figures.frontier import NAMES
+from analysis.figures.price import look_alike, main_methods
+from analysis.figures.ranking import COLORS, GROUPS, learner
+from analysis.methods import family_of, spoken_name
+from analysis.study import Study
+from coartic.text import json_text
+
+_ANY = "all"
+_ROW = 17  # pixels
+_INK = "currentColor"
+_CONFIG: Any = {
+    "background": "transparent",
+    "font": "system-ui, -apple-system, Segoe UI, Roboto, Liberation Sans, sans-serif",
+    "view": {"stroke": "transparent"},
+    "axis": {
+        **{"labelColor": _INK, "titleColor": _INK, "domainColor": _INK, "tickColor": _INK},
+        **{"labelFontSize": 12, "titleFontSize": 12, "titleFontWeight": "normal"},
+        **{"gridColor": _INK, "gridOpacity": 0.12, "labelLimit": 230},
+    },
+    "legend": {"labelColor": _INK, "titleColor": _INK, "labelFontSize": 12, "labelLimit": 240},
+    "header": {"labelColor": _INK, "titleColor": _INK},
+}
+
+
+def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
+    """Specifications as JSON by the id of the figure whose data they show."""
+    makers: dict[str, Callable[[Study, pd.DataFrame], alt.TopLevelMixin]] = {
+        "ranking": ranking_chart,
+        "price": price_chart,
+    }
+    return {
+        name: json_text(make(study, shown[name]).to_dict(), allow_nan=False)
+        for name, make in makers.items()
+        if name in shown
+    }
+
+
+def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
+    """Gap of every method with its interval; by task, by family, by what a method is told."""
+    tasks = list(dict.fromkeys(map(str, data.task)))
+    values = [
+        {
+            **{"task": row.task, "name": spoken_name(str(row.method)), "id": row.method},
+            **{"told": row.told, "family": row.family, "runs": row.runs},
+            **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
+            **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
+        }
+        for row in data.itertuples(index=False)
+    ]
+    chosen = _choices(tasks, data.told, data.family)
+    base = _filtered(alt.Chart(alt.Data(values=values)), chosen)
+    order = alt.EncodingSortField("gap", order="ascending")
+    y: Any = alt.Y("name:N", sort=order, title=None, axis=alt.Axis(grid=False, ticks=False))
+    told: Any = alt.Color(
+        "told:N", scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())), legend=None
+    )
+    tips = [
+        alt.Tooltip("name:N", title="method"),
+        alt.Tooltip("gap:Q", title="gap to the optimum (%)", format=".2f"),
+        alt.Tooltip("interval:N", title="95 % interval"),
+        *(
+            alt.Tooltip(f"{name}:{kind}")
+            for name, kind in (("runs", "Q"), ("told", "N"), ("id", "N"))
+        ),
+    ]
+    x: Any = alt.X("gap:Q", title="gap to the optimum (%): nearer 0 is better")
+    lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=told)
+    marks = base.mark_point(filled=True, size=70, opacity=1).encode(
+        x=x, y=y, color=told, tooltip=tips,
+        shape=alt.Shape("learner:N", legend=None,
+                        scale=alt.Scale(domain=[False, True], range=["circle", "diamond"])),
+    )  # fmt: skip
+    text = base.mark_text(align="left", dx=9, color=_INK).encode(
+        x=alt.X("end:Q"), y=y, text=alt.Text("gap:Q", format=".1f")
+    ).transform_calculate(end="max(datum.gap, isValid(datum.high) ? datum.high : datum.gap)")  # fmt: skip
+    zero = alt.Chart(alt.Data(values=[{"x": 0}])).mark_rule(strokeDash=[2, 3], color=_INK)
+    parts = alt.layer(zero.encode(x=alt.X("x:Q")), lines, marks, text)
+    told_first = [told for told in GROUPS if (data.told == told).any()]
+    return _finished(
+        parts.properties(width="container", height=alt.Step(_ROW)),
+        *chosen,
+    ).properties(description=f"Gap to the optimum by method; {'; '.join(told_first)}.")
+
+
+def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
+    """Targets reached within a budget; by task, family, what a method is told, and spend."""
+    told_of = _told(study)
+    tasks = list(dict.fromkeys(map(str, data.task)))
+    if ALL_TASKS in tasks:
+        tasks.remove(ALL_TASKS)
+        tasks.insert(0, ALL_TASKS)
+    main = set(main_methods(data))
+    labels = list(dict.fromkeys(map(str, data.method)))
+    looks = style.looks([look_alike(label) for label in labels])
+    values = []
+    keys = ["task", "method", "spend"]
+    for (task, method, spend), own in data.groupby(keys, sort=False):
+        least = float(own.budget[own.budget > 0].min())
+        known = own.low.notna().all()
+        values.append(
+            {
+                **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
+                **{"told": told_of[str(method)], "family": family_of(str(method))},
+                **{"main": method in main, "runs": int(own.runs.iloc[0])},
+                "budget": [_number(max(b, least / 2)) for b in own.budget],
+                "share": [_number(100 * share) for share in own.share],
+                "low": [_number(100 * low) if known else None for low in own.low],
+                "high": [_number(100 * high) if known else None for high in own.high],
+            }
+        )
+    spends = [spend for spend in SPENDS if (data.spend == spend).any()]
+    spend = alt.param(
+        name="spend",
+        value=spends[0],
+        bind=alt.binding_select(
+            options=spends, labels=[NAMES[name] for name in spends], name="Against "
+        ),
+    )
+    chosen = (*_choices(tasks, told_of.values(), map(family_of, labels)), spend)
+    every = alt.param(name="every", value=False, bind=alt.binding_checkbox(name="All methods "))
+    near = alt.selection_point(
+        name="near", fields=["name"], on="pointerover", clear="pointerout", empty=False
+    )
+    base = _filtered(alt.Chart(alt.Data(values=values)), chosen[:3])
+    base = base.transform_filter(
+        "datum.spend === spend && (every || datum.main || family !== 'all')"
+    )
+    base = base.transform_flatten(["budget", "share", "low", "high"])
+    base = base.transform_calculate(
+        interval="isValid(datum.low) ? format(datum.low, '.0f') + ' to ' + "
+        "format(datum.high, '.0f')  + ' %' : 'none: too few runs'"
+    )
+    names = [spoken_name(label) for label in labels]
+    color: Any = alt.Color(
+        "name:N",
+        scale=alt.Scale(
+            domain=names, range=[_paint(looks[look_alike(label)].color) for label in labels]
+        ),
+        legend=None,
+    )
+    dash: Any = alt.StrokeDash(
+        "name:N",
+        scale=alt.Scale(
+            domain=names, range=[_dash(looks[look_alike(label)].dash) for label in labels]
+        ),
+        legend=None,
+    )
+    x: Any = alt.X(
+        "budget:Q",
+        scale=alt.Scale(type="log", nice=False),
+        title="spent (methods that spend nothing start at the left edge)",
+        axis=alt.Axis(format="~s", tickCount=6),
+    )
+    y: Any = alt.Y("share:Q", title="targets reached (%)", scale=alt.Scale(domain=[0, 100]))
+    band = base.mark_area(interpolate="step-after").encode(
+        x=x, y=alt.Y("low:Q"), y2="high:Q", color=color,
+        opacity=alt.condition(near, alt.value(0.35), alt.value(0.12)),
+    )  # fmt: skip
+    line = base.mark_line(interpolate="step-after").encode(
+        x=x, y=y, color=color, strokeDash=dash,
+        strokeWidth=alt.condition(near, alt.value(4), alt.value(1.8)),
+    )  # fmt: skip
+    tips = [
+        alt.Tooltip("name:N", title="method"),
+        alt.Tooltip("budget:Q", title="spent", format=".3~s"),
+        alt.Tooltip("share:Q", title="targets reached (%)", format=".0f"),
+        alt.Tooltip("interval:N", title="95 % interval"),
+        *(
+            alt.Tooltip(f"{name}:{kind}")
+            for name, kind in (("runs", "Q"), ("told", "N"), ("id", "N"))
+        ),
+    ]
+    points = base.mark_point(size=90, opacity=0, filled=True).encode(
+        x=x, y=y, color=color, tooltip=tips
+    ).add_params(near)  # fmt: skip
+    last = (
+        base.transform_aggregate(at="max(budget)", share="max(share)", groupby=["name"])
+        .mark_text(align="left", dx=4, fontSize=11)
+        .encode(x=alt.X("at:Q"), y=y, text="name:N", color=color)
+    )
+    layers = alt.layer(band, line, points, last)
+    return _finished(layers.properties(width="container", height=300), *chosen, every).properties(
+        description="Share of targets reached within a budget, by method."
+    )
+
+
+def _choices(tasks: list[str], told: Iterable[str], families: Iterable[str]) -> tuple[Any, ...]:
+    known = set(told)
+    groups = [words for words in (*INFORMED.values(), UNTOLD) if words in known]
+    return (
+        alt.param(
+            name="task", value=tasks[0], bind=alt.binding_select(options=tasks, name="Task ")
+        ),
+        _any("told", "Told ", groups),
+        _any("family", "Family ", list(dict.fromkeys(families))),
+    )
+
+
+def _any(name: str, words: str, options: list[str]) -> Any:
+    bound = alt.binding_select(options=[_ANY, *options], name=words)
+    return alt.param(name=name, value=_ANY, bind=bound)
+
+
+def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
+    for param in chosen:
+        name = param.param.name
+        if name == "task":
+            chart = chart.transform_filter("datum.task === task")
+        else:
+            chart = chart.transform_filter(f"{name} === 'all' || datum.{name} === {name}")
+    return chart
+
+
+def _finished(chart: Any, *params: Any) -> Any:
+    return chart.add_params(*params).configure(**_CONFIG)
+
+
+def _told(study: Study) -> dict[str, str]:
+    """What methods know of the reward by label, those over all tasks as their parts."""
+    from analysis.comparisons.methods import informed
+
+    found = {label: informed(row.told) for (_, label), row in study.method_rows.items()}
+    of_parts = study.scores.drop_duplicates("method")
+    joint = zip(map(str, of_parts.method), map(str, of_parts.label), strict=True)
+    return {**{name: found[label] for name, label in joint}, **found}
+
+
+def _number(value: float) -> float | None:
+    """With four figures, which is more than are seen."""
+    return None if math.isnan(value) else float(f"{value:.4g}")
+
+
+def _interval(low: float, high: float) -> str:
+    return "none: run once" if math.isnan(low) else f"{low:.2f} to {high:.2f}"
+
+
+def _paint(color: str) -> str:
+    return _INK if color == style.INK else color
+
+
+def _dash(dash: Any) -> list[float]:
+    return [1, 0] if dash == style.SOLID else list(dash[1])
