@@ -64,8 +64,8 @@ FAMILIES: Mapping[str, str] = {
     "random-search": "random search",
     "cma-es": "CMA-ES",
     "nullspace-qp": "null-space control",
-    "posture-based": "posture planning",
-    "trajectory-optimisation": "trajectory optimisation",
+    "posture-based": "posture plan",
+    "trajectory-optimisation": "trajectory plan",
     "optimum": "search for the optimum",
 }
 """What the built-in methods of one family are called together."""

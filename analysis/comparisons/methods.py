@@ -32,7 +32,7 @@ TOLD = {
 """A letter for each kind of information, in the order in which the tables show them."""
 INFORMED = {
     Information.REWARD_FORMULA: "told the reward as a formula",
-    Information.REWARD_BY_TRIAL: "told the reward of each trial, after it",
+    Information.REWARD_BY_TRIAL: "told each trial's reward",
 }
 """What a method is told of the reward, the most first, in words."""
 UNTOLD = "not told the reward"

@@ -138,7 +138,7 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
             "tasks-drawn", "Tasks", drawn("tasks-drawn"), [tasks_table(study)], _facts(study)
         ),
         _section(
-            "paper", "The paper's results", drawn("paper"), beside_paper(study), cells_found(study)
+            "paper", "Paper", drawn("paper"), beside_paper(study), cells_found(study)
         ),
         _claims(study, {} if figures is None else figures.like_the_paper),
         _section("movements", "Movements", drawn("movements"), (), hands_found(study)),
@@ -255,11 +255,11 @@ def _methods(study: Study, figures: Sequence[Block]) -> Section:
         *_by_task(study, "methods", "every method", of),
     )
     tables = () if overall is None else without_variants(overall)
-    return _section("methods", "Methods side by side", figures, tables, winners(study), below)
+    return _section("methods", "Methods", figures, tables, winners(study), below)
 
 
 def _cost(study: Study, figures: Sequence[Block]) -> Section:
-    title = "Reward and what it costs"
+    title = "Cost"
     if _many(study):
         return _section("cost", title, figures)
 
@@ -291,7 +291,7 @@ def _signatures(study: Study, figures: Sequence[Block]) -> Section:
         Section("signatures-read", "What each signature says", (meanings,), folded=True),
         *_by_task(study, "signatures", "signatures", of),
     )
-    title = "Signatures of coarticulation"
+    title = "Signatures"
     return _section("coarticulation", title, figures, between, context_found(study), below)
 
 
@@ -302,7 +302,7 @@ def _claims(study: Study, figures: Mapping[str, str]) -> Section:
     table = claims_table(study)
     return Section(
         CLAIMS,
-        "Claims of the paper",
+        "Claims",
         (counts, *_tables(table)),
         (each,),
         finding=claims_found(study),
@@ -336,7 +336,7 @@ def _about(
             "no tables of pairs, targets, areas, Pareto sets and further signatures by task, and "
             "no figures of signatures; `coartic analyse` writes all of them as CSV."
         )
-    return Section("about", "Tracing and citing", (Bullets(tuple(items)),))
+    return Section("about", "Citing", (Bullets(tuple(items)),))
 
 
 def _many(study: Study) -> bool:

@@ -25,7 +25,8 @@ from analysis.study import Study
 from coartic.text import json_text
 
 _ANY = "all"
-_ROW = 17  # pixels
+_ROW, _TALL = 11.5, 205  # pixels: of a row, of the curves
+_APART = 7.0  # per cent of the axis between names at its end
 _INK = "currentColor"
 _CONFIG: Any = {
     "background": "transparent",
@@ -33,8 +34,8 @@ _CONFIG: Any = {
     "view": {"stroke": "transparent"},
     "axis": {
         **{"labelColor": _INK, "titleColor": _INK, "domainColor": _INK, "tickColor": _INK},
-        **{"labelFontSize": 12, "titleFontSize": 12, "titleFontWeight": "normal"},
-        **{"gridColor": _INK, "gridOpacity": 0.12, "labelLimit": 230},
+        **{"labelFontSize": 11, "titleFontSize": 11, "titleFontWeight": "normal"},
+        **{"gridColor": _INK, "gridOpacity": 0.12, "labelLimit": 260},
     },
     "legend": {"labelColor": _INK, "titleColor": _INK, "labelFontSize": 12, "labelLimit": 240},
     "header": {"labelColor": _INK, "titleColor": _INK},
@@ -60,6 +61,7 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     values = [
         {
             **{"task": row.task, "name": spoken_name(str(row.method)), "id": row.method},
+            **{"place": 1000 * GROUPS.index(str(row.told)) + _number(row.gap)},
             **{"told": row.told, "family": row.family, "runs": row.runs},
             **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
             **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
@@ -68,10 +70,16 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     ]
     chosen = _choices(tasks, data.told, data.family)
     base = _filtered(alt.Chart(alt.Data(values=values)), chosen)
-    order = alt.EncodingSortField("gap", order="ascending")
-    y: Any = alt.Y("name:N", sort=order, title=None, axis=alt.Axis(grid=False, ticks=False))
+    order = alt.EncodingSortField("place", op="min", order="ascending")
+    bold: Any = {
+        "condition": {"test": "indexof(datum.label, 'learner') === 0", "value": "bold"},
+        "value": "normal",
+    }
+    axis = alt.Axis(grid=False, ticks=False, labelFontWeight=bold)
+    y: Any = alt.Y("name:N", sort=order, title=None, axis=axis)
     told: Any = alt.Color(
-        "told:N", scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())), legend=None
+        "told:N", scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())),
+        legend=alt.Legend(orient="top", title=None, offset=2, symbolSize=50, columnPadding=6),
     )
     tips = [
         alt.Tooltip("name:N", title="method"),
@@ -82,14 +90,14 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
             for name, kind in (("runs", "Q"), ("told", "N"), ("id", "N"))
         ),
     ]
-    x: Any = alt.X("gap:Q", title="gap to the optimum (%): nearer 0 is better")
+    x: Any = alt.X("gap:Q", scale=alt.Scale(padding=24), title="gap to the optimum (%)")
     lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=told)
-    marks = base.mark_point(filled=True, size=70, opacity=1).encode(
+    marks = base.mark_point(filled=True, size=45, opacity=1).encode(
         x=x, y=y, color=told, tooltip=tips,
         shape=alt.Shape("learner:N", legend=None,
                         scale=alt.Scale(domain=[False, True], range=["circle", "diamond"])),
     )  # fmt: skip
-    text = base.mark_text(align="left", dx=9, color=_INK).encode(
+    text = base.mark_text(align="left", dx=7, color=_INK, fontSize=10.5).encode(
         x=alt.X("end:Q"), y=y, text=alt.Text("gap:Q", format=".1f")
     ).transform_calculate(end="max(datum.gap, isValid(datum.high) ? datum.high : datum.gap)")  # fmt: skip
     zero = alt.Chart(alt.Data(values=[{"x": 0}])).mark_rule(strokeDash=[2, 3], color=_INK)
@@ -111,22 +119,27 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     main = set(main_methods(data))
     labels = list(dict.fromkeys(map(str, data.method)))
     looks = style.looks([look_alike(label) for label in labels])
-    values = []
+    positive = data[data.budget > 0].groupby("spend").budget
+    edges = {str(name): (float(own.min()), float(own.max())) for name, own in positive}
+    values: list[dict[str, Any]] = []
     keys = ["task", "method", "spend"]
     for (task, method, spend), own in data.groupby(keys, sort=False):
-        least = float(own.budget[own.budget > 0].min())
+        least, most = edges[str(spend)]
         known = own.low.notna().all()
         values.append(
             {
                 **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
                 **{"told": told_of[str(method)], "family": family_of(str(method))},
                 **{"main": method in main, "runs": int(own.runs.iloc[0])},
+                "end": _number(most),
                 "budget": [_number(max(b, least / 2)) for b in own.budget],
                 "share": [_number(100 * share) for share in own.share],
                 "low": [_number(100 * low) if known else None for low in own.low],
                 "high": [_number(100 * high) if known else None for high in own.high],
             }
         )
+    for place in {(value["task"], value["spend"]) for value in values}:
+        _placed([v for v in values if (v["task"], v["spend"]) == place and v["main"]])
     spends = [spend for spend in SPENDS if (data.spend == spend).any()]
     spend = alt.param(
         name="spend",
@@ -144,6 +157,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     base = base.transform_filter(
         "datum.spend === spend && (every || datum.main || family !== 'all')"
     )
+    ends = base
     base = base.transform_flatten(["budget", "share", "low", "high"])
     base = base.transform_calculate(
         interval="isValid(datum.low) ? format(datum.low, '.0f') + ' to ' + "
@@ -167,8 +181,8 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     x: Any = alt.X(
         "budget:Q",
         scale=alt.Scale(type="log", nice=False),
-        title="spent (methods that spend nothing start at the left edge)",
-        axis=alt.Axis(format="~s", tickCount=6),
+        title="spent (left edge: nothing)",
+        axis=alt.Axis(format="~s", tickCount=6, grid=False),
     )
     y: Any = alt.Y("share:Q", title="targets reached (%)", scale=alt.Scale(domain=[0, 100]))
     band = base.mark_area(interpolate="step-after").encode(
@@ -193,14 +207,26 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
         x=x, y=y, color=color, tooltip=tips
     ).add_params(near)  # fmt: skip
     last = (
-        base.transform_aggregate(at="max(budget)", share="max(share)", groupby=["name"])
-        .mark_text(align="left", dx=4, fontSize=11)
-        .encode(x=alt.X("at:Q"), y=y, text="name:N", color=color)
+        ends.transform_filter("isValid(datum.label)")
+        .mark_text(align="left", dx=4, fontSize=10.5)
+        .encode(x=alt.X("end:Q"), y=alt.Y("label:Q"), text="name:N", color=color)
     )
     layers = alt.layer(band, line, points, last)
-    return _finished(layers.properties(width="container", height=300), *chosen, every).properties(
+    return _finished(layers.properties(width="container", height=_TALL), *chosen, every).properties(
         description="Share of targets reached within a budget, by method."
     )
+
+
+def _placed(values: list[dict[str, Any]]) -> None:
+    """Heights of the names of curves at their ends, so that none covers another."""
+    lowest = -math.inf
+    ordered = sorted(values, key=lambda value: value["share"][-1])
+    for value in ordered:
+        lowest = value["label"] = max(value["share"][-1], lowest + _APART)
+    highest = 100.0
+    for value in reversed(ordered):
+        value["label"] = _number(min(value["label"], highest))
+        highest = value["label"] - _APART
 
 
 def _choices(tasks: list[str], told: Iterable[str], families: Iterable[str]) -> tuple[Any, ...]:

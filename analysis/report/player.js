@@ -236,7 +236,7 @@ class Player {
     const both = element("div", { class: "panels" }, root);
     const load = () => this.load();
     const folded = element("details", { class: "choices" });
-    element("summary", { text: "Choose task and movements" }, folded);
+    element("summary", { text: "Choose task, movements, speed" }, folded);
     const choices = element("div", { class: "controls" }, folded);
     const first = element("span", {}, choices);
     element("label", { for: `${id}-task`, text: "Task " }, first);
@@ -255,11 +255,10 @@ class Player {
     step("◂", "One tick back", -1);
     step("▸", "One tick on", 1);
     const ticks = element("span", { class: "ticks" }, controls);
-    element("label", { for: `${id}-tick`, text: "Tick" }, ticks);
-    this.slider = element("input", { type: "range", id: `${id}-tick`, min: 0, step: 1, value: 0 }, ticks);
+    this.slider = element("input", { type: "range", "aria-label": "Tick", min: 0, step: 1, value: 0 }, ticks);
     this.slider.addEventListener("input", () => { this.pause(); this.go(Number(this.slider.value)); });
     this.count = element("span", { class: "count" }, ticks);
-    const speed = element("span", {}, controls);
+    const speed = element("span", {}, choices);
     element("label", { for: `${id}-speed`, text: "Speed " }, speed);
     this.speed = element("select", { id: `${id}-speed` }, speed);
     [15, 30, 60, 120, 240].forEach((rate) => element("option", { value: rate, text: `${rate} ticks/s` }, this.speed));

@@ -47,6 +47,11 @@
     const said = JSON.parse(place.nextElementSibling.textContent);
     place.hidden = false;
     still.hidden = true;
+    if (place.clientWidth < 480) { // names and legends give way to what is drawn
+      Object.assign(said.config.axis, { labelLimit: 118 });
+      Object.assign(said.config.legend, { columns: 1 });
+      said.config.text = { limit: 104 };
+    }
     window.vegaEmbed(place, said, { renderer: "svg", actions: false, tooltip: { theme: "custom" } })
       .catch(() => { place.hidden = true; still.hidden = false; });
   });
