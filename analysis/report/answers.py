@@ -58,7 +58,7 @@ def answers(study: Study, pictures: Mapping[str, Block], player: Block | None) -
     """
     found = (
         _card("coarticulation", coarticulation(study), _some(pictures.get("postures"), player)),
-        _card("paper", reproduced(study), _strips(study)),
+        _card("paper", reproduced(study), strips(study)),
         _card("methods", winners(study), _some(pictures.get("ranking"))),
         _card("price", price(study), _some(pictures.get("price"))),
     )
@@ -181,7 +181,7 @@ def _counted(found: Counter[Any], verdict: str) -> str:
     return f"{count or 'none'} {_IN_WORDS[verdict][count != 1]}"
 
 
-def _strips(study: Study) -> list[Block]:
+def strips(study: Study) -> list[Block]:
     """Verdicts as strips of colours and words, then what is not reproduced, by name."""
     cells = tuple(
         Verdict(

@@ -52,6 +52,7 @@ from analysis.report.summary import (
 )
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
+from analysis.report.tables.main import main_methods, main_verdicts
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
 from analysis.report.tables.paper import beside_paper
 from analysis.report.tables.signatures import signatures_tables
@@ -137,9 +138,7 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
         _section(
             "tasks-drawn", "Tasks", drawn("tasks-drawn"), [tasks_table(study)], _facts(study)
         ),
-        _section(
-            "paper", "Paper", drawn("paper"), beside_paper(study), cells_found(study)
-        ),
+        _section("paper", "Paper", drawn("paper"), beside_paper(study), cells_found(study)),
         _claims(study, {} if figures is None else figures.like_the_paper),
         _section("movements", "Movements", drawn("movements"), (), hands_found(study)),
         _section("learning", "Learning", drawn("learning"), (), pace_found(study)),
@@ -153,9 +152,16 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
 
 
 def write(
-    report: Report, study: Study, folder: Path, *, begin: Callable[[], object] = lambda: None
+    report: Report,
+    study: Study,
+    folder: Path,
+    *,
+    printed: bool = False,
+    begin: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
+
+    ``printed``: also the page as a PDF.
 
     ``begin`` is called when all is made and nothing written.
     Raises CoarticError where it cannot be written, or something is in the way.
@@ -170,7 +176,7 @@ def write(
     figures: dict[str, bytes] = {}
     for plot in report.plots:
         figures |= rendered(plot, endings=report.formats)
-    write_report(report.document, figures, folder, extra, begin=begin)
+    write_report(report.document, figures, folder, extra, printed=printed, begin=begin)
 
 
 def _title(results: Results) -> str:
@@ -254,7 +260,7 @@ def _methods(study: Study, figures: Sequence[Block]) -> Section:
         ),
         *_by_task(study, "methods", "every method", of),
     )
-    tables = () if overall is None else without_variants(overall)
+    tables = (main_methods(study), *(without_variants(overall) if overall else ()))
     return _section("methods", "Methods", figures, tables, winners(study), below)
 
 
@@ -303,7 +309,7 @@ def _claims(study: Study, figures: Mapping[str, str]) -> Section:
     return Section(
         CLAIMS,
         "Claims",
-        (counts, *_tables(table)),
+        (counts, *_tables(main_verdicts(study), table)),
         (each,),
         finding=claims_found(study),
     )

@@ -78,7 +78,8 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     axis = alt.Axis(grid=False, ticks=False, labelFontWeight=bold)
     y: Any = alt.Y("name:N", sort=order, title=None, axis=axis)
     told: Any = alt.Color(
-        "told:N", scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())),
+        "told:N",
+        scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())),
         legend=alt.Legend(orient="top", title=None, offset=2, symbolSize=50, columnPadding=6),
     )
     tips = [
@@ -212,9 +213,9 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
         .encode(x=alt.X("end:Q"), y=alt.Y("label:Q"), text="name:N", color=color)
     )
     layers = alt.layer(band, line, points, last)
-    return _finished(layers.properties(width="container", height=_TALL), *chosen, every).properties(
-        description="Share of targets reached within a budget, by method."
-    )
+    return _finished(
+        layers.properties(width="container", height=_TALL), *chosen, every
+    ).properties(description="Share of targets reached within a budget, by method.")
 
 
 def _placed(values: list[dict[str, Any]]) -> None:

@@ -18,6 +18,7 @@ from analysis.markup import inline
 from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
 from analysis.report.formats.templates import LATEX, template
+from analysis.report.tables.main import MAIN
 from analysis.report.text import METHOD_COLUMNS, Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
@@ -28,10 +29,11 @@ _ESCAPES: dict[str, str] = _TABLE["characters"] | {
     for form, pairs in _TABLE["forms"].items()
     for character, said in re.findall(r"(\S) (\S+)", pairs)
 }
-MOST_ROWS = 35
-"""Of a float; a table with more is continued on the next page."""
+MOST_ROWS = 38
+"""Lines of a float, notes among them; a table with more is continued on the next page."""
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
+_LINE = 105  # characters of small print that a line holds
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
@@ -39,7 +41,17 @@ _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
 def latex_inputs(document: Document) -> str:
     """A file that inputs all tables from ``tables/``."""
-    inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
+    tables = {table.id: table for table in document.tables()}
+    main = [name for name in MAIN if name in tables]
+    parts = [f"\\input{{tables/{name}.tex}}\n" for name in main]
+    rest = [table for name, table in tables.items() if name not in main]
+    if main and rest:
+        parts.append("\\clearpage % the supplement, in the order of its numbers\n")
+    for table in rest:
+        # A table over several pages does not float: those before it are set first.
+        before = "\\clearpage\n" if is_long(table) else ""
+        parts.append(f"{before}\\input{{tables/{table.id}.tex}}\n")
+    inputs = "".join(parts)
     return (
         f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
         f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
@@ -53,7 +65,7 @@ def latex_table(table: DataTable) -> str:
     Numbers are in S columns as wide as they need, text and intervals beside them.
     """
     shown = [part for part in parts(table) if part.column.printed]
-    broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
+    broken, long = _broken(shown, table), is_long(table)
     width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
     return template("table.tex.jinja", **LATEX).render(
         id=table.id,
@@ -70,6 +82,20 @@ def latex_table(table: DataTable) -> str:
         broken=broken,
         long=long,
     )
+
+
+def is_long(table: DataTable) -> bool:
+    """Whether it has more lines than a float holds, as far as is known before it is set."""
+    shown = [part for part in parts(table) if part.column.printed]
+    broken = _broken(shown, table)
+    used = sum(_longest(part, table) + 2 for part in shown if part not in broken)
+    each = max((_LINE - used) / max(len(broken), 1), _WORD)
+    lines = sum(
+        max((-(-len(_words(part, row.values[part.index])) // each) for part in broken), default=1)
+        for row in table.rows
+    )
+    notes = sum(len(note) / _LINE for note in table.notes)
+    return lines + notes > MOST_ROWS
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
