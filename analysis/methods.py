@@ -85,7 +85,7 @@ def spoken_name(label: str) -> str:
     name = short_name(label)
     if label.startswith(LEARNER):
         return f"{FAMILIES['dual-process']} {name}"
-    what, apart, rest = name.partition(": ")
+    _, apart, rest = name.partition(": ")
     return f"{family_of(label)} ({rest})" if apart and label in METHODS else name
 
 

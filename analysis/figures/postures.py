@@ -19,7 +19,7 @@ from analysis.figures.robot import MARKERS, box
 from analysis.figures.selection import CONDITIONS, chosen, missing
 from analysis.methods import spoken_name
 from analysis.study import Study
-from coartic import Task
+from coartic import Hand, Task
 from coartic.robot import Array
 from coartic.task import hands_of
 
@@ -38,7 +38,7 @@ class Contexts:
     tasks: tuple[Task, Task]
     postures: tuple[Array, Array]
     """Where each run hits it, ``(runs, dof)``; with the hand that most runs choose."""
-    hand: str
+    hand: Hand
     apart: float
     """Distance of the mean postures, length unit and rad."""
     hands_apart: float
@@ -62,7 +62,8 @@ def contexts(study: Study, methods: Sequence[str] | None = None) -> Contexts | N
     labels = [label for label in (*CONDITIONS, *labels) if label in set(found.label)]
     found = found[found.label == (labels or list(found.label))[0]]
     row = found.iloc[0]
-    label, goal, hand = str(row.label), int(row.goal), str(row.hand)
+    label, goal = str(row.label), int(row.goal)
+    hand: Hand = "left" if row.hand == "left" else "right"
     names = str(row.task), str(row.against)
     both = [_postures(study, name, label, goal, hand) for name in names]
     first, second = (study.tasks[name] for name in names)
@@ -84,7 +85,7 @@ def contexts(study: Study, methods: Sequence[str] | None = None) -> Contexts | N
     )
 
 
-def _postures(study: Study, task: str, label: str, goal: int, hand: str) -> Array:
+def _postures(study: Study, task: str, label: str, goal: int, hand: Hand) -> Array:
     runs = (run.execution for run in study.trajectories[task, label].runs)
     alike = [run.configurations[goal - 1] for run in runs if hands_of(run.hands)[goal - 1] == hand]
     return np.array(alike)
@@ -102,7 +103,7 @@ def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     figure = Figure(figsize=(0.8 * style.ONE, 1.5), layout="constrained")
     _draw(figure.subplots(), found)
     first, second = found.tasks
-    facts = {
+    facts: dict[str, Any] = {
         "method": spoken_name(found.method),
         "goal": found.goal,
         "first": first.label,
@@ -126,15 +127,14 @@ def _draw(axes: Axes, found: Contexts) -> None:
     axes.set_xlim(low[0], high[0] + 1.5)
     axes.set_ylim(low[1], high[1])
     shared = found.tasks[0].goals[found.goal - 1]
-    for task, color, runs, following in zip(
-        found.tasks, _COLORS, found.postures, goals, strict=True
-    ):
+    for task, color, runs, (x, y) in zip(found.tasks, _COLORS, found.postures, goals, strict=True):
         for q in runs:
             axes.plot(*task.robot.joint_positions(q, found.hand).T, color=color, **_RUNS)
+        following = float(x), float(y)
         mean = runs.mean(axis=0)
         outline = task.robot.base_outline(mean)
         axes.fill(*outline.T, facecolor=color, alpha=0.12, edgecolor=color, linewidth=0.8)
-        look = MARKERS[found.hand]  # type: ignore[index]
+        look = MARKERS[found.hand]
         joints = task.robot.joint_positions(mean, found.hand).T
         axes.plot(*joints, color=color, linewidth=1.6, zorder=3, **look)
         axes.annotate(

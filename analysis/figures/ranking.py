@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from analysis.comparisons.reached import ALL_TASKS
 from analysis.figures import style
 from analysis.figures.plot import Plot, spoken, worded
 from analysis.figures.selection import missing
-from analysis.methods import LEARNER, family_of, short_name, spoken_name
+from analysis.methods import LEARNER, family_of, short_name
 from analysis.statistics.estimates import SEED, mean
 from analysis.study import Study
 from coartic.record import SEARCH
@@ -68,9 +69,9 @@ def _over_all(study: Study) -> Iterator[Standing]:
         told = informed(
             study.method_rows[str(labels.task[method]), str(labels.label[method])].told
         )
-        gaps = (100 * float(row[name]) for name in ("gap", "gap_low", "gap_high"))
+        gap, low, high = (100 * float(row[name]) for name in ("gap", "gap_low", "gap_high"))
         named = ALL_TASKS, method, told, family_of(method)
-        yield Standing(*named, *gaps, int(row.runs), int(row.failed))
+        yield Standing(*named, gap, low, high, int(row.runs), int(row.failed))
 
 
 def _by_task(study: Study) -> Iterator[Standing]:
@@ -83,9 +84,9 @@ def _by_task(study: Study) -> Iterator[Standing]:
         found = mean(study.cells[task, label].rewards, seed=SEED)
         # The higher the reward, the smaller the gap.
         ends = (found.estimate, found.high, found.low)
-        gaps = (100 * (best.reward - value) / -best.reward for value in ends)
+        gap, low, high = (100 * (best.reward - value) / -best.reward for value in ends)
         named = task, label, informed(row.told), family_of(label)
-        yield Standing(*named, *gaps, row.runs, row.runs - row.solved)
+        yield Standing(*named, gap, low, high, row.runs, row.runs - row.solved)
 
 
 @style.styled
@@ -123,27 +124,23 @@ def ranking(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
 
 def _panel(axes: Axes, told: str, own: pd.DataFrame) -> None:
     axes.set_title(told, color=COLORS[told])
-    for place, row in enumerate(own.itertuples(index=False)):
+    for place, values in enumerate(own.itertuples(index=False, name=None)):
+        row = Standing(*values)
         mark: Any = {"color": COLORS[told], "clip_on": False, "markersize": 3.5}
-        if not pd.isna(row.low):
+        end = row.gap
+        if not math.isnan(row.low):
+            end = max(row.gap, row.high)
             axes.plot([row.low, row.high], [-place, -place], color=COLORS[told], linewidth=1.4)
         axes.plot(row.gap, -place, "D" if learner(row.method) else "o", **mark)
-        axes.annotate(
-            f"{row.gap:.1f}", (max(row.gap, row.high if row.high == row.high else row.gap), -place),
-            (5, 0), textcoords="offset points", va="center",
-        )  # fmt: skip
+        of: Any = {"textcoords": "offset points", "va": "center"}
+        axes.annotate(f"{row.gap:.1f}", (end, -place), (5, 0), **of)
     style.name_rows(axes, [short_name(method) for method in own.method])
     for name, method in zip(axes.get_yticklabels(), own.method, strict=True):
         if learner(method):
-            name.set_weight("bold")
+            name.set_fontweight("bold")
     axes.axvline(0, **style.OPTIMUM)
 
 
 def learner(label: str) -> bool:
     """Whether it is the paper's learner under its own conditions."""
     return label.startswith(LEARNER.rstrip("/")) and not variant(label)
-
-
-def name_of(label: str) -> str:
-    """As sentences say it."""
-    return spoken_name(label)

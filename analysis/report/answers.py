@@ -1,4 +1,4 @@
-"""What a reader wants first: four questions, each with one sentence of the data and one picture."""
+"""What a reader wants first: four questions, each with a sentence of the data and a picture."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from analysis.figures.price import main_methods
 from analysis.figures.ranking import learner, standings
 from analysis.markup import escaped
 from analysis.methods import LEARNER, spoken_name
-from analysis.report.document import Block, Bullets, Section, Strip, Tone, Verdict
+from analysis.report.document import Block, Bullets, Section, Strip, Verdict
 from analysis.report.summary import best_condition, unlike_printed
+from analysis.report.text import tone_of
 from analysis.statistics.equivalence import MARGIN
 from analysis.statistics.estimates import LEVEL
 from analysis.study import Study
@@ -32,14 +33,6 @@ from coartic.method import Information
 _SAID: dict[str, dict[str, str]] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )
-_TONES: Mapping[str, Tone] = {
-    "supported": "good",
-    "equivalent": "good",
-    "not supported": "bad",
-    "different": "bad",
-    "cannot tell": "open",
-    "undecided": "open",
-}
 _IN_WORDS = {
     "equivalent": ("is equivalent", "are equivalent"),
     "undecided": ("is undecided", "are undecided"),
@@ -185,10 +178,11 @@ def strips(study: Study) -> list[Block]:
     """Verdicts as strips of colours and words, then what is not reproduced, by name."""
     cells = tuple(
         Verdict(
-            f"{study.tasks[row.cell.task].label} {row.cell.label.removeprefix(LEARNER)}"
+            f"{_unbroken(study.tasks[row.cell.task].label)} "
+            + row.cell.label.removeprefix(LEARNER)
             + " †" * bool(study.tasks[row.cell.task].reconstructed),
-            row.verdict or "nothing printed",
-            _TONES.get(row.verdict or "", "plain"),
+            row.verdict or "not printed",
+            tone_of(row.verdict or ""),
             "#published-and-ours",
         )
         for row in paper_rows(study)
@@ -199,19 +193,24 @@ def strips(study: Study) -> list[Block]:
         Verdict(
             entry.claim.statement + " †" * entry.claim.fitted,
             entry.verdict,
-            _TONES.get(entry.verdict, "plain"),
+            tone_of(entry.verdict),
             f"#claim-{entry.claim.id}",
         )
         for entry in decided
     )
     found: list[Block] = []
     if any(cell.tone != "plain" for cell in cells):
-        found.append(Strip("strip-cells", "Learned rewards of the paper", cells))
+        found.append(Strip("strip-cells", "Learned rewards", cells))
     if squares and any(square.tone in ("good", "bad") for square in squares):
-        found.append(Strip("strip-claims", "Claims of the paper", squares, counted=True))
+        found.append(Strip("strip-claims", "Claims", squares, counted=True))
     if found:
         found.append(Bullets(tuple(_refuted(judged, study))))
     return [block for block in found if not isinstance(block, Bullets) or block.items]
+
+
+def _unbroken(text: str) -> str:
+    """With spaces and hyphens at which no line breaks."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}").replace("-", "\N{NON-BREAKING HYPHEN}")
 
 
 _ORDER = ("supported", "cannot tell", "not supported", "measured")
@@ -312,7 +311,7 @@ def price(study: Study) -> str:
     if own is None:
         return ""
     trials = shown[(shown.spend == "trials") & (shown.budget > 0)]
-    learners = [m for m in labels if trials[trials.method == m].share.nunique() > 1 and m != own]
+    learners = [m for m in labels if _learns(trials, m) and m != own]
     last = {m: float(trials[trials.method == m].share.iloc[-1]) for m in (*learners, own)}
     rival = max(learners, key=lambda m: last[m], default=None)
     if rival is None:
@@ -328,8 +327,14 @@ def price(study: Study) -> str:
     return said + _plan(shown, labels, own)
 
 
+def _learns(trials: pd.DataFrame, method: str) -> bool:
+    """Whether it reaches more in more trials."""
+    share = trials[trials.method == method].share
+    return bool(len(share) and share.iloc[-1] > share.iloc[0])
+
+
 def _plan(shown: pd.DataFrame, labels: Iterable[str], own: str) -> str:
-    """The method that makes no trials and reaches half of the targets with the least kinematics."""
+    """What makes no trials and reaches half of the targets with the least kinematics."""
     trials = shown[shown.spend == "trials"].groupby("method").budget
     none = shown[(shown.spend == "trials") & (shown.budget == 0) & (shown.share >= 0.5)].method
     known = shown[(shown.spend == "forward_kinematics") & shown.method.isin(set(none))]
@@ -412,7 +417,7 @@ def context_found(study: Study) -> str:
         for name in ("motor-equivalent part", "non-motor-equivalent part")
     ]
     both = pd.concat(parts, axis=1, keys=["equivalent", "other"]).dropna()
-    both = both[~both.index.get_level_values("label").map(variant)]
+    both = both[[not variant(str(label)) for label in both.index.get_level_values("label")]]
     if not len(both):
         return ""
     larger = int((both.equivalent > both.other).sum())

@@ -14,9 +14,7 @@ from analysis.study import Study
 
 def beside(document: Document, first: Study, second: Study, found: VersionComparison) -> Document:
     """The report of the first folder, which begins with both beside each other."""
-    cards = tuple(
-        _card(side, study) for side, study in zip("ab", (first, second), strict=True)
-    )
+    cards = tuple(_card(side, study) for side, study in zip("ab", (first, second), strict=True))
     differing = tuple(
         replace(section, id=f"beside-{section.id}", blocks=tuple(map(_folded, section.blocks)))
         for section in versions_document(found).sections
@@ -25,7 +23,11 @@ def beside(document: Document, first: Study, second: Study, found: VersionCompar
     both = (
         Section("beside", "A and B", (), cards, cards=True),
         Section(
-            "beside-outcome", "A against B", (), differing, finding=escaped(" ".join(found.summary))
+            "beside-outcome",
+            "A against B",
+            (),
+            differing,
+            finding=escaped(" ".join(found.summary)),
         ),
     )
     return replace(

@@ -13,21 +13,22 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from analysis.comparisons.methods import INFORMED, UNTOLD
+from analysis.comparisons.methods import INFORMED, UNTOLD, informed
 from analysis.comparisons.progress import SPENDS
 from analysis.comparisons.reached import ALL_TASKS
 from analysis.figures import style
 from analysis.figures.frontier import NAMES
 from analysis.figures.price import look_alike, main_methods
-from analysis.figures.ranking import COLORS, GROUPS, learner
+from analysis.figures.ranking import COLORS, GROUPS, Standing, learner
 from analysis.methods import family_of, spoken_name
 from analysis.study import Study
 from coartic.text import json_text
 
 _ANY = "all"
-_ROW, _TALL = 11.5, 205  # pixels: of a row, of the curves
+_ROW, _TALL = 11, 200  # pixels: of a row, of the curves
 _APART = 7.0  # per cent of the axis between names at its end
 _INK = "currentColor"
+_SHORT = json_text(dict(zip(GROUPS, ("as a formula", "after each trial", "nothing"), strict=True)))
 _CONFIG: Any = {
     "background": "transparent",
     "font": "system-ui, -apple-system, Segoe UI, Roboto, Liberation Sans, sans-serif",
@@ -37,14 +38,17 @@ _CONFIG: Any = {
         **{"labelFontSize": 11, "titleFontSize": 11, "titleFontWeight": "normal"},
         **{"gridColor": _INK, "gridOpacity": 0.12, "labelLimit": 260},
     },
-    "legend": {"labelColor": _INK, "titleColor": _INK, "labelFontSize": 12, "labelLimit": 240},
+    "legend": {
+        **{"labelColor": _INK, "titleColor": _INK, "labelFontSize": 11, "titleFontSize": 11},
+        **{"titleFontWeight": "normal", "labelLimit": 240},
+    },
     "header": {"labelColor": _INK, "titleColor": _INK},
 }
 
 
 def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
     """Specifications as JSON by the id of the figure whose data they show."""
-    makers: dict[str, Callable[[Study, pd.DataFrame], alt.TopLevelMixin]] = {
+    makers: dict[str, Callable[[Study, pd.DataFrame], Any]] = {
         "ranking": ranking_chart,
         "price": price_chart,
     }
@@ -55,21 +59,21 @@ def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
     }
 
 
-def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
+def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     """Gap of every method with its interval; by task, by family, by what a method is told."""
     tasks = list(dict.fromkeys(map(str, data.task)))
     values = [
         {
             **{"task": row.task, "name": spoken_name(str(row.method)), "id": row.method},
-            **{"place": 1000 * GROUPS.index(str(row.told)) + _number(row.gap)},
+            **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
             **{"told": row.told, "family": row.family, "runs": row.runs},
             **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
             **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
         }
-        for row in data.itertuples(index=False)
+        for row in map(Standing._make, data.itertuples(index=False, name=None))
     ]
     chosen = _choices(tasks, data.told, data.family)
-    base = _filtered(alt.Chart(alt.Data(values=values)), chosen)
+    base = _filtered(_chart(values), chosen)
     order = alt.EncodingSortField("place", op="min", order="ascending")
     bold: Any = {
         "condition": {"test": "indexof(datum.label, 'learner') === 0", "value": "bold"},
@@ -80,16 +84,20 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     told: Any = alt.Color(
         "told:N",
         scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())),
-        legend=alt.Legend(orient="top", title=None, offset=2, symbolSize=50, columnPadding=6),
+        legend=alt.Legend(
+            orient="top",
+            title="told of the reward:",
+            titleOrient="left",
+            offset=2,
+            symbolSize=50,
+            labelExpr=f"({_SHORT})[datum.label]",
+        ),
     )
     tips = [
         alt.Tooltip("name:N", title="method"),
         alt.Tooltip("gap:Q", title="gap to the optimum (%)", format=".2f"),
         alt.Tooltip("interval:N", title="95 % interval"),
-        *(
-            alt.Tooltip(f"{name}:{kind}")
-            for name, kind in (("runs", "Q"), ("told", "N"), ("id", "N"))
-        ),
+        *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
     ]
     x: Any = alt.X("gap:Q", scale=alt.Scale(padding=24), title="gap to the optimum (%)")
     lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=told)
@@ -98,10 +106,12 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
         shape=alt.Shape("learner:N", legend=None,
                         scale=alt.Scale(domain=[False, True], range=["circle", "diamond"])),
     )  # fmt: skip
-    text = base.mark_text(align="left", dx=7, color=_INK, fontSize=10.5).encode(
-        x=alt.X("end:Q"), y=y, text=alt.Text("gap:Q", format=".1f")
-    ).transform_calculate(end="max(datum.gap, isValid(datum.high) ? datum.high : datum.gap)")  # fmt: skip
-    zero = alt.Chart(alt.Data(values=[{"x": 0}])).mark_rule(strokeDash=[2, 3], color=_INK)
+    ends = "max(datum.gap, isValid(datum.high) ? datum.high : datum.gap)"
+    text = base.transform_calculate(end=ends).mark_text(
+        align="left", dx=7, color=_INK, fontSize=10.5
+    )
+    text = text.encode(x=alt.X("end:Q"), y=y, text=alt.Text("gap:Q", format=".1f"))
+    zero = _chart([{"x": 0}]).mark_rule(strokeDash=[2, 3], color=_INK)
     parts = alt.layer(zero.encode(x=alt.X("x:Q")), lines, marks, text)
     told_first = [told for told in GROUPS if (data.told == told).any()]
     return _finished(
@@ -110,7 +120,7 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     ).properties(description=f"Gap to the optimum by method; {'; '.join(told_first)}.")
 
 
-def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
+def price_chart(study: Study, data: pd.DataFrame) -> Any:
     """Targets reached within a budget; by task, family, what a method is told, and spend."""
     told_of = _told(study)
     tasks = list(dict.fromkeys(map(str, data.task)))
@@ -154,10 +164,9 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
     near = alt.selection_point(
         name="near", fields=["name"], on="pointerover", clear="pointerout", empty=False
     )
-    base = _filtered(alt.Chart(alt.Data(values=values)), chosen[:3])
-    base = base.transform_filter(
-        "datum.spend === spend && (every || datum.main || family !== 'all')"
-    )
+    base = _filtered(_chart(values), chosen[:3])
+    base = base.transform_filter("datum.spend === spend")
+    base = base.transform_filter("every || datum.main || family !== 'all'")
     ends = base
     base = base.transform_flatten(["budget", "share", "low", "high"])
     base = base.transform_calculate(
@@ -199,10 +208,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> alt.TopLevelMixin:
         alt.Tooltip("budget:Q", title="spent", format=".3~s"),
         alt.Tooltip("share:Q", title="targets reached (%)", format=".0f"),
         alt.Tooltip("interval:N", title="95 % interval"),
-        *(
-            alt.Tooltip(f"{name}:{kind}")
-            for name, kind in (("runs", "Q"), ("told", "N"), ("id", "N"))
-        ),
+        *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
     ]
     points = base.mark_point(size=90, opacity=0, filled=True).encode(
         x=x, y=y, color=color, tooltip=tips
@@ -257,14 +263,16 @@ def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
     return chart
 
 
+def _chart(values: list[dict[str, Any]]) -> Any:
+    return alt.Chart(alt.InlineData(values=values))
+
+
 def _finished(chart: Any, *params: Any) -> Any:
     return chart.add_params(*params).configure(**_CONFIG)
 
 
 def _told(study: Study) -> dict[str, str]:
     """What methods know of the reward by label, those over all tasks as their parts."""
-    from analysis.comparisons.methods import informed
-
     found = {label: informed(row.told) for (_, label), row in study.method_rows.items()}
     of_parts = study.scores.drop_duplicates("method")
     joint = zip(map(str, of_parts.method), map(str, of_parts.label), strict=True)

@@ -98,11 +98,11 @@ def report(
             made = replace_field(made, document=beside(made.document, study, against, found))
         write(made, study, out, printed=pdf, begin=lambda: writing(out))
     if_interrupted(f"the report is written in {out}")
+    took, tables = time.monotonic() - started, counted(len(made.document.tables()), "table")
     say(
-        f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
-        f"it: report.md, {'report.pdf, ' * pdf}{counted(len(made.document.tables()), 'table')} "
-        f"(tables/, CSV and LaTeX), {counted(len(made.plots), 'figure')} (figures/, as {formats}), "
-        "numbers.tex."
+        f"{out / 'report.html'} is the report, made in {took:.0f} s. Beside it: report.md, "
+        f"{'report.pdf, ' * pdf}{tables} (tables/, CSV and LaTeX), "
+        f"{counted(len(made.plots), 'figure')} (figures/, as {formats}), numbers.tex."
     )
 
 

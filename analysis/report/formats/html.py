@@ -18,7 +18,7 @@ from analysis.markup import inline
 from analysis.methods import LEARNER, short_name
 from analysis.report.document import CellKey, DataTable, Document, FigureBlock, PlayerBlock, Row
 from analysis.report.formats.templates import on_one_line, template
-from analysis.report.text import METHOD_COLUMNS, Part, by_column, tallied
+from analysis.report.text import METHOD_COLUMNS, Part, by_column, tallied, tone_of
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
 
@@ -133,7 +133,7 @@ def vega() -> str:
     """What draws the charts: Vega, Vega-Lite and Vega-Embed in one script (BSD-3-Clause)."""
     import vl_convert
 
-    script: str = vl_convert.javascript_bundle()
+    script: str = vl_convert.javascript_bundle(None)
     return script.replace("</script", "<\\/script")
 
 
@@ -160,6 +160,8 @@ def cell_view(row: Row, own: list[Part]) -> CellView:
     length, kind = len(str(value or "")), ""
     if column.kind == "text":
         kind = "word" if length <= _WORD else "text" if length <= _SENTENCE else "text sentence"
+    if column.name == "verdict":
+        kind = f"{kind} {tone_of(str(value or ''))}".strip()
     cells = row.cells_by_column.get(column.name, ())
     text = shown["value"]
     name = short_name(text) if column.name in METHOD_COLUMNS and text != NONE else text

@@ -8,6 +8,7 @@ column of text; their columns of many words share two fifths of the line.
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 import tomllib
@@ -34,7 +35,7 @@ MOST_ROWS = 38
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _LINE = 105  # characters of small print that a line holds
-_WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
+_WORD, _WORDS = 16, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
@@ -43,20 +44,21 @@ def latex_inputs(document: Document) -> str:
     """A file that inputs all tables from ``tables/``."""
     tables = {table.id: table for table in document.tables()}
     main = [name for name in MAIN if name in tables]
-    parts = [f"\\input{{tables/{name}.tex}}\n" for name in main]
+    parts = [_input(tables[name]) for name in main]
     rest = [table for name, table in tables.items() if name not in main]
     if main and rest:
         parts.append("\\clearpage % the supplement, in the order of its numbers\n")
-    for table in rest:
-        # A table over several pages does not float: those before it are set first.
-        before = "\\clearpage\n" if is_long(table) else ""
-        parts.append(f"{before}\\input{{tables/{table.id}.tex}}\n")
-    inputs = "".join(parts)
+    inputs = "".join([*parts, *map(_input, rest)])
     return (
         f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
         f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
         + inputs
     )
+
+
+def _input(table: DataTable) -> str:
+    # A table over several pages does not float: those before it are set first.
+    return ("\\clearpage\n" if is_long(table) else "") + f"\\input{{tables/{table.id}.tex}}\n"
 
 
 def latex_table(table: DataTable) -> str:
@@ -66,12 +68,14 @@ def latex_table(table: DataTable) -> str:
     """
     shown = [part for part in parts(table) if part.column.printed]
     broken, long = _broken(shown, table), is_long(table)
-    width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
+    widths = _widths(shown, broken, table) if long else {}
     return template("table.tex.jinja", **LATEX).render(
         id=table.id,
         caption=_spans(table.caption),
         kinds="".join(
-            rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
+            rf">{{\raggedright\arraybackslash}}{widths.get(part, 'X')}"
+            if part in broken
+            else _kind(part, table)
             for part in shown
         ),
         head=" & ".join(_head(part, table) for part in shown),
@@ -82,6 +86,17 @@ def latex_table(table: DataTable) -> str:
         broken=broken,
         long=long,
     )
+
+
+def _widths(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> dict[Part, str]:
+    """Of columns of many words in a longtable: what the others leave, the more the longer."""
+    used = sum(_longest(part, table) + 3 for part in shown if part not in broken)
+    share = min(max(0.92 - used / _LINE, 0.4), 0.8)
+    weights = {part: math.sqrt(_longest(part, table)) for part in broken}
+    whole = sum(weights.values())
+    return {
+        part: f"p{{{share * weight / whole:.2f}\\linewidth}}" for part, weight in weights.items()
+    }
 
 
 def is_long(table: DataTable) -> bool:

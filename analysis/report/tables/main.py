@@ -37,12 +37,17 @@ def main_methods(study: Study) -> DataTable | None:
         layout = layout.model_copy(
             update={"columns": tuple(c for c in layout.columns if c.name != "all_tasks")}
         )
-        rows = [replace(row, values=(*row.values[:2], *row.values[3:])) for row in rows]
+        rows = [_without_third(row) for row in rows]
     return layout.table(rows)
 
 
+def _without_third(row: Row) -> Row:
+    first, second, _, *rest = row.values  # noqa: PD011
+    return replace(row, values=(first, second, *rest))
+
+
 def _order(item: tuple[object, pd.DataFrame]) -> tuple[int, float]:
-    """What is told the most first, then the nearest over all tasks; what is not everywhere last."""
+    """What is told the most first, the nearest over all tasks; what is not everywhere last."""
     own = item[1]
     whole = own[own.task == ALL_TASKS].gap
     return GROUPS.index(str(own.told.iloc[0])), float(whole.iloc[0]) if len(whole) else math.inf
@@ -70,7 +75,7 @@ def _row(study: Study, method: str, own: pd.DataFrame, tasks: list[str]) -> Row:
     values = [float(gaps.gap[task]) if task in gaps.index else None for task in tasks]
     if ALL_TASKS in gaps.index and not any(v is not None for v in values):
         values = [
-            float(100 * study.method_rows[by_task[task]].gap_share) if task in by_task else None
+            100 * study.method_rows[by_task[task]].gap_share if task in by_task else None
             for task in tasks
         ]
     spent = (
