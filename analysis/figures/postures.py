@@ -100,7 +100,7 @@ def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     found = contexts(study, methods)
     if found is None:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
-    figure = Figure(figsize=(0.8 * style.ONE, 1.5), layout="constrained")
+    figure = Figure(figsize=(style.ONE, 1.85), layout="constrained")
     _draw(figure.subplots(), found)
     first, second = found.tasks
     facts: dict[str, Any] = {

@@ -97,7 +97,7 @@ def ranking(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """
     data = standings(study)
     if methods is not None:
-        data = data[data.method.isin(methods) | data.method.str.contains("(", regex=False)]
+        data = data[data.method.isin(methods)]
     if not len(data):
         raise missing(study, "no method with a solution to every run and a known optimum")
     shown = data[data.task == data.task.iloc[0]]

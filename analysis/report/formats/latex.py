@@ -35,7 +35,7 @@ MOST_ROWS = 38
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _LINE = 105  # characters of small print that a line holds
-_WORD, _WORDS = 16, 45  # characters: up to one a column stays whole, as all do up to the other
+_WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
