@@ -39,8 +39,8 @@ FORMULA, TRIAL, NOTHING = ranking.GROUPS
                 standing("dual-process (EC1, EC4)", 2.0, TRIAL, 1.0, 3.0),
                 standing("cma-es/bandit", 2.5, TRIAL, 2.0, 4.0),
             ],
-            ["learner (EC1, EC4) wins: 2.0 %", "not surely before CMA-ES, bandit"],
-            ["place"],
+            ["learner (EC1, EC4) is ahead: 2.0 %", "not surely before CMA-ES, bandit"],
+            ["place", "wins"],
         ),
         (
             [standing("trajectory-optimisation/path-length", 0.0, FORMULA)],

@@ -236,14 +236,15 @@ def winners(study: Study) -> str:
     by_formula = shown[shown.told == INFORMED[Information.REWARD_FORMULA]]
     said = ""
     if len(by_trial):
-        best = by_trial.iloc[0]
+        best, sure = by_trial.iloc[0], _sure(by_trial)
         said = _said(
             "methods",
             "learners",
             best=escaped(spoken_name(best.method)),
+            leads="is ahead" if sure.startswith(", not") else "wins",
             gap=f"{best.gap:.1f}",
             interval=_interval(best),
-            sure=_sure(by_trial),
+            sure=sure,
             learner=_place_of_learner(by_trial),
         )
     if len(by_formula):
@@ -315,7 +316,8 @@ def price(study: Study) -> str:
     last = {m: float(trials[trials.method == m].share.iloc[-1]) for m in (*learners, own)}
     rival = max(learners, key=lambda m: last[m], default=None)
     if rival is None:
-        return ""
+        alone = _said("price", "alone", learner=f"{100 * last[own]:.0f} %")
+        return alone + _plan(shown, labels, own)
     halves = [_half(trials[trials.method == m]) for m in (own, rival)]
     name = escaped(spoken_name(rival))
     if None in halves:

@@ -133,7 +133,7 @@ def vega() -> str:
     """What draws the charts: Vega, Vega-Lite and Vega-Embed in one script (BSD-3-Clause)."""
     import vl_convert
 
-    script: str = vl_convert.javascript_bundle(None)
+    script: str = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
     return script.replace("</script", "<\\/script")
 
 

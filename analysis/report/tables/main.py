@@ -68,8 +68,8 @@ def _row(study: Study, method: str, own: pd.DataFrame, tasks: list[str]) -> Row:
     gaps = own.set_index("task")
     whole: Value = None
     if ALL_TASKS in gaps.index:
-        row = gaps.loc[ALL_TASKS]
-        whole = with_interval(float(row.gap), float(row.low), float(row.high))
+        gap, low, high = (float(gaps[name][ALL_TASKS]) for name in ("gap", "low", "high"))
+        whole = with_interval(gap, low, high)
     cells = _cells(study, method, own)
     by_task = {key[0]: key for key in cells}
     values = [float(gaps.gap[task]) if task in gaps.index else None for task in tasks]
