@@ -20,7 +20,7 @@ from analysis.figures import style
 from analysis.figures.frontier import NAMES
 from analysis.figures.price import look_alike, main_methods
 from analysis.figures.ranking import COLORS, GROUPS, Standing, learner
-from analysis.methods import family_of, spoken_name
+from analysis.methods import family_of, short_name, spoken_name
 from analysis.study import Study
 from coartic.text import json_text
 
@@ -64,9 +64,14 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     tasks = list(dict.fromkeys(map(str, data.task)))
     values = [
         {
-            **{"task": row.task, "name": spoken_name(str(row.method)), "id": row.method},
+            **{"task": row.task, "name": spoken_name(row.method), "id": row.method},
             **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
-            **{"told": row.told, "family": row.family, "runs": row.runs},
+            **{
+                "brief": _brief(row.method),
+                "told": row.told,
+                "family": row.family,
+                "runs": row.runs,
+            },
             **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
             **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
         }
@@ -141,7 +146,11 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
             {
                 **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
                 **{"told": told_of[str(method)], "family": family_of(str(method))},
-                **{"main": method in main, "runs": int(own.runs.iloc[0])},
+                **{
+                    "brief": _brief(str(method)),
+                    "main": method in main,
+                    "runs": int(own.runs.iloc[0]),
+                },
                 "end": _number(most),
                 "budget": [_number(max(b, least / 2)) for b in own.budget],
                 "share": [_number(100 * share) for share in own.share],
@@ -261,6 +270,11 @@ def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
         else:
             chart = chart.transform_filter(f"{name} === 'all' || datum.{name} === {name}")
     return chart
+
+
+def _brief(label: str) -> str:
+    """The name of a method where there is little room."""
+    return spoken_name(label) if learner(label) else short_name(label)
 
 
 def _chart(values: list[dict[str, Any]]) -> Any:

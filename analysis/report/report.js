@@ -44,13 +44,20 @@
   /* Charts in the place of the drawings of the same data. */
   document.querySelectorAll("figure .chart").forEach((place) => {
     const still = place.parentElement.querySelector(".still");
-    const said = JSON.parse(place.nextElementSibling.textContent);
+    const text = place.nextElementSibling.textContent;
+    let said = JSON.parse(text);
     place.hidden = false;
     still.hidden = true;
     if (place.clientWidth < 480) { // names and legends give way to what is drawn
-      Object.assign(said.config.axis, { labelLimit: 118 });
+      const brief = new Map();
+      JSON.parse(text, (key, value) => {
+        if (value && value.brief) brief.set(value.name, value.brief);
+        return value;
+      });
+      said = JSON.parse(text, (key, value) => brief.get(value) ?? value);
+      Object.assign(said.config.axis, { labelLimit: 132 });
       Object.assign(said.config.legend, { columns: 1 });
-      said.config.text = { limit: 104 };
+      said.config.text = { limit: 118 };
     }
     window.vegaEmbed(place, said, { renderer: "svg", actions: false, tooltip: { theme: "custom" } })
       .catch(() => { place.hidden = true; still.hidden = false; });
