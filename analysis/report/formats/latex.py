@@ -35,6 +35,7 @@ MOST_ROWS = 38
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _LINE = 105  # characters of small print that a line holds
+_MANY = 10  # columns from which on the print is smaller
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
@@ -83,6 +84,7 @@ def latex_table(table: DataTable) -> str:
             " & ".join(_cell(part, row.values[part.index]) for part in shown) for row in table.rows
         ],
         notes=map(_spans, table.notes),
+        size="scriptsize" if len(shown) >= _MANY else "footnotesize",
         broken=broken,
         long=long,
     )
@@ -91,7 +93,7 @@ def latex_table(table: DataTable) -> str:
 def _widths(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> dict[Part, str]:
     """Of columns of many words in a longtable: what the others leave, the more the longer."""
     used = sum(_longest(part, table) + 3 for part in shown if part not in broken)
-    share = min(max(0.92 - used / _LINE, 0.4), 0.8)
+    share = min(max(0.86 - used / _LINE, 0.36), 0.8)
     weights = {part: math.sqrt(_longest(part, table)) for part in broken}
     whole = sum(weights.values())
     return {
