@@ -85,6 +85,7 @@ def latex_table(table: DataTable) -> str:
         ],
         notes=map(_spans, table.notes),
         size="scriptsize" if len(shown) >= _MANY else "footnotesize",
+        gap="1.5pt" if len(shown) >= _MANY else "3pt",
         broken=broken,
         long=long,
     )
