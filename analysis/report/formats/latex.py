@@ -34,7 +34,7 @@ MOST_ROWS = 38
 """Lines of a float, notes among them; a table with more is continued on the next page."""
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
-_LINE = 105  # characters of small print that a line holds
+_LINE, _NARROW = 105, 70  # characters of small print that a line holds, and a narrow one
 _MANY = 10  # columns from which on the print is smaller
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
@@ -94,7 +94,7 @@ def latex_table(table: DataTable) -> str:
 def _widths(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> dict[Part, str]:
     """Of columns of many words in a longtable: what the others leave, the more the longer."""
     used = sum(_longest(part, table) + 3 for part in shown if part not in broken)
-    share = min(max(0.86 - used / _LINE, 0.36), 0.8)
+    share = min(max(0.9 - used / _NARROW, 0.3), 0.8)
     weights = {part: math.sqrt(_longest(part, table)) for part in broken}
     whole = sum(weights.values())
     return {
