@@ -94,7 +94,7 @@ def latex_table(table: DataTable) -> str:
 def _widths(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> dict[Part, str]:
     """Of columns of many words in a longtable: what the others leave, the more the longer."""
     used = sum(_longest(part, table) + 3 for part in shown if part not in broken)
-    share = min(max(0.9 - used / _NARROW, 0.3), 0.8)
+    share = min(max(0.85 - used / _NARROW, 0.3), 0.8)
     weights = {part: math.sqrt(_longest(part, table)) for part in broken}
     whole = sum(weights.values())
     return {
