@@ -58,12 +58,47 @@ _PARAMETERS = {
 }
 
 
+FAMILIES: Mapping[str, str] = {
+    "dual-process": "learner",
+    "corrective-alone": "corrective process alone",
+    "random-search": "random search",
+    "cma-es": "CMA-ES",
+    "nullspace-qp": "null-space control",
+    "posture-based": "posture plan",
+    "trajectory-optimisation": "trajectory plan",
+    "optimum": "search for the optimum",
+}
+"""What the built-in methods of one family are called together."""
+
+
+def family_of(label: str) -> str:
+    """The family of a method in words; of one that is not built in what its name begins with."""
+    first = re.split(r"[/ ]", one_line(label), maxsplit=1)[0]
+    return FAMILIES.get(first, first)
+
+
+def spoken_name(label: str) -> str:
+    """The name of a method with its variant as a sentence has it.
+
+    ``learner EC4``, ``null-space control (next goal)``.
+    """
+    name = short_name(label)
+    if label.startswith(LEARNER):
+        return f"{FAMILIES['dual-process']} {name}"
+    _, apart, rest = name.partition(": ")
+    return f"{family_of(label)} ({rest})" if apart and label in METHODS else name
+
+
 def short_name(label: str) -> str:
     """The name of a method with its variant as figures and printed tables show it.
 
-    Of a method that is not built in it is the label itself.
+    Of a method that is not built in it is the label itself. The learner's conditions together,
+    ``dual-process (EC1, EC4)``, are ``learner (EC1, EC4)``.
     """
-    method, _, variant = one_line(label).partition(" ")
+    label = one_line(label)
+    if label.startswith(f"{LEARNER.rstrip('/')} ("):
+        return label.replace(LEARNER.rstrip("/"), FAMILIES["dual-process"], 1)
+    method, _, variant = label.partition(" ")
     name = METHODS[method].short if method in METHODS else method
     for key, words in _PARAMETERS.items():
         variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)

@@ -23,6 +23,7 @@ from analysis.comparisons.overall import combined, normalised_scores, over_tasks
 from analysis.comparisons.pairs import compared, pairs_table
 from analysis.comparisons.pareto import pareto_sets
 from analysis.comparisons.progress import best_so_far
+from analysis.comparisons.reached import reached
 from analysis.comparisons.targets import targets
 from analysis.generality.exploration import Contrast, contrasts
 from analysis.generality.presence import Signs, signs
@@ -91,6 +92,7 @@ class Study:
     best_so_far = cached_property(best_so_far)
     anytime = cached_property(anytime_curves)
     targets = cached_property(targets)
+    reached = cached_property(reached)
     areas = cached_property(areas)
     pareto = cached_property(pareto_sets)
     signature_rows = cached_property(signature_rows)

@@ -106,6 +106,7 @@ def test_no_module_is_imported_but_undeclared():
     """Every third-party import is a declared dependency."""
     declared = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     aliases = {"pydantic_core": "pydantic", "llvmlite": "numba", "click": "typer", "PIL": "pillow"}
+    aliases["vl_convert"] = "vl-convert-python"
     for path in sources():
         for name in imported(path):
             root = name.split(".")[0]

@@ -29,11 +29,13 @@ from analysis.report.document import (
     Prose,
     Row,
     Section,
+    Strip,
+    Verdict,
 )
 from analysis.report.formats.csv import runs_csv, table_csv
-from analysis.report.formats.html import MOST_ROWS, html
+from analysis.report.formats.html import MOST_ROWS, WIDTHS, html
 from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
-from analysis.report.formats.latex import PACKAGES, latex_table, latex_text
+from analysis.report.formats.latex import PACKAGES, is_long, latex_table, latex_text
 from analysis.report.formats.markdown import markdown
 from analysis.report.formats.terminal import terminal_table
 from analysis.report.summary import without_variants
@@ -211,14 +213,76 @@ def test_a_cell_holds_a_value_with_its_small_print():
     assert "<td>−465.0<span></span></td>" in rows[2]
 
 
-def test_long_tables_are_scrolled_until_asked_for():
+def test_longer_tables_have_a_field_to_search_and_all_their_rows():
     rows = tuple(replace(TABLE.rows[0], key=f"row {k}") for k in range(MOST_ROWS + 1))
     for shown, long in ((rows[:-1], 0), (rows, 1)):
-        page = Document("t", (Section("a", "A", (replace(TABLE, rows=shown),)),),
-                        runs=document().runs)  # fmt: skip
+        table = replace(TABLE, rows=shown)
+        page = Document("t", (Section("a", "A", (table,)),), runs=document().runs)
         text = html(page)
-        assert text.count('<input type="checkbox">') == long
-        assert text.count('<th scope="row">') == len(shown)  # all of them are there
+        assert text.count(" data-rows=") == long
+        assert text.count('<th scope="row"') == len(shown)  # all of them are there
+        assert "overflow" not in re.search(r"<table.*?</table>", text, re.S)[0]
+
+
+def test_rows_of_one_kind_stay_together():
+    kinds = ("b", "a", "b")
+    rows = tuple(
+        replace(TABLE.rows[0], key=f"row {k}", group=kind) for k, kind in enumerate(kinds)
+    )
+    page = Document("t", (Section("a", "A", (replace(TABLE, rows=rows),)),), runs=document().runs)
+    bodies = re.findall(r"<tbody>.*?</tbody>", html(page), re.S)
+    assert [re.search(r'scope="rowgroup"[^>]*>(.)<', body)[1] for body in bodies] == ["b", "a"]
+    assert [body.count('scope="row"') for body in bodies] == [2, 1]
+
+
+def test_narrow_pages_show_rows_as_cards_with_every_head():
+    text = html(document())
+    for place, column in enumerate(TABLE.columns[1:], 2):
+        head = re.search(rf'#methods-shelf td:nth-child\({place}\){{--head:"(.*?)"}}', text)[1]
+        said = re.sub(r"\\([0-9a-f]{6})", lambda m: chr(int(m[1], 16)), head)
+        assert said.startswith(column.header)
+    widths = [int(width) for width in re.findall(r'<table[^>]* class="w(\d+)"', text)]
+    assert widths
+    assert set(widths) <= set(WIDTHS)
+    for width in WIDTHS[:-1]:
+        assert f"(max-width: {width}rem)" in text
+
+
+def test_findings_strips_and_charts():
+    verdicts = (
+        Verdict("One <b>", "supported", "good", "#s"),
+        Verdict("Two", "cannot tell", "open", "#s"),
+    )
+    strips = [
+        Strip("named", "Named", verdicts),
+        Strip("squares", "Squares", verdicts, counted=True),
+    ]
+    chart = json.dumps({"mark": "</script>", "config": {}})
+    figure = FigureBlock("line", "A line", "It rises.", "x", SVG, chart=chart)
+    section = Section("s", "S", (*strips, figure), finding="**Found** it.")
+    shown = Document("t", (section,))
+    text = html(shown)
+    page = Page(text)
+    assert "<strong>Found</strong> it." in text
+    assert "One &lt;b&gt;<small>supported</small>" in text
+    assert "1 supported" in text
+    assert "1 cannot tell" in text
+    assert [a["aria-label"] for a in page.all("a") if "aria-label" in a] == [
+        "One <b> Supported.",
+        "Two Cannot tell.",
+    ]
+    data = re.search(r'<script type="application/json">(.*?)</script>', text)[1]
+    assert json.loads(data) == json.loads(chart)
+    # Readable without scripts: the drawing is there and shown, the chart's place is not.
+    assert 'class="still' in text
+    place = next(div for div in page.all("div") if div.get("class") == "chart")
+    assert "hidden" in place
+    assert "vegaEmbed" in text
+    assert "vegaLite" not in html(document())  # which has no chart to draw
+    told = markdown(shown)
+    assert "**Found** it." in told
+    assert "One \\<b>: supported; Two: cannot tell" in told
+    assert "1 supported, 1 cannot tell" in told
 
 
 def test_folds_hold_their_content_and_links_lead_there():
@@ -226,10 +290,11 @@ def test_folds_hold_their_content_and_links_lead_there():
     inner = Section("below", "Below", (Prose(("Hidden words.",)),), folded=True)
     text = html(Document("t", (Section("a", "A", (table,), (inner,)),), runs=document().runs))
     page = Page(text)
-    folds = re.findall(r"<details><summary>.*?</details>", text, re.S)
-    assert len(folds) == 2
-    assert '<table id="methods-shelf" aria-labelledby="methods-shelf-caption">' in folds[0]
-    assert '<th scope="row"><a href="#below">' in folds[0]
+    main = text[text.index("<main") :]
+    folds = re.findall(r'<details(?: class="table")?><summary>.*?</details>', main, re.S)
+    assert len(folds) == 3  # the lists of runs as well
+    assert 'aria-labelledby="methods-shelf-caption">' in folds[0]
+    assert re.search(r'<th scope="row"[^>]*><a href="#below">', folds[0])
     assert folds[1].startswith('<details><summary><h3 id="below">Below</h3></summary>')
     assert "Hidden words." in folds[1]
     assert not page.all("caption")  # the summary names it
@@ -450,7 +515,8 @@ def test_tables_longer_than_a_page_are_continued():
     assert text.count("squared changes (other arm still") == 90  # as figures name them
     assert "trajectory-optimisation" not in text
     assert "unseen" not in text
-    short = replace(LONG, rows=LONG.rows[:MOST_LATEX])
+    assert is_long(replace(LONG, rows=LONG.rows[:MOST_LATEX]))  # of two lines each
+    short = replace(LONG, rows=LONG.rows[:8])
     assert r"\begin{table}" in latex_table(short)
     assert r"\begin{tabularx}" in latex_table(short)
     few = latex_table(replace(short, columns=LONG.columns[1:2], rows=(Row("a", (1.0,)),)))

@@ -50,7 +50,7 @@ def test_interrupted_while_it_writes(interrupted, monkeypatch, tmp_path):
     monkeypatch.setattr("coartic.files.publish", interrupt)
     assert interrupted("analyse", tmp_path) == f"interrupted; {WITHIN.format(tmp_path)}\n"
 
-    def write(made, study, out, *, begin):
+    def write(made, study, out, *, printed, begin):
         begin()
         interrupt()
 

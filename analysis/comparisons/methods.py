@@ -30,6 +30,12 @@ TOLD = {
     Information.SECONDARY_OBJECTIVES: "S",
 }
 """A letter for each kind of information, in the order in which the tables show them."""
+INFORMED = {
+    Information.REWARD_FORMULA: "told the reward as a formula",
+    Information.REWARD_BY_TRIAL: "told each trial's reward",
+}
+"""What a method is told of the reward, the most first, in words."""
+UNTOLD = "not told the reward"
 _SPENT = (
     *("trials", "movement_ticks", "forward_kinematics", "jacobians"),
     *("solver_iterations", "build_s"),
@@ -78,6 +84,12 @@ class MethodRow(Cell):
     """:func:`solve_times`."""
     evaluations: float
     """Forward kinematics and Jacobians together."""
+
+
+def informed(told: str) -> str:
+    """What letters of :data:`TOLD` say that a method knows of the reward, in words."""
+    known = (words for item, words in INFORMED.items() if TOLD[item] in told)
+    return next(known, UNTOLD)
 
 
 def method_rows(study: Study) -> dict[CellKey, MethodRow]:

@@ -43,7 +43,32 @@ REACHED: Mapping[str, Reached] = {"gap": "at most", "score": "above"}
 """Which side of a threshold a profile counts."""
 _ENDINGS = ("", "_low", "_high", "_note")
 _CONDITION = re.compile(re.escape(LEARNER) + r"(EC\d)(.*)")
+_VARIANT = re.compile(r"=|\bEC\d-")
 _ONE_ARMED, _TWO_ARMED = "EC1", ("EC4", "EC3")
+
+
+def ends(study: Study) -> dict[str, tuple[float, int]]:
+    """Rewards of the initial solution and of the optimum by task, where there is a way between.
+
+    The initial solution is the corrective process alone with the task's initial hands, the
+    optimum that with all joints free.
+    """
+    alone = study.results.sequences.set_index(["task", "hands"]).reward
+    found = {}
+    for name, task in study.tasks.items():
+        best = study.optima.get((name, "free"))
+        start = alone.get((name, initial_hands(task, model=study.model)))
+        if best is None or pd.isna(start):
+            continue
+        # Nothing to fall short of, or to gain; or a search that missed the optimum: no scale.
+        if best.reward != 0 and best.reward > start:
+            found[name] = float(start), best.reward
+    return found
+
+
+def variant(label: str) -> bool:
+    """Whether it was run with parameters of its own, or is an ablation of the learner."""
+    return bool(_VARIANT.search(label))
 
 
 def normalised_scores(study: Study) -> pd.DataFrame:
@@ -56,15 +81,11 @@ def normalised_scores(study: Study) -> pd.DataFrame:
     with all joints free and the corrective process alone with the task's initial hands. A
     run without a solution has NaN for all three.
     """
-    parts = []
-    alone = study.results.sequences.set_index(["task", "hands"]).reward
+    parts, known = [], ends(study)
     for cell in study.cells.values():
-        best = study.optima.get((cell.task, "free"))
-        start = alone.get((cell.task, initial_hands(study.tasks[cell.task], model=study.model)))
-        if best is None or start is None or pd.isna(start):
+        if cell.task not in known:
             continue
-        if best.reward == 0 or best.reward <= start:
-            continue  # nothing to fall short of, or to gain; or a search that missed the optimum
+        start, best = known[cell.task]
         rewards = cell.runs.reward.where(cell.runs.status == "ok")
         values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
         own = {
@@ -72,8 +93,8 @@ def normalised_scores(study: Study) -> pd.DataFrame:
             "run": cell.runs.run.to_numpy(),
             "seed": cell.runs.seed.to_numpy(),
             "reward": values,
-            "score": normalised(values, float(start), best.reward),
-            "gap": gap_share(values, best.reward),
+            "score": normalised(values, start, best),
+            "gap": gap_share(values, best),
         }
         parts.append(pd.DataFrame(own))
     columns = ["task", "method", "label", "run", "seed", "reward", "score", "gap"]

@@ -150,17 +150,12 @@ def configurations(
             shown += [learned_solution(study, task, label, run) for run in found]
     figure = _draw(shown)
     tasks = {solution.task.name: solution.task for solution in shown}
-    named = "; ".join(
-        f"{solution.task.name}, {solution.name}: run {solution.run_id}"
-        for solution in shown
-        if solution.method
-    )
     totals = "; ".join(
         f"{s.task.label}, {s.name}, total {style.number(-s.execution.ticks)}" for s in shown
     )
     labels = ", ".join(task.label for task in tasks.values())
     of = {"tasks": labels, "which": _TYPICAL if sequences == 1 else _BY_SEQUENCE, "like": like}
-    of |= {"named": named, "totals": totals}
+    of |= {"totals": totals}
     return worded("configurations", figure, _data(shown), tasks.values(), id=id, **of)
 
 

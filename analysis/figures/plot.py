@@ -13,6 +13,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.text import Text
 from PIL import Image
 
@@ -162,10 +163,12 @@ def _smaller(stream: io.BytesIO, ending: str) -> bytes:
 
 def _settle(figure: Figure) -> None:
     """Lay the figure out once, for all formats, with words that print."""
+    if isinstance(engine := figure.get_layout_engine(), PlaceHolderLayoutEngine):
+        return
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         text.set_text("\n".join(map(printed, text.get_text().split("\n"))))
-    if figure.get_layout_engine() is not None:
+    if engine is not None:
         for _ in range(2):  # the first time does not know how tall titles are
             figure.draw_without_rendering()
         figure.set_layout_engine("none")

@@ -15,8 +15,11 @@ from analysis.figures.families import exploration_by_family, gaps_by_family
 from analysis.figures.frontier import frontier
 from analysis.figures.learning_curves import learning_curves
 from analysis.figures.plot import Plot
+from analysis.figures.postures import postures
+from analysis.figures.price import price
 from analysis.figures.profiles import profiles
 from analysis.figures.published import published
+from analysis.figures.ranking import ranking
 from analysis.figures.recruitment import recruitment
 from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
@@ -27,6 +30,7 @@ from coartic import CoarticError
 from coartic.text import did_you_mean
 
 Section = Literal[
+    "answers",
     "tasks-drawn",
     "families",
     "paper",
@@ -72,6 +76,9 @@ REGISTER = (
     Entry("signatures", signature_matrix, "coarticulation", by_task=True),
     Entry("frontier", frontier, "cost"),
     Entry("profiles", profiles, "methods"),
+    Entry("postures", postures, "answers"),
+    Entry("ranking", ranking, "answers"),
+    Entry("price", price, "answers"),
 )
 """The paper's figures in its order, and the others."""
 

@@ -143,6 +143,7 @@ def task_panels(
         axes.set_axis_off()
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
         axes.set_title(heading(task))
+        axes.tick_params(labelbottom=True)  # also where an axis is shared
         axes.set_ylabel("" if place % columns else up)
         axes.set_xlabel(across if place + columns >= len(tasks) else "")
     shown = panels[: len(tasks)]

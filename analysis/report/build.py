@@ -14,6 +14,18 @@ from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.figures.register import Section as FigureSection
 from analysis.generality.sample import one_by_one
 from analysis.markup import escaped, words
+from analysis.report.answers import (
+    answers,
+    cells_found,
+    claims_found,
+    context_found,
+    hands_found,
+    limits_found,
+    pace_found,
+    price,
+    winners,
+)
+from analysis.report.charts import charts
 from analysis.report.document import (
     Block,
     Bullets,
@@ -25,6 +37,7 @@ from analysis.report.document import (
     Section,
 )
 from analysis.report.formats.csv import table_csv
+from analysis.report.glossary import glossary
 from analysis.report.headlines import headline_numbers
 from analysis.report.limitations import limitations
 from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
@@ -35,25 +48,28 @@ from analysis.report.pages.frontier import cost_tables, optima_known, reading_of
 from analysis.report.player import player_json
 from analysis.report.summary import (
     tasks_table,
-    unlike_printed,
     verdicts,
     version_text,
     without_variants,
 )
 from analysis.report.tables.common import table_ids
 from analysis.report.tables.contexts import contexts_table, slopes_tables
+from analysis.report.tables.main import main_methods, main_verdicts
 from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
 from analysis.report.tables.paper import beside_paper
 from analysis.report.tables.signatures import signatures_tables
 from analysis.report.trace_file import FILE, trace_json
 from analysis.report.write import check_report_folder, write_report
 from analysis.results.folder import Results
+from analysis.signatures.register import REGISTER
 from analysis.study import Study
 from coartic import CoarticError
 from coartic.text import counted
 
 MOST_TASKS = 8
 """More would make a report that nobody reads."""
+_MANY_PARTS = 4
+"""Things that a sentence of a limitation lists: from so many on they are a list."""
 CLAIMS = "claims-register"
 """Id of the section of the claims."""
 _FORMATS = {".pdf": "PDF", ".svg": "SVG", ".png": "PNG", ".csv": "CSV (the data behind it)"}
@@ -105,33 +121,50 @@ def report_tables(study: Study) -> dict[str, pd.DataFrame]:
 def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
     """The sections that have something to show; without figures and films where None."""
 
-    def drawn(section: FigureSection) -> list[Block]:
+    def drawn(section: FigureSection) -> list[FigureBlock]:
         plots = [] if figures is None else figures.of_section(section)
+        chart_of = charts(study, {plot.id: plot.data for plot in plots})
         return [
-            FigureBlock(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot))
+            FigureBlock(
+                *(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot)),
+                chart=chart_of.get(plot.id, ""),
+            )
             for plot in plots
         ]
 
+    limits = limitations(study)
+    pictures = {picture.id: picture for picture in drawn("answers")}
+    player = None if figures is None else _player(study)
     sections = (
-        _summary(study),
+        answers(study, pictures, player),
         families_section(study, drawn("families")),
-        _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
-        _section("paper", "Published and ours", [*drawn("paper"), *_tables(*beside_paper(study))]),
+        _section(
+            "tasks-drawn", "Tasks", drawn("tasks-drawn"), [tasks_table(study)], _facts(study)
+        ),
+        _section("paper", "Paper", drawn("paper"), beside_paper(study), cells_found(study)),
         _claims(study, {} if figures is None else figures.like_the_paper),
-        *([] if figures is None else [_movements(study, drawn("movements"))]),
-        _section("learning", "Learning", drawn("learning")),
+        _section("movements", "Movements", drawn("movements"), (), hands_found(study)),
+        _section("learning", "Learning", drawn("learning"), (), pace_found(study)),
         _methods(study, drawn("methods")),
         _cost(study, drawn("cost")),
         _signatures(study, drawn("coarticulation")),
-        _section("limitations", "Limitations", [Bullets(limitations(study))]),
+        Section("limitations", "Limitations", (), _limits(limits), finding=limits_found(limits)),
+        Section("glossary", "Glossary", (Bullets(glossary()),), folded=True),
     )
     return (section for section in sections if section.blocks or section.sections)
 
 
 def write(
-    report: Report, study: Study, folder: Path, *, begin: Callable[[], object] = lambda: None
+    report: Report,
+    study: Study,
+    folder: Path,
+    *,
+    printed: bool = False,
+    begin: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a report into ``folder`` (page, Markdown, tables, figures, numbers, traces).
+
+    ``printed``: also the page as a PDF.
 
     ``begin`` is called when all is made and nothing written.
     Raises CoarticError where it cannot be written, or something is in the way.
@@ -146,7 +179,7 @@ def write(
     figures: dict[str, bytes] = {}
     for plot in report.plots:
         figures |= rendered(plot, endings=report.formats)
-    write_report(report.document, figures, folder, extra, begin=begin)
+    write_report(report.document, figures, folder, extra, printed=printed, begin=begin)
 
 
 def _title(results: Results) -> str:
@@ -163,33 +196,19 @@ def _lead(results: Results) -> str:
     )
 
 
-def _summary(study: Study) -> Section:
+def _facts(study: Study) -> str:
     results = study.results
     failed = int((results.runs.status != "ok").sum())
     runs, labels = counted(len(results.runs), "run"), {label for _, label in results.cells}
-    facts = (
+    return (
         f"{counted(len(results.tasks), 'task')}, {counted(len(labels), 'method')} with their "
         f"variants, {counted(len(results.cells), 'cell')}; "
         + (f"{failed} of {runs} have no solution." if failed else "every run has a solution.")
     )
-    unlike = unlike_printed(study)
-    items = verdicts(study.judged, CLAIMS).items
-    if unlike:
-        note = f"Not as printed: {escaped('; '.join(unlike))} ([table](#published-and-ours))."
-        items = (*items, note)
-    blocks: list[Block] = [
-        Prose((facts,)),
-        *_tables(tasks_table(study), folded=_many(study)),
-        Bullets(items),
-    ]
-    overall = overall_table(study)
-    if overall is not None:
-        blocks += _tables(*without_variants(overall))
-    return _section("summary", "Summary", blocks)
 
 
-def _movements(study: Study, figures: list[Block]) -> Section:
-    player = PlayerBlock(
+def _player(study: Study) -> PlayerBlock:
+    return PlayerBlock(
         "player",
         "Movements, tick by tick",
         "Of each method the run nearest its median reward, beside the initial solution. "
@@ -197,68 +216,109 @@ def _movements(study: Study, figures: list[Block]) -> Section:
         "filled goals are hit.",
         player_json(study),
     )
-    return _section("movements", "Movements", [player, *figures])
+
+
+def _limits(items: Sequence[str]) -> tuple[Section, ...]:
+    """Each limitation below its first words; what lists many things as a list."""
+    found = []
+    for number, item in enumerate(items, 1):
+        title, _, text = item.strip("*").partition(".* ")
+        text = text or item
+        said, colon, listed = text.partition(": ")
+        parts = listed.split("; ")
+        blocks: list[Block] = [Prose((text,))]
+        if colon and len(parts) >= _MANY_PARTS:
+            blocks = [Prose((f"{said}:",)), Bullets(tuple(parts))]
+        found.append(Section(f"limit-{number}", words(title), tuple(blocks), folded=True))
+    return tuple(found)
 
 
 def _by_task(
-    study: Study, name: str, blocks_of: Callable[[str], Sequence[Block]]
+    study: Study, name: str, what: str, blocks_of: Callable[[str], Sequence[Block]]
 ) -> Iterator[Section]:
-    """A section a task, where there is something to show of it."""
+    """A folded section a task, where there is something to show of it."""
     alone = one_by_one(study)
     for task, slug in table_ids(study).items():
         if task not in alone:
             continue  # the section of families has them together
         blocks = blocks_of(task)
         if blocks:
-            yield _section(f"on-{slug}-{name}", task, blocks)
+            title = f"{study.tasks[task].label}: {what}"
+            yield Section(f"on-{slug}-{name}", title, tuple(blocks), folded=True)
 
 
-def _methods(study: Study, figures: list[Block]) -> Section:
+def _methods(study: Study, figures: Sequence[Block]) -> Section:
     pairs = not _many(study)
 
     def of(task: str) -> list[Block]:
-        blocks = _tables(methods_table(study, task))
+        tables = [methods_table(study, task)]
         if pairs:
-            both = pairwise_table(study, task), cost_table(study, task)
-            blocks += _tables(*both, folded=True)
-        return blocks
+            tables += [pairwise_table(study, task), cost_table(study, task)]
+        return _tables(*tables)
 
     reading = reading_of_methods(study)
     if study.pair_rows and pairs:
         reading += reading_of_pairs(study)
-    below = _by_task(study, "methods", of)
-    return _section("methods", "Methods side by side", [*figures, Bullets(reading)], below)
+    overall = overall_table(study)
+    below = (
+        Section(
+            "methods-read", "How the tables of methods are read", (Bullets(reading),), folded=True
+        ),
+        *_by_task(study, "methods", "every method", of),
+    )
+    tables = (main_methods(study), *(without_variants(overall) if overall else ()))
+    return _section("methods", "Methods", figures, tables, winners(study), below)
 
 
-def _cost(study: Study, figures: list[Block]) -> Section:
-    title = "Reward and what it costs"
+def _cost(study: Study, figures: Sequence[Block]) -> Section:
+    title = "Cost"
     if _many(study):
         return _section("cost", title, figures)
 
     def of(task: str) -> list[Block]:
         found = list(cost_tables(study, task))
-        folded = [replace(table, folded=True) for table in found[1:]]
-        return [optima_known(study, task), *found[:1], *folded] if found else []
+        return [optima_known(study, task), *_tables(*found)] if found else []
 
-    reading = Bullets(reading_of_cost())
-    return _section("cost", title, [*figures, reading], _by_task(study, "cost", of))
+    below = (
+        Section(
+            "cost-read",
+            "How the tables of cost are read",
+            (Bullets(reading_of_cost()),),
+            folded=True,
+        ),
+        *_by_task(study, "cost", "reward and cost", of),
+    )
+    return _section("cost", title, figures, (), price(study), below)
 
 
-def _signatures(study: Study, figures: list[Block]) -> Section:
+def _signatures(study: Study, figures: Sequence[Block]) -> Section:
     short = _many(study)
 
     def of(task: str) -> list[Block]:
         return _tables(*signatures_tables(study, task, short=short))
 
-    between = _tables(contexts_table(study), *slopes_tables(study))
-    title, below = "Signatures of coarticulation", _by_task(study, "signatures", of)
-    return _section("coarticulation", title, [*figures, *between], below)
+    between = (contexts_table(study), *slopes_tables(study))
+    meanings = Bullets(tuple(f"**{escaped(s.name)}**: {s.meaning}" for s in REGISTER.values()))
+    below = (
+        Section("signatures-read", "What each signature says", (meanings,), folded=True),
+        *_by_task(study, "signatures", "signatures", of),
+    )
+    title = "Signatures"
+    return _section("coarticulation", title, figures, between, context_found(study), below)
 
 
 def _claims(study: Study, figures: Mapping[str, str]) -> Section:
     found = [claim_section(entry, figures) for entry in study.judged]
+    counts = verdicts(study.judged)
     each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(found), folded=True)
-    return _section(CLAIMS, "Claims", _tables(claims_table(study)), [each])
+    table = claims_table(study)
+    return Section(
+        CLAIMS,
+        "Claims",
+        (counts, *_tables(main_verdicts(study), table)),
+        (each,),
+        finding=claims_found(study),
+    )
 
 
 def _about(
@@ -288,7 +348,7 @@ def _about(
             "no tables of pairs, targets, areas, Pareto sets and further signatures by task, and "
             "no figures of signatures; `coartic analyse` writes all of them as CSV."
         )
-    return _section("about", "Tracing and citing", [Bullets(tuple(items))])
+    return Section("about", "Citing", (Bullets(tuple(items)),))
 
 
 def _many(study: Study) -> bool:
@@ -296,10 +356,25 @@ def _many(study: Study) -> bool:
 
 
 def _section(
-    name: str, title: str, blocks: Sequence[Block], below: Iterable[Section] = ()
+    name: str,
+    title: str,
+    figures: Sequence[Block],
+    tables: Iterable[DataTable | None] = (),
+    finding: str = "",
+    below: Iterable[Section] = (),
 ) -> Section:
-    return Section(name, title, tuple(blocks), tuple(below))
+    """What was found, one figure, then folded: further figures, tables and what is below."""
+    more: list[Section] = []
+    if figures[1:]:
+        titles = "; ".join(
+            figure.title for figure in figures[1:] if isinstance(figure, FigureBlock)
+        )
+        more = [
+            Section(f"{name}-figures", f"More figures: {titles}", tuple(figures[1:]), folded=True)
+        ]
+    blocks = (*figures[:1], *_tables(*tables))
+    return Section(name, title, blocks, (*more, *below), finding=finding)
 
 
-def _tables(*found: DataTable | None, folded: bool = False) -> list[Block]:
-    return [replace(table, folded=folded or table.folded) for table in filter(None, found)]
+def _tables(*found: DataTable | None) -> list[Block]:
+    return [replace(table, folded=True) for table in filter(None, found)]

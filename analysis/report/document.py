@@ -123,6 +123,8 @@ class Row:
     """Rows of one name are a family; by default all rows of a table."""
     link: str = ""
     """Address within the page that the row's name leads to."""
+    group: str = ""
+    """What a page says above rows of one kind, which it keeps together."""
 
     @property
     def all_cells(self) -> set[CellKey]:
@@ -184,6 +186,37 @@ class FigureBlock:
     """What the figure shows, in plain text, for who cannot see it."""
     svg: str
     """An SVG document."""
+    chart: str = ""
+    """A specification of Vega-Lite as JSON, which a page of HTML shows in the place of the SVG
+    where scripts are on; empty where there is none."""
+
+
+Tone = Literal["good", "bad", "open", "plain"]
+"""Whether a verdict is in favour, against, undecided, or none."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One outcome among several, in words."""
+
+    name: str
+    """Of what it was judged, in plain text."""
+    verdict: str
+    """In plain text."""
+    tone: Tone
+    link: str = ""
+    """Address within the page that says more."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Verdicts beside each other, in words and colours: a picture made of text."""
+
+    id: str
+    title: str
+    verdicts: tuple[Verdict, ...]
+    counted: bool = False
+    """Whether there are so many that a page shows one square each, and the words by count."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +231,7 @@ class PlayerBlock:
     """JSON as :func:`analysis.report.player.player_json` makes it."""
 
 
-Block = Prose | Bullets | DataTable | FigureBlock | PlayerBlock
+Block = Prose | Bullets | DataTable | FigureBlock | PlayerBlock | Strip
 
 
 @dataclass(frozen=True)
@@ -211,6 +244,10 @@ class Section:
     sections: tuple[Section, ...] = ()
     folded: bool = False
     """Whether a page shows its title alone until more is asked for."""
+    finding: str = ""
+    """What was found, in a sentence or two below the title, in inline markup."""
+    cards: bool = False
+    """Whether its subsections stand beside each other, where a page has room."""
 
     def walk(self) -> Iterator[Section]:
         """This section and all below it, in order."""

@@ -82,31 +82,39 @@ function polyline(points) {
   return points.map(([x, y]) => `${x.toFixed(3)},${(-y).toFixed(3)}`).join(" ");
 }
 
+/* What is in sight of points, with a margin: left, bottom, right, top. */
+function around(points, margin = 0) {
+  const [x, y] = [0, 1].map((axis) => points.map((point) => point[axis]));
+  const least = (values) => values.reduce((a, b) => Math.min(a, b)) - margin;
+  const most = (values) => values.reduce((a, b) => Math.max(a, b)) + margin;
+  return [least(x), least(y), most(x), most(y)];
+}
+
 /* One side: a choice of movement, its picture and what is to be said of it. */
 class Panel {
-  constructor(parent, id, side, changed) {
+  constructor(parent, choices, id, side, changed) {
     this.side = side;
-    const root = element("div", { class: "panel" }, parent);
-    element("label", { for: `${id}-${side}`, text: `${side === "left" ? "Left" : "Right"} picture` }, root);
-    this.select = element("select", { id: `${id}-${side}` }, root);
+    const choice = element("span", {}, choices);
+    element("label", { for: `${id}-${side}`, text: side === "left" ? "First " : "Second " }, choice);
+    this.select = element("select", { id: `${id}-${side}` }, choice);
     this.select.addEventListener("change", changed);
+    const root = element("div", { class: "panel" }, parent);
     this.svg = element("svg:svg", { role: "img" }, root);
     this.facts = element("p", { class: "facts" }, root);
-    this.run = element("p", { class: "run" }, root);
   }
 
-  offer(task, wanted) {
+  offer(task, wanted, first) {
     this.select.replaceChildren();
     const add = (parent, value, text) => element("option", { value, text }, parent);
     const group = element("optgroup", { label: "Initial: corrective process alone" }, this.select);
     task.initials.forEach((initial, k) => add(group, `i${k}`, `initial ${initial.hands} (−${initial.ticks})`));
     if (!task.initials.length) group.remove();
     const methods = element("optgroup", { label: "Methods" }, this.select);
-    task.movements.forEach((movement, k) => add(methods, `m${k}`, `${movement.label} (−${movement.ticks})`));
+    task.movements.forEach((movement, k) => add(methods, `m${k}`, `${movement.name} (−${movement.ticks})`));
     const same = task.movements.findIndex((movement) => movement.label === wanted);
     if (same >= 0) this.select.value = `m${same}`;
     else if (this.side === "left" && task.initials.length) this.select.value = "i0";
-    else this.select.value = "m0";
+    else this.select.value = `m${first}`;
   }
 
   get label() {
@@ -119,24 +127,25 @@ class Panel {
     this.task = task;
     this.movement = decode(list[Number(this.select.value.slice(1))], task.unit, dof);
     this.trails = Object.fromEntries(task.hands.map((hand) => [hand, []]));
+    const seen = [...task.goals];
     for (let row = 0; row <= this.movement.rows.at(-1); row += 1) {
       const points = arms(task.robot, configuration(this.movement, row));
-      task.hands.forEach((hand) => this.trails[hand].push(points[hand].at(-1)));
+      task.hands.forEach((hand) => {
+        this.trails[hand].push(points[hand].at(-1));
+        seen.push(...points[hand]);
+      });
     }
-    this.draw();
+    this.seen = around(seen);
     const { label, run, runs, hands, ticks } = this.movement;
     this.svg.setAttribute("aria-label",
       `Robot on ${task.label}: ${label || "initial movement"}, hands ${hands}, reward −${ticks}`);
-    this.run.textContent = "";
-    if (run) {
-      this.run.append(runs > 1 ? `nearest the median of ${runs} runs: ` : "run ");
-      element("code", { text: run }, this.run);
-    } else this.run.append("corrective process alone, no learning");
+    const of = run ? `${runs > 1 ? `nearest the median of ${runs} runs: ` : "run "}${run}` : "corrective process alone, no learning";
+    this.facts.title = of;
+    this.head = label ? this.movement.name : `initial ${hands}`;
   }
 
-  draw() {
-    const { box, goals, radius, below, hands } = this.task;
-    const [left, bottom, right, top] = box;
+  draw([left, bottom, right, top]) {
+    const { goals, radius, below, hands } = this.task;
     const size = Math.max(right - left, top - bottom);
     this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
     this.svg.style.setProperty("--stroke", size / 260);
@@ -193,9 +202,8 @@ class Panel {
       ? `reward ${reward(now.ticks)}, goal ${now.hit + 1} with the ${now.hand} hand`
       : `reward ${reward(now.ticks)}, all goals hit`;
     this.facts.replaceChildren();
-    const [figure, ...rest] = this.words.split(", ");
-    element("strong", { text: figure }, this.facts);
-    this.facts.append(`, ${rest.join(", ")}`);
+    element("strong", { text: this.head }, this.facts);
+    this.facts.append(`: ${this.words}`);
   }
 }
 
@@ -213,17 +221,30 @@ class Player {
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     this.build(root, root.id);
     this.choose();
+    /* Played once when it is first seen, unless less motion is asked for. */
+    if (!this.calm.matches && "IntersectionObserver" in window) {
+      const seen = new IntersectionObserver((entries) => {
+        if (!entries.some((entry) => entry.isIntersecting)) return;
+        seen.disconnect();
+        if (!this.spent) this.play();
+      }, { threshold: 0.6 });
+      seen.observe(root);
+    } else this.go(this.last);
   }
 
   build(root, id) {
-    const first = element("div", { class: "controls" }, root);
-    element("label", { for: `${id}-task`, text: "Task" }, first);
-    this.task = element("select", { id: `${id}-task` }, first);
-    this.data.tasks.forEach((task, k) => element("option", { value: k, text: task.label }, this.task));
-    this.task.addEventListener("change", () => this.choose());
     const both = element("div", { class: "panels" }, root);
     const load = () => this.load();
-    this.panels = ["left", "right"].map((side) => new Panel(both, id, side, load));
+    const folded = element("details", { class: "choices" });
+    element("summary", { text: "Choose task, movements, speed" }, folded);
+    const choices = element("div", { class: "controls" }, folded);
+    const first = element("span", {}, choices);
+    element("label", { for: `${id}-task`, text: "Task " }, first);
+    this.task = element("select", { id: `${id}-task` }, first);
+    this.data.tasks.forEach((task, k) => element("option", { value: k, text: task.label }, this.task));
+    this.task.value = this.data.first ? this.data.first.task : 0;
+    this.task.addEventListener("change", () => this.choose());
+    this.panels = ["left", "right"].map((side) => new Panel(both, choices, id, side, load));
     const controls = element("div", { class: "controls" }, root);
     this.button = element("button", { type: "button", class: "play", text: "Play" }, controls);
     this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
@@ -234,21 +255,22 @@ class Player {
     step("◂", "One tick back", -1);
     step("▸", "One tick on", 1);
     const ticks = element("span", { class: "ticks" }, controls);
-    element("label", { for: `${id}-tick`, text: "Tick" }, ticks);
-    this.slider = element("input", { type: "range", id: `${id}-tick`, min: 0, step: 1, value: 0 }, ticks);
+    this.slider = element("input", { type: "range", "aria-label": "Tick", min: 0, step: 1, value: 0 }, ticks);
     this.slider.addEventListener("input", () => { this.pause(); this.go(Number(this.slider.value)); });
     this.count = element("span", { class: "count" }, ticks);
-    const speed = element("span", {}, controls);
+    const speed = element("span", {}, choices);
     element("label", { for: `${id}-speed`, text: "Speed " }, speed);
     this.speed = element("select", { id: `${id}-speed` }, speed);
     [15, 30, 60, 120, 240].forEach((rate) => element("option", { value: rate, text: `${rate} ticks/s` }, this.speed));
     this.speed.value = "60";
+    root.append(folded);
     this.status = element("p", { class: "unseen", role: "status", "aria-live": "polite" }, root);
   }
 
   choose() {
-    const task = this.data.tasks[Number(this.task.value)];
-    this.panels.forEach((panel) => panel.offer(task, panel.label));
+    const at = Number(this.task.value);
+    const first = this.data.first && this.data.first.task === at ? this.data.first.movement : 0;
+    this.panels.forEach((panel) => panel.offer(this.data.tasks[at], panel.label, first));
     this.load();
   }
 
@@ -256,6 +278,9 @@ class Player {
     const task = this.data.tasks[Number(this.task.value)];
     this.pause();
     this.panels.forEach((panel) => panel.load(task));
+    const corners = this.panels.flatMap(({ seen }) => [seen.slice(0, 2), seen.slice(2)]);
+    const box = around(corners, 0.4);
+    this.panels.forEach((panel) => panel.draw(box));
     this.last = Math.max(...this.panels.map((panel) => panel.movement.ticks));
     this.slider.max = this.last;
     this.go(0);

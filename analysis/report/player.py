@@ -8,6 +8,7 @@ where it was at every control tick; hits are kept by tick, exactly.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.figures.robot import numbered_below
+from analysis.methods import LEARNER, spoken_name
 from analysis.report.document import CellKey
 from analysis.signatures.trajectories import Trajectories
 from analysis.study import Study
@@ -33,7 +35,7 @@ from coartic.text import json_text
 
 TOLERANCE = 0.005
 """Length unit by which a joint may be off at any tick."""
-_MARGIN = 0.4  # length unit around all that is shown
+_CONDITION = re.compile(rf"{LEARNER}EC\d")
 
 
 def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
@@ -47,7 +49,20 @@ def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
         _task(study.results.tasks[name], study, [cell for cell in chosen if cell[0] == name])
         for name in dict.fromkeys(name for name, _ in chosen)
     ]
-    return json_text({"tasks": [task for task in tasks if task["movements"]]}, allow_nan=False)
+    shown = [task for task in tasks if task["movements"]]
+    return json_text({"tasks": shown, "first": _first(shown)}, allow_nan=False)
+
+
+def _first(tasks: list[dict[str, Any]]) -> dict[str, Any]:
+    """What is played first: the task and the learner's movement that gained most, as a share."""
+    gains = [
+        ((task["initials"][0]["ticks"] - movement["ticks"]) / task["initials"][0]["ticks"], at, k)
+        for at, task in enumerate(tasks)
+        for k, movement in enumerate(task["movements"])
+        if task["initials"] and _CONDITION.fullmatch(movement["label"])
+    ]
+    _, task, movement = max(gains, default=(0.0, 0, 0), key=lambda found: found[0])
+    return {"task": task, "movement": movement}
 
 
 def nearest_to_median(cell: Trajectories) -> int:
@@ -107,7 +122,12 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
         hands = (
             str(first) if isinstance(first, str) and first else _initial_hands(task, study.model)
         )
-        head = {"label": key[1], "run": str(row.run_id), "runs": len(cell.runs)}
+        head = {
+            "label": key[1],
+            "name": spoken_name(key[1]),
+            "run": str(row.run_id),
+            "runs": len(cell.runs),
+        }
         if hands and hands not in initials:
             execution = corrective_trial(task, hands, model=study.model)
             if execution.completed:
@@ -115,7 +135,6 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
         if hands in initials:
             head["initial"] = hands
         chosen.append((head, cell.runs[index]))
-    shown = [*initials.values(), *(run for _, run in chosen)]
     unit = rounding_unit(task.robot)
     return {
         "name": task.name,
@@ -129,7 +148,6 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
             "left": _arm(task.robot.left_shoulder, task.robot.left_links),
             "right": _arm(task.robot.right_shoulder, task.robot.right_links),
         },
-        "box": _box(task, shown),
         "unit": unit,
         "initials": [_movement({"hands": hands}, run, unit) for hands, run in initials.items()],
         "movements": [_movement(head, run, unit) for head, run in chosen],
@@ -158,15 +176,3 @@ def _movement(head: dict[str, Any], run: Trajectory, unit: float) -> dict[str, A
         "rows": np.diff(rows, prepend=0).tolist(),
         "frames": np.diff(frames, axis=0, prepend=0).ravel().tolist(),
     }
-
-
-def _box(task: Task, runs: list[Trajectory]) -> list[float]:
-    """What must be in sight: left, bottom, right, top; length unit."""
-    robot, clouds = task.robot, [task.goal_array]
-    for run in runs:
-        q = run.configurations
-        joints = (robot.joint_positions(q, hand) for hand in task.hands)
-        clouds += [cloud.reshape(-1, 2) for cloud in (robot.base_outline(q), *joints)]
-    points = np.concatenate(clouds)
-    corners = [points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN]
-    return [round(float(value), 2) for value in np.concatenate(corners)]

@@ -22,7 +22,7 @@
   name();
 
   const contents = document.querySelector("#contents details");
-  if (window.matchMedia("(max-width: 64rem)").matches) contents.open = false;
+  if (window.matchMedia("(max-width: 56rem)").matches) contents.open = false;
 
   /* A link to something folded away unfolds it. */
   const reveal = () => {
@@ -40,4 +40,26 @@
   });
   window.addEventListener("afterprint", () => folded.forEach((at) => { at.open = false; }));
   if (window.location.hash) reveal();
+
+  /* Charts in the place of the drawings of the same data. */
+  document.querySelectorAll("figure .chart").forEach((place) => {
+    const still = place.parentElement.querySelector(".still");
+    const text = place.nextElementSibling.textContent;
+    let said = JSON.parse(text);
+    place.hidden = false;
+    still.hidden = true;
+    if (place.clientWidth < 480) { // names and legends give way to what is drawn
+      const brief = new Map();
+      JSON.parse(text, (key, value) => {
+        if (value && value.brief) brief.set(value.name, value.brief);
+        return value;
+      });
+      said = JSON.parse(text, (key, value) => brief.get(value) ?? value);
+      Object.assign(said.config.axis, { labelLimit: 132 });
+      Object.assign(said.config.legend, { columns: 1 });
+      said.config.text = { limit: 118 };
+    }
+    window.vegaEmbed(place, said, { renderer: "svg", actions: false, tooltip: { theme: "custom" } })
+      .catch(() => { place.hidden = true; still.hidden = false; });
+  });
 })();

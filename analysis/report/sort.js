@@ -1,5 +1,5 @@
 "use strict";
-/* Sorts tables by a click on a column's header: up, down, then as they were. */
+/* Sorts tables by a click on a column's header: up, down, then as they were; searches them. */
 
 const POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 
@@ -30,8 +30,8 @@ function order(keys, words, down) {
 }
 
 function sortable(table) {
-  const body = table.tBodies[0];
-  const first = [...body.rows];
+  /* Rows of one kind stay together. */
+  const kinds = [...table.tBodies].map((body) => ({ body, first: [...body.rows].filter((row) => row.className !== "group") }));
   const heads = [...table.tHead.rows[0].cells];
   /* Without small print: the value alone. */
   const key = (cell) => {
@@ -48,13 +48,37 @@ function sortable(table) {
       const next = { none: "ascending", ascending: "descending" }[head.getAttribute("aria-sort") || "none"];
       heads.forEach((other) => other.removeAttribute("aria-sort"));
       if (next) head.setAttribute("aria-sort", next);
-      const keys = first.map((row) => key(row.cells[column]));
-      const words = head.classList.contains("text") && column === 0;
-      const places = next ? order(keys, words, next === "descending") : keys.map((_, place) => place);
-      body.append(...places.map((place) => first[place]));
+      kinds.forEach(({ body, first }) => {
+        const keys = first.map((row) => key(row.cells[column]));
+        const words = head.classList.contains("text") && column === 0;
+        const places = next ? order(keys, words, next === "descending") : keys.map((_, place) => place);
+        body.append(...places.map((place) => first[place]));
+      });
     });
   });
 }
 
+/* A field above a longer table: rows without all of its words are hidden. */
+function searchable(table) {
+  const root = document.createElement("label");
+  root.className = "search";
+  const field = document.createElement("input");
+  const count = document.createElement("span");
+  field.type = "search";
+  count.setAttribute("aria-live", "polite");
+  root.append("Search ", field, count);
+  table.before(root);
+  const rows = [...table.tBodies].flatMap((body) => [...body.rows]).filter((row) => row.className !== "group");
+  field.addEventListener("input", () => {
+    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const said = (row) => `${row.textContent} ${row.cells[0].title}`.toLowerCase();
+    rows.forEach((row) => { row.hidden = !words.every((word) => said(row).includes(word)); });
+    count.textContent = words.length ? `${rows.filter((row) => !row.hidden).length} of ${rows.length} rows` : "";
+  });
+}
+
 if (typeof module !== "undefined") module.exports = { value, order };
-else document.querySelectorAll("main table").forEach((table) => { if (table.tBodies[0].rows.length > 1) sortable(table); });
+else document.querySelectorAll("main table").forEach((table) => {
+  if (table.tBodies[0].rows.length > 1) sortable(table);
+  if (table.dataset.rows) searchable(table);
+});

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.claims.register import Judged, Verdict
+from analysis.comparisons.overall import variant
 from analysis.comparisons.paper import paper_rows
 from analysis.methods import LEARNER
 from analysis.published import published_cell
@@ -21,7 +22,6 @@ from coartic.record import Environment
 from coartic.text import counted
 
 _CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
-_VARIANT = re.compile(r"=|\bEC\d-")
 _VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell", "measured")
 
 
@@ -66,8 +66,8 @@ def tasks_table(study: Study) -> DataTable | None:
     return layout.table(rows)
 
 
-def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
-    """The paper's claims counted by verdict; ``claims`` is the id of the section with them."""
+def verdicts(judged: Sequence[Judged]) -> Bullets:
+    """The paper's claims counted by verdict."""
     paper = [entry for entry in judged if entry.claim.place]
     items = []
     for fitted, name in (
@@ -75,18 +75,11 @@ def verdicts(judged: Sequence[Judged], claims: str) -> Bullets:
         (True, "no independent tests, as they rest on reconstructed tasks †"),
     ):
         found = Counter(entry.verdict for entry in paper if entry.claim.fitted == fitted)
-        number = counted(found.total(), "claim")
         counts = ", ".join(f"{found[verdict]} {verdict}" for verdict in _VERDICTS)
-        items.append(f"[{number} of the paper](#{claims}), {name}: {counts}.")
-    refuted = [entry for entry in paper if entry.verdict == "not supported"]
-    if refuted:
-        names = ", ".join(f"[{e.claim.id}](#claim-{e.claim.id})" for e in refuted)
-        items.append(f"Not supported here: {names}.")
+        items.append(f"{counted(found.total(), 'claim')} of the paper, {name}: {counts}.")
     beyond = len(judged) - len(paper)
     if beyond:
-        items.append(
-            f"[{counted(beyond, 'comparison')}](#{claims}) that the paper does not make: measured."
-        )
+        items.append(f"{counted(beyond, 'comparison')} that the paper does not make: measured.")
     return Bullets(tuple(items))
 
 
@@ -117,8 +110,8 @@ def without_variants(of: DataTable) -> tuple[DataTable, DataTable | None]:
 
     Variants are what was run with other parameters, and ablations of the learner.
     """
-    variants = tuple(row for row in of.rows if _VARIANT.search(row.key))
-    kept = tuple(row for row in of.rows if not _VARIANT.search(row.key))
+    variants = tuple(row for row in of.rows if variant(row.key))
+    kept = tuple(row for row in of.rows if not variant(row.key))
     if not variants or not kept:
         return of, None
     caption = f"{of.caption.removesuffix('.')}: variants of parameters, ablations."

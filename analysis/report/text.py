@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from analysis.report.document import Column, DataTable, Estimate, Row, Value
+from analysis.report.document import Column, DataTable, Estimate, Row, Strip, Tone, Value
 from analysis.words import NO_SPREAD, NONE, true_minus, typographic
+
+METHOD_COLUMNS = frozenset({"method", "first", "second"})
+"""Names of columns that hold methods with their variants, shown by their short names."""
 
 
 @dataclass(frozen=True)
@@ -135,3 +140,23 @@ def number_text(value: float, column: Column) -> str:
             return f"<{10.0**-digits:.{digits}f}"
         return shown.removeprefix("-")
     return shown
+
+
+def tallied(strip: Strip) -> Mapping[str, int]:
+    """How often each verdict was given, in the order in which they come first."""
+    return Counter(verdict.verdict for verdict in strip.verdicts)
+
+
+_TONES: Mapping[str, Tone] = {
+    "supported": "good",
+    "equivalent": "good",
+    "not supported": "bad",
+    "different": "bad",
+    "cannot tell": "open",
+    "undecided": "open",
+}
+
+
+def tone_of(verdict: str) -> Tone:
+    """Whether a verdict is in favour or against, marks behind it left aside."""
+    return _TONES.get(verdict.removesuffix(" †"), "plain")

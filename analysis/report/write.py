@@ -11,6 +11,7 @@ from analysis.report.formats.csv import runs_csv, table_csv
 from analysis.report.formats.html import html
 from analysis.report.formats.latex import latex_inputs, latex_table
 from analysis.report.formats.markdown import markdown
+from analysis.report.pdf import pdf
 from coartic import CoarticError
 from coartic.files import REPORT, check_folder, publish
 
@@ -33,9 +34,10 @@ def write_report(
     folder: Path,
     extra: Mapping[str, str] | None = None,
     *,
+    printed: bool = False,
     begin: Callable[[], object] = lambda: None,
 ) -> None:
-    """Write a report into ``folder``, in the place of an earlier one.
+    """Write a report into ``folder``, in the place of an earlier one, with a PDF if ``printed``.
 
     ``report.html`` stands alone; ``report.md`` links to ``figures/`` with ``figures``: contents
     by file name, at least ``ID.svg`` of each; ``tables/`` holds CSV and LaTeX, ``tables.tex``
@@ -59,5 +61,7 @@ def write_report(
         texts[f"tables/{table.id}.tex"] = latex_table(table)
     files = {f"figures/{name}": data for name, data in figures.items()}
     files |= {name: text.encode() for name, text in texts.items()}
+    if printed:
+        files["report.pdf"] = pdf(files["report.html"])
     begin()
     publish(folder, files, owner=REPORT, alone=True)

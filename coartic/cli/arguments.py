@@ -61,6 +61,12 @@ SuiteName = Annotated[
 ResultsFolder = Annotated[
     Path, typer.Argument(parser=folder_named, help="Results folder, such as results/all.")
 ]
+Results = Annotated[
+    Path,
+    typer.Argument(
+        parser=folder_named, metavar="DIR", help="Results folder, or an archive of one (.zip)."
+    ),
+]
 RunId = Annotated[str, typer.Argument(help="Id of a run, or its beginning.")]
 Records = Annotated[
     Path, typer.Option("--in", parser=folder_named, help="Folder to look for the run in.")

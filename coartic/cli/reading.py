@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace as replace_field
 from pathlib import Path
 from typing import Annotated
 
@@ -42,7 +43,13 @@ def analyse(folder: given.ResultsFolder) -> None:
 
 
 def report(
-    folder: given.ResultsFolder,
+    folder: given.Results,
+    other: Annotated[
+        Path | None,
+        typer.Argument(
+            parser=folder_named, metavar="[DIR_B]", help="A second one, to stand beside it."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(parser=folder_named, help="Folder to write; DIR/report by default."),
@@ -57,31 +64,85 @@ def report(
     formats: Annotated[
         str, typer.Option(help="Files of each figure: svg and any of pdf, png, csv.")
     ] = "pdf,svg,png,csv",
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Also the page as report.pdf, by a browser that is here.")
+    ] = False,
 ) -> None:
     """Write a report: page with player, tables, figures, numbers for LaTeX, traces.
 
-    A folder that holds anything else than an earlier report, unchanged, is refused.
+    A folder that holds anything else than an earlier report, unchanged, is refused. With a
+    second results folder, or an archive, the page begins with both side by side.
     """
-    out = folder / "report" if out is None else out
+    archived = folder.is_file()
+    if out is None:
+        out = folder.with_suffix("") / "report" if archived else folder / "report"
     if_interrupted(f"nothing is written in {out}")  # also not while this is imported
+    from analysis.comparisons.versions import compare_versions
     from analysis.figures.plot import FILES
+    from analysis.report.beside import beside
     from analysis.report.build import build, write
     from analysis.report.write import check_report_folder
+    from analysis.results.archive import opened
     from analysis.study import load
 
     started = time.monotonic()
     endings = endings_in(formats, FILES)
-    study = load(folder)
-    check_report_folder(out, folder)
     labels = None if methods is None else labels_in(methods, "--methods")
-    made = build(study, labels, endings)
-    write(made, study, out, begin=lambda: writing(out))
+    with opened(folder) as first, opened(folder if other is None else other) as second:
+        study = load(first)
+        check_report_folder(out, first)
+        made = build(study, labels, endings)
+        if other is not None:
+            against = load(second)
+            found = compare_versions(study, against)
+            made = replace_field(made, document=beside(made.document, study, against, found))
+        write(made, study, out, printed=pdf, begin=lambda: writing(out))
     if_interrupted(f"the report is written in {out}")
+    took, tables = time.monotonic() - started, counted(len(made.document.tables()), "table")
     say(
-        f"{out / 'report.html'} is the report, made in {time.monotonic() - started:.0f} s. Beside "
-        f"it: report.md, {counted(len(made.document.tables()), 'table')} (tables/, CSV and "
-        f"LaTeX), {counted(len(made.plots), 'figure')} (figures/, as {formats}), numbers.tex."
+        f"{out / 'report.html'} is the report, made in {took:.0f} s. Beside it: report.md, "
+        f"{'report.pdf, ' * pdf}{tables} (tables/, CSV and LaTeX), "
+        f"{counted(len(made.plots), 'figure')} (figures/, as {formats}), numbers.tex."
     )
+
+
+def pack(
+    folder: given.ResultsFolder,
+    out: Annotated[
+        Path | None, typer.Option(help="Archive to write (.zip); DIR.zip by default.")
+    ] = None,
+    replace: given.Replace = False,
+) -> None:
+    """Write a results folder into one file, with checksums, for others to read and compare.
+
+    It holds tables and records alone, and nothing that runs when it is opened.
+    """
+    from analysis.results.archive import pack as packed
+
+    path = folder.with_suffix(".zip") if out is None else out
+    if path.suffix.lower() != ".zip":
+        raise CoarticError(f"--out {path}: the name must end in .zip")
+    if_interrupted(f"nothing is written in {path}")
+    digest = packed(folder, path, replace=replace)
+    size = path.stat().st_size / 1e6
+    say(f"{path} holds the results ({size:.1f} MB). SHA-256 of its list: {digest}.")
+    say(f"`coartic verify {path}` checks it, `coartic report {path}` reports it.")
+
+
+def verify(folder: given.Results) -> None:
+    """Check a results folder or an archive: checksums, tables, every solution executed again."""
+    from analysis.results.archive import opened
+    from analysis.results.folder import load_results
+
+    with opened(folder) as found:
+        results = load_results(found)
+        runs, cells = counted(len(results.runs), "run"), counted(len(results.cells), "cell")
+        suite = results.manifest.specification.suite
+    say(
+        f"{folder} agrees with itself: {runs} of suite {suite}, {cells}. Tables follow from the "
+        "records, and every solution, executed again, gets the reward that is stored."
+    )
+    say("That the runs were made as they say, only doing them again shows: `coartic reproduce`.")
 
 
 def trace(
@@ -117,6 +178,7 @@ def compare(
     from analysis.comparisons.versions import compare_versions, load_pair
     from analysis.report.formats.markdown import markdown
     from analysis.report.pages.versions import versions_document
+    from analysis.results.archive import opened
     from coartic.files import check_outputs, write_outputs
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
@@ -125,7 +187,8 @@ def compare(
     if out is not None and csv is None:
         csv = out.with_suffix(".csv")
     check_outputs(filter(None, (out, csv)), replace=replace)
-    found = compare_versions(*load_pair(first, second))
+    with opened(first) as a, opened(second) as b:
+        found = replace_field(compare_versions(*load_pair(a, b)), folders=(first, second))
     document = versions_document(found)
     texts = {out: markdown(document, tables=""), csv: found.cells.to_csv(index=False)}
     written = {path: text.encode() for path, text in texts.items() if path is not None}
@@ -170,4 +233,4 @@ def cite(
     say(*text.rstrip("\n").split("\n"))
 
 
-COMMANDS = (analyse, report, trace, compare, cite)
+COMMANDS = (analyse, report, trace, compare, pack, verify, cite)

@@ -8,26 +8,29 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.resources import files
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from markupsafe import Markup, escape
 
 from analysis.markup import inline
-from analysis.report.document import CellKey, Document, FigureBlock, PlayerBlock, Row
+from analysis.methods import LEARNER, short_name
+from analysis.report.document import CellKey, DataTable, Document, FigureBlock, PlayerBlock, Row
 from analysis.report.formats.templates import on_one_line, template
-from analysis.report.text import Part, by_column
+from analysis.report.text import METHOD_COLUMNS, Part, by_column, tallied, tone_of
 from analysis.words import NONE, true_minus
 from coartic.text import one_line
 
-_MAGNIFIED = 1.5
+_MAGNIFIED = 1.35
 _WIDE, _READABLE = 320.0, 1.4  # pt; CSS pixels per pt that text of 7 pt needs
 _WORD, _SENTENCE = 18, 60  # characters: up to one stays on a line, beyond the other has room
 
-MOST_ROWS = 15
-"""Rows of a table that are shown at once; the rest is scrolled to, or asked for."""
-MOST_LISTED = 12
-"""Subsections of one section that the contents show."""
+MOST_ROWS = 8
+"""Rows of a table above which it has a field to search them."""
+WIDTHS = (24, 32, 40, 48, 56, 64, 72, 999)
+"""Of tables, rem: pages narrower than a table's show its rows as cards."""
+_RUNS = 4.0  # rem of the last column, which leads to the runs
 MOST_LINKS = 4
 """Stretches of run lists linked from one row."""
 
@@ -38,6 +41,7 @@ def html(document: Document) -> str:
     Raises ValueError where a figure's SVG has no ``viewBox``.
     """
     players = any(isinstance(block, PlayerBlock) for block in document.blocks())
+    charts = any(figure.chart for figure in document.figures())
     styles = _resource("report.css") + (_resource("player.css") if players else "")
     script = _resource("report.js") + f"(() => {{\n{_resource('sort.js')}}})();\n"
     if players:
@@ -45,7 +49,7 @@ def html(document: Document) -> str:
     page = template(
         "page.html.jinja",
         *(inline, true_minus, by_column, small_print, cell_view, stretches, is_wide),
-        *(inlined_svg, script_data),
+        *(inlined_svg, script_data, tallied, width_of, heads_of, by_group, is_learner),
         autoescape=True,
         finalize=on_one_line,
     )
@@ -54,8 +58,9 @@ def html(document: Document) -> str:
         numbers={cell: number for number, cell in enumerate(document.runs, 1)},
         styles=Markup(styles),
         script=Markup(script),
+        vega=Markup(vega() if charts else ""),
+        widths=WIDTHS,
         most_rows=MOST_ROWS,
-        most_listed=MOST_LISTED,
         most_links=MOST_LINKS,
     )
 
@@ -70,10 +75,74 @@ def small_print(own: list[Part]) -> str:
     return " ".join(filter(None, (small[part.kind] for part in own)))
 
 
+def width_of(table: DataTable) -> int:
+    """Which of :data:`WIDTHS` a table needs, roughly; the last is wider than any page.
+
+    Where there is less room each row stands as a card of its own.
+    """
+    wide = sum(map(_width_of_column, ([table, own] for own in by_column(table))))
+    return next((width for width in WIDTHS if wide + _RUNS <= width), WIDTHS[-1])
+
+
+def _width_of_column(of: Any) -> float:
+    """In rem, of text at 0.85 rem."""
+    table, own = of
+    column = own[0].column
+    longest = {
+        part.kind: max((len(part.text(row.values[part.index])) for row in table.rows), default=0)
+        for part in own
+    }
+    beside = longest["value"] + (longest.get("sd", -3) + 3)
+    if column.kind == "text":
+        beside = min(beside, _WORD if longest["value"] <= _SENTENCE else 2 * _WORD)
+    head = max(map(len, own[0].header.split()), default=0)
+    return 0.5 * max(beside, 0.85 * longest.get("interval", 0), head) + 0.9
+
+
+def heads_of(table: DataTable) -> Markup:
+    """What each column is, as styles: a card names its values so."""
+    rules = (
+        f'#{table.id} td:nth-child({place}){{--head:"{_css(own[0].header)}"}}'
+        for place, own in enumerate(by_column(table)[1:], 2)
+    )
+    return Markup("\n".join(rules))
+
+
+def _css(text: str) -> str:
+    """Text within a string of CSS, which nothing in it ends."""
+    return re.sub(r"[^\w .,()%±/–−-]", lambda m: f"\\{ord(m[0]):06x}", one_line(text))
+
+
+def by_group(rows: Iterable[Row]) -> list[tuple[str, list[Row]]]:
+    """Rows of one kind together, in the order of the first of each."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.group, []).append(row)
+    return list(found.items())
+
+
+def is_learner(row: Row) -> bool:
+    """Whether it is of the paper's learner, which a page marks."""
+    return any(label.startswith(LEARNER) for _, label in row.cells) and LEARNER.rstrip("/") in str(
+        row.key
+    )
+
+
+@cache
+def vega() -> str:
+    """What draws the charts: Vega, Vega-Lite and Vega-Embed in one script (BSD-3-Clause)."""
+    import vl_convert
+
+    script: str = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+    return script.replace("</script", "<\\/script")
+
+
 class CellView(NamedTuple):
     """What a table shows in one place."""
 
     text: str
+    title: str
+    """What is said on hover; empty where there is nothing."""
     sd: str | None
     """None where the column has none, empty where this value has none."""
     interval: str
@@ -91,9 +160,18 @@ def cell_view(row: Row, own: list[Part]) -> CellView:
     length, kind = len(str(value or "")), ""
     if column.kind == "text":
         kind = "word" if length <= _WORD else "text" if length <= _SENTENCE else "text sentence"
+    if column.name == "verdict":
+        kind = f"{kind} {tone_of(str(value or ''))}".strip()
     cells = row.cells_by_column.get(column.name, ())
+    text = shown["value"]
+    name = short_name(text) if column.name in METHOD_COLUMNS and text != NONE else text
     return CellView(
-        breakable(shown["value"]), small.get("sd"), small.get("interval", ""), kind, cells
+        breakable(name),
+        text if name != text else "",
+        small.get("sd"),
+        small.get("interval", ""),
+        kind,
+        cells,
     )
 
 
@@ -150,6 +228,6 @@ def inlined_svg(figure: FigureBlock) -> Markup:
     )
 
 
-def script_data(player: PlayerBlock) -> Markup:
+def script_data(data: str) -> Markup:
     """JSON within a script element, which only "<" could end."""
-    return Markup(player.data.replace("<", "\\u003c"))
+    return Markup(data.replace("<", "\\u003c"))

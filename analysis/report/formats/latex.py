@@ -8,6 +8,7 @@ column of text; their columns of many words share two fifths of the line.
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 import tomllib
@@ -18,7 +19,8 @@ from analysis.markup import inline
 from analysis.methods import short_name
 from analysis.report.document import DataTable, Document, Value
 from analysis.report.formats.templates import LATEX, template
-from analysis.report.text import Part, parts
+from analysis.report.tables.main import MAIN
+from analysis.report.text import METHOD_COLUMNS, Part, parts
 from analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
 
@@ -28,24 +30,36 @@ _ESCAPES: dict[str, str] = _TABLE["characters"] | {
     for form, pairs in _TABLE["forms"].items()
     for character, said in re.findall(r"(\S) (\S+)", pairs)
 }
-MOST_ROWS = 35
-"""Of a float; a table with more is continued on the next page."""
+MOST_ROWS = 38
+"""Lines of a float, notes among them; a table with more is continued on the next page."""
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
+_LINE, _NARROW = 105, 70  # characters of small print that a line holds, and a narrow one
+_MANY = 10  # columns from which on the print is smaller
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
-_LABELS = {"method", "first", "second"}  # columns of methods with their variants
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
 
 def latex_inputs(document: Document) -> str:
     """A file that inputs all tables from ``tables/``."""
-    inputs = "".join(f"\\input{{tables/{table.id}.tex}}\n" for table in document.tables())
+    tables = {table.id: table for table in document.tables()}
+    main = [name for name in MAIN if name in tables]
+    parts = [_input(tables[name]) for name in main]
+    rest = [table for name, table in tables.items() if name not in main]
+    if main and rest:
+        parts.append("\\clearpage % the supplement, in the order of its numbers\n")
+    inputs = "".join([*parts, *map(_input, rest)])
     return (
         f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
         f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
         + inputs
     )
+
+
+def _input(table: DataTable) -> str:
+    # A table over several pages does not float: those before it are set first.
+    return ("\\clearpage\n" if is_long(table) else "") + f"\\input{{tables/{table.id}.tex}}\n"
 
 
 def latex_table(table: DataTable) -> str:
@@ -54,13 +68,15 @@ def latex_table(table: DataTable) -> str:
     Numbers are in S columns as wide as they need, text and intervals beside them.
     """
     shown = [part for part in parts(table) if part.column.printed]
-    broken, long = _broken(shown, table), len(table.rows) > MOST_ROWS
-    width = f"p{{{0.4 / max(len(broken), 1):.2f}\\linewidth}}" if long else "X"
+    broken, long = _broken(shown, table), is_long(table)
+    widths = _widths(shown, broken, table) if long else {}
     return template("table.tex.jinja", **LATEX).render(
         id=table.id,
         caption=_spans(table.caption),
         kinds="".join(
-            rf">{{\raggedright\arraybackslash}}{width}" if part in broken else _kind(part, table)
+            rf">{{\raggedright\arraybackslash}}{widths.get(part, 'X')}"
+            if part in broken
+            else _kind(part, table)
             for part in shown
         ),
         head=" & ".join(_head(part, table) for part in shown),
@@ -68,9 +84,36 @@ def latex_table(table: DataTable) -> str:
             " & ".join(_cell(part, row.values[part.index]) for part in shown) for row in table.rows
         ],
         notes=map(_spans, table.notes),
+        size="scriptsize" if len(shown) >= _MANY else "footnotesize",
+        gap="1.5pt" if len(shown) >= _MANY else "3pt",
         broken=broken,
         long=long,
     )
+
+
+def _widths(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> dict[Part, str]:
+    """Of columns of many words in a longtable: what the others leave, the more the longer."""
+    used = sum(_longest(part, table) + 3 for part in shown if part not in broken)
+    share = min(max(0.85 - used / _NARROW, 0.3), 0.8)
+    weights = {part: math.sqrt(_longest(part, table)) for part in broken}
+    whole = sum(weights.values())
+    return {
+        part: f"p{{{share * weight / whole:.2f}\\linewidth}}" for part, weight in weights.items()
+    }
+
+
+def is_long(table: DataTable) -> bool:
+    """Whether it has more lines than a float holds, as far as is known before it is set."""
+    shown = [part for part in parts(table) if part.column.printed]
+    broken = _broken(shown, table)
+    used = sum(_longest(part, table) + 2 for part in shown if part not in broken)
+    each = max((_LINE - used) / max(len(broken), 1), _WORD)
+    lines = sum(
+        max((-(-len(_words(part, row.values[part.index])) // each) for part in broken), default=1)
+        for row in table.rows
+    )
+    notes = sum(len(note) / _LINE for note in table.notes)
+    return lines + notes > MOST_ROWS
 
 
 def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
@@ -99,7 +142,7 @@ def _head(part: Part, table: DataTable) -> str:
 def _words(part: Part, value: Value) -> str:
     """A value as it is printed, before LaTeX."""
     text = part.text(value)
-    return short_name(text) if part.column.name in _LABELS and text != NONE else text
+    return short_name(text) if part.column.name in METHOD_COLUMNS and text != NONE else text
 
 
 def latex_text(text: str) -> str:

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from analysis.markup import markdown as inline_markdown
 from analysis.markup import markdown_text
-from analysis.report.document import Document, Row
+from analysis.report.document import Document, Row, Strip
 from analysis.report.formats.templates import template
-from analysis.report.text import Part, parts
+from analysis.report.text import Part, parts, tallied
 from coartic.text import one_line
 
 
@@ -18,7 +18,9 @@ def markdown(document: Document, tables: str = "tables") -> str:
     ``tables``: folder beside it with each table as CSV, which the tables name; empty where
     there is none.
     """
-    page = template("page.md.jinja", markdown_text, spans, parts, shown_texts, table_line)
+    page = template(
+        "page.md.jinja", markdown_text, spans, parts, shown_texts, table_line, told_verdicts
+    )
     return page.render(document=document, tables=tables).rstrip("\n") + "\n"
 
 
@@ -30,6 +32,13 @@ def spans(text: str) -> str:
 def shown_texts(row: Row, shown: Iterable[Part]) -> list[str]:
     """What a row shows in each of these parts of columns."""
     return [part.text(row.values[part.index]) for part in shown]
+
+
+def told_verdicts(strip: Strip) -> str:
+    """Each verdict in words, or how often each was given where they are counted."""
+    if strip.counted:
+        return ", ".join(f"{count} {words}" for words, count in tallied(strip).items())
+    return "; ".join(f"{verdict.name}: {verdict.verdict}" for verdict in strip.verdicts)
 
 
 def table_line(cells: Iterable[str]) -> str:

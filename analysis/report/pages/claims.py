@@ -59,7 +59,7 @@ def claims_document(study: Study) -> Document:
     return Document(
         "Claims",
         (
-            Section("verdicts", "Verdicts", (verdicts(study.judged, "verdicts"), *shown)),
+            Section("verdicts", "Verdicts", (verdicts(study.judged), *shown)),
             *(
                 Section(names[title], title, (), tuple(map(claim_section, own)))
                 for title, own in groups

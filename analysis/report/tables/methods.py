@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from analysis.comparisons.methods import TOLD, MethodRow
 from analysis.markup import escaped
@@ -18,6 +19,7 @@ from coartic.text import counted
 _METHODS, _OVERALL = LAYOUTS["methods"], LAYOUTS["across-tasks"]
 _WHOLE = ("trials", "movement_ticks", "forward_kinematics", "jacobians", "solver_iterations")
 """Medians that are shown whole."""
+_GROUPS = ("Methods, the best mean reward first", "Searches for the optimum: references")
 
 
 def reading_of_methods(study: Study) -> tuple[str, ...]:
@@ -53,7 +55,8 @@ def _method_row(study: Study, row: MethodRow) -> Row:
     key = row.task, row.label
     reward = mean_of(study.cells[key].good.reward)
     whole = {name: _whole(getattr(row, name)) for name in _WHOLE}
-    return _METHODS.row(row.label, row, (key,), method=row.label, reward=reward, **whole)
+    made = _METHODS.row(row.label, row, (key,), method=row.label, reward=reward, **whole)
+    return replace(made, group=_GROUPS[row.method.startswith(SEARCH)])
 
 
 def _optimum(study: Study, task: str) -> str:

@@ -1,0 +1,180 @@
+"""What coarticulation is: one goal, hit in another posture when another goal comes next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from analysis.figures import style
+from analysis.figures.plot import Plot, worded
+from analysis.figures.robot import MARKERS, box
+from analysis.figures.selection import CONDITIONS, chosen, missing
+from analysis.methods import spoken_name
+from analysis.study import Study
+from coartic import Hand, Task
+from coartic.robot import Array
+from coartic.task import hands_of
+
+_COLORS = (style.BLUE, style.VERMILLION)
+_RUNS: Any = {"linewidth": 0.4, "alpha": 0.25, "zorder": 1}
+
+
+@dataclass(frozen=True)
+class Contexts:
+    """A method's runs that hit one goal before either of two others."""
+
+    method: str
+    """Label."""
+    goal: int
+    """Number of the goal that both tasks have, from 1; the next one differs."""
+    tasks: tuple[Task, Task]
+    postures: tuple[Array, Array]
+    """Where each run hits it, ``(runs, dof)``; with the hand that most runs choose."""
+    hand: Hand
+    apart: float
+    """Distance of the mean postures, length unit and rad."""
+    hands_apart: float
+    """Distance of the hands in them, length unit."""
+    spreads: float
+    """The first in pooled SDs of the runs; NaN where there is none."""
+    p: float
+    """Of the permutation test; NaN where there is none."""
+
+
+def contexts(study: Study, methods: Sequence[str] | None = None) -> Contexts | None:
+    """The first goal that two tasks share before they differ, by the paper's learner if it ran.
+
+    None where no method has solved runs on two such tasks.
+    """
+    found = study.signatures
+    found = found[(found.signature == "context distance") & found.value.notna()]
+    if not len(found):
+        return None
+    labels = chosen(study, list(dict.fromkeys(found.task)), methods)
+    labels = [label for label in (*CONDITIONS, *labels) if label in set(found.label)]
+    found = found[found.label == (labels or list(found.label))[0]]
+    row = found.iloc[0]
+    label, goal = str(row.label), int(row.goal)
+    hand: Hand = "left" if row.hand == "left" else "right"
+    names = str(row.task), str(row.against)
+    both = [_postures(study, name, label, goal, hand) for name in names]
+    first, second = (study.tasks[name] for name in names)
+    ends = [first.robot.forward_kinematics(q.mean(axis=0), hand) for q in both]
+    same = study.signatures
+    same = same[(same.task == row.task) & (same.label == label) & (same["where"] == row["where"])]
+    of = same.set_index("signature")
+    spreads = of.loc["context dependence"] if "context dependence" in of.index else None
+    return Contexts(
+        label,
+        goal,
+        (first, second),
+        (both[0], both[1]),
+        hand,
+        float(row.value),
+        float(np.linalg.norm(ends[0] - ends[1])),
+        math.nan if spreads is None else float(spreads.value),
+        math.nan if spreads is None else float(spreads.p),
+    )
+
+
+def _postures(study: Study, task: str, label: str, goal: int, hand: Hand) -> Array:
+    runs = (run.execution for run in study.trajectories[task, label].runs)
+    alike = [run.configurations[goal - 1] for run in runs if hands_of(run.hands)[goal - 1] == hand]
+    return np.array(alike)
+
+
+@style.styled
+def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """The postures at one goal before two others, overlaid: all runs faint, their means strong.
+
+    Raises CoarticError where no method has solved runs on two tasks that share their first goals.
+    """
+    found = contexts(study, methods)
+    if found is None:
+        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+    figure = Figure(figsize=(style.ONE, 1.85), layout="constrained")
+    _draw(figure.subplots(), found)
+    first, second = found.tasks
+    facts: dict[str, Any] = {
+        "method": spoken_name(found.method),
+        "goal": found.goal,
+        "first": first.label,
+        "second": second.label,
+        "apart": f"{found.apart:.2f}",
+        "hands": f"{found.hands_apart:.2f}",
+    }
+    return worded("postures", figure, _data(found), found.tasks, **facts)
+
+
+def _draw(axes: Axes, found: Contexts) -> None:
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    shown = np.concatenate([q.mean(axis=0)[None] for q in found.postures])
+    low, high = box(found.tasks[0], shown)
+    goals = [np.array(task.goals[found.goal]) for task in found.tasks]
+    low, high = (
+        np.minimum(low, np.min(goals, axis=0) - 0.6),
+        np.maximum(high, np.max(goals, 0) + 0.6),
+    )
+    axes.set_xlim(low[0], high[0] + 1.5)
+    axes.set_ylim(low[1], high[1])
+    shared = found.tasks[0].goals[found.goal - 1]
+    for task, color, runs, (x, y) in zip(found.tasks, _COLORS, found.postures, goals, strict=True):
+        for q in runs:
+            axes.plot(*task.robot.joint_positions(q, found.hand).T, color=color, **_RUNS)
+        following = float(x), float(y)
+        mean = runs.mean(axis=0)
+        outline = task.robot.base_outline(mean)
+        axes.fill(*outline.T, facecolor=color, alpha=0.12, edgecolor=color, linewidth=0.8)
+        look = MARKERS[found.hand]
+        joints = task.robot.joint_positions(mean, found.hand).T
+        axes.plot(*joints, color=color, linewidth=1.6, zorder=3, **look)
+        axes.annotate(
+            "", following, shared, zorder=2,
+            arrowprops={"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4,
+                        "linewidth": 0.8, "linestyle": (0, (3, 2))},
+        )  # fmt: skip
+        axes.add_patch(Circle(following, task.radius, fill=False, edgecolor=color))
+        up = following[1] >= shared[1]
+        axes.annotate(
+            f"then goal {found.goal + 1}\n({task.label.lower()})", following, (5, 0),
+            textcoords="offset points", color=color, va="center", ha="left",
+        )  # fmt: skip
+        _base(axes, task, mean, color, above=up)
+    axes.add_patch(
+        Circle(shared, found.tasks[0].radius, fill=False, edgecolor=style.INK, linewidth=1.1)
+    )
+    axes.annotate(
+        f"goal {found.goal},\nthe same", shared, (7, 0), textcoords="offset points",
+        va="center", weight="bold",
+    )  # fmt: skip
+
+
+def _base(axes: Axes, task: Task, q: Array, color: str, *, above: bool) -> None:
+    """Which posture is which, at its base."""
+    outline = task.robot.base_outline(q)
+    place = outline.mean(axis=0)[0], outline[:, 1].max() if above else outline[:, 1].min()
+    axes.annotate(
+        task.label.lower(), place, (0, 3 if above else -3), textcoords="offset points",
+        color=color, ha="center", va="bottom" if above else "top",
+    )  # fmt: skip
+
+
+def _data(found: Contexts) -> pd.DataFrame:
+    """One row a run: task and posture at the shared goal."""
+    return pd.concat(list(_parts(found)), ignore_index=True)
+
+
+def _parts(found: Contexts) -> Iterator[pd.DataFrame]:
+    for task, runs in zip(found.tasks, found.postures, strict=True):
+        joints = dict(zip(task.robot.joint_names, runs.T, strict=True))
+        named = {"task": task.name, "method": found.method, "goal": found.goal}
+        yield pd.DataFrame({**named, "hand": found.hand, **joints})

@@ -1,0 +1,90 @@
+"""At what price: shares of targets reached within a budget, over runs and tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.comparisons.reached import WAY
+from analysis.figures import style
+from analysis.figures.frontier import NAMES
+from analysis.figures.plot import Plot, spoken, worded
+from analysis.figures.selection import CONDITIONS, HEADLINES, missing
+from analysis.methods import LEARNER, short_name
+from analysis.study import Study
+
+SHOWN = ("trials", "forward_kinematics")
+"""Spends that the printed figure has a panel of."""
+_BAND: Any = {"step": "post", "alpha": 0.15, "linewidth": 0}
+
+
+def look_alike(label: str) -> str:
+    """Whose look a method has: the learner over all tasks that of its two-armed condition."""
+    ends = (name for name in reversed(CONDITIONS) if name.removeprefix(LEARNER) in label)
+    return next(ends, label) if label.startswith(f"{LEARNER.rstrip('/')} (") else label
+
+
+def main_methods(data: pd.DataFrame) -> list[str]:
+    """Of the labels in ``data`` those that stand for their families, in the order of figures."""
+    labels = list(dict.fromkeys(data.method))
+    joint = [label for label in labels if label != look_alike(label)]
+    own = [label for label in HEADLINES if label in labels]
+    own = [label for label in own if not (joint and label.startswith(LEARNER))]
+    return [*joint[:1], *own] or labels
+
+
+@style.styled
+def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+    """Share of pairs of run and target reached, against trials and kinematics.
+
+    Raises CoarticError where no task has a known optimum beyond its initial solution.
+    """
+    data = study.reached
+    if methods is not None:
+        data = data[data.method.isin(methods)]
+    if not len(data):
+        raise missing(study, "no method has runs on a task with a known optimum")
+    task = data.task.iloc[-1]  # all together come last
+    shown = data[data.task == task]
+    labels = list(methods or main_methods(shown))
+    spends = [spend for spend in SHOWN if (shown.spend == spend).any()]
+    rows = -(-len(labels) // 4)
+    figure = Figure(figsize=(style.TWO, 2.2 + 0.15 * rows), layout="constrained")
+    panels = figure.subplots(1, len(spends), squeeze=False, sharey=True).ravel()
+    for axes, spend in zip(panels, spends, strict=True):
+        _panel(axes, shown[shown.spend == spend], labels, NAMES[spend])
+    panels[0].set_ylabel("targets reached (%)")
+    style.letters(panels)
+    looks = {label: style.looks([look_alike(label)])[look_alike(label)] for label in labels}
+    handles = [style.entry(short_name(label), **look.line) for label, look in looks.items()]
+    style.legend(figure, handles, 4)
+    ends = shown[(shown.spend == spends[0]) & shown.method.isin(labels)]
+    ends = ends.groupby("method", sort=False).tail(1)
+    return worded(
+        "price",
+        figure,
+        data,
+        study.tasks.values(),
+        targets=len(WAY),
+        over=task,
+        ends=spoken(ends.assign(share=100 * ends.share), "{method} {share:.0f} %"),
+    )
+
+
+def _panel(axes: Axes, data: pd.DataFrame, labels: Sequence[str], name: str) -> None:
+    style.log_axis(axes)
+    least = data.budget[data.budget > 0].min()
+    edge = least / 2
+    for label in labels:
+        own = data[data.method == label]
+        look = style.looks([look_alike(label)])[look_alike(label)]
+        x = own.budget.clip(lower=edge)
+        axes.step(x, 100 * own.share, where="post", **look.line)
+        axes.fill_between(x, 100 * own.low, 100 * own.high, color=look.color, **_BAND)
+    axes.set_xlim(edge, data.budget.max())
+    axes.set_ylim(-2, 102)
+    axes.set_xlabel(name)

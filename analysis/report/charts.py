@@ -1,0 +1,310 @@
+"""Charts to explore, as specifications of Vega-Lite, of the data that printed figures show.
+
+Altair states them; Vega draws them in the reader's browser, from a bundle that is part of the
+page (``html.py``). Text and axes have the page's ink, so that light and dark need no other chart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import altair as alt
+import pandas as pd
+
+from analysis.comparisons.methods import INFORMED, UNTOLD, informed
+from analysis.comparisons.progress import SPENDS
+from analysis.comparisons.reached import ALL_TASKS
+from analysis.figures import style
+from analysis.figures.frontier import NAMES
+from analysis.figures.price import look_alike, main_methods
+from analysis.figures.ranking import COLORS, GROUPS, Standing, learner
+from analysis.methods import family_of, short_name, spoken_name
+from analysis.study import Study
+from coartic.text import json_text
+
+_ANY = "all"
+_ROW, _TALL = 11, 200  # pixels: of a row, of the curves
+_APART = 7.0  # per cent of the axis between names at its end
+_INK = "currentColor"
+_SHORT = json_text(dict(zip(GROUPS, ("as a formula", "after each trial", "nothing"), strict=True)))
+_CONFIG: Any = {
+    "background": "transparent",
+    "font": "system-ui, -apple-system, Segoe UI, Roboto, Liberation Sans, sans-serif",
+    "view": {"stroke": "transparent"},
+    "axis": {
+        **{"labelColor": _INK, "titleColor": _INK, "domainColor": _INK, "tickColor": _INK},
+        **{"labelFontSize": 11, "titleFontSize": 11, "titleFontWeight": "normal"},
+        **{"gridColor": _INK, "gridOpacity": 0.12, "labelLimit": 260},
+    },
+    "legend": {
+        **{"labelColor": _INK, "titleColor": _INK, "labelFontSize": 11, "titleFontSize": 11},
+        **{"titleFontWeight": "normal", "labelLimit": 240},
+    },
+    "header": {"labelColor": _INK, "titleColor": _INK},
+}
+
+
+def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
+    """Specifications as JSON by the id of the figure whose data they show."""
+    makers: dict[str, Callable[[Study, pd.DataFrame], Any]] = {
+        "ranking": ranking_chart,
+        "price": price_chart,
+    }
+    return {
+        name: json_text(make(study, shown[name]).to_dict(), allow_nan=False)
+        for name, make in makers.items()
+        if name in shown
+    }
+
+
+def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
+    """Gap of every method with its interval; by task, by family, by what a method is told."""
+    tasks = list(dict.fromkeys(map(str, data.task)))
+    values = [
+        {
+            **{"task": row.task, "name": spoken_name(row.method), "id": row.method},
+            **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
+            **{
+                "brief": _brief(row.method),
+                "told": row.told,
+                "family": row.family,
+                "runs": row.runs,
+            },
+            **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
+            **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
+        }
+        for row in map(Standing._make, data.itertuples(index=False, name=None))
+    ]
+    chosen = _choices(tasks, data.told, data.family)
+    base = _filtered(_chart(values), chosen)
+    order = alt.EncodingSortField("place", op="min", order="ascending")
+    bold: Any = {
+        "condition": {"test": "indexof(datum.label, 'learner') === 0", "value": "bold"},
+        "value": "normal",
+    }
+    axis = alt.Axis(grid=False, ticks=False, labelFontWeight=bold)
+    y: Any = alt.Y("name:N", sort=order, title=None, axis=axis)
+    told: Any = alt.Color(
+        "told:N",
+        scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())),
+        legend=alt.Legend(
+            orient="top",
+            title="told of the reward:",
+            titleOrient="left",
+            offset=2,
+            symbolSize=50,
+            labelExpr=f"({_SHORT})[datum.label]",
+        ),
+    )
+    tips = [
+        alt.Tooltip("name:N", title="method"),
+        alt.Tooltip("gap:Q", title="gap to the optimum (%)", format=".2f"),
+        alt.Tooltip("interval:N", title="95 % interval"),
+        *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
+    ]
+    x: Any = alt.X("gap:Q", scale=alt.Scale(padding=24), title="gap to the optimum (%)")
+    lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=told)
+    marks = base.mark_point(filled=True, size=45, opacity=1).encode(
+        x=x, y=y, color=told, tooltip=tips,
+        shape=alt.Shape("learner:N", legend=None,
+                        scale=alt.Scale(domain=[False, True], range=["circle", "diamond"])),
+    )  # fmt: skip
+    ends = "max(datum.gap, isValid(datum.high) ? datum.high : datum.gap)"
+    text = base.transform_calculate(end=ends).mark_text(
+        align="left", dx=7, color=_INK, fontSize=10.5
+    )
+    text = text.encode(x=alt.X("end:Q"), y=y, text=alt.Text("gap:Q", format=".1f"))
+    zero = _chart([{"x": 0}]).mark_rule(strokeDash=[2, 3], color=_INK)
+    parts = alt.layer(zero.encode(x=alt.X("x:Q")), lines, marks, text)
+    told_first = [told for told in GROUPS if (data.told == told).any()]
+    return _finished(
+        parts.properties(width="container", height=alt.Step(_ROW)),
+        *chosen,
+    ).properties(description=f"Gap to the optimum by method; {'; '.join(told_first)}.")
+
+
+def price_chart(study: Study, data: pd.DataFrame) -> Any:
+    """Targets reached within a budget; by task, family, what a method is told, and spend."""
+    told_of = _told(study)
+    tasks = list(dict.fromkeys(map(str, data.task)))
+    if ALL_TASKS in tasks:
+        tasks.remove(ALL_TASKS)
+        tasks.insert(0, ALL_TASKS)
+    main = set(main_methods(data))
+    labels = list(dict.fromkeys(map(str, data.method)))
+    looks = style.looks([look_alike(label) for label in labels])
+    positive = data[data.budget > 0].groupby("spend").budget
+    edges = {str(name): (float(own.min()), float(own.max())) for name, own in positive}
+    values: list[dict[str, Any]] = []
+    keys = ["task", "method", "spend"]
+    for (task, method, spend), own in data.groupby(keys, sort=False):
+        least, most = edges[str(spend)]
+        known = own.low.notna().all()
+        values.append(
+            {
+                **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
+                **{"told": told_of[str(method)], "family": family_of(str(method))},
+                **{
+                    "brief": _brief(str(method)),
+                    "main": method in main,
+                    "runs": int(own.runs.iloc[0]),
+                },
+                "end": _number(most),
+                "budget": [_number(max(b, least / 2)) for b in own.budget],
+                "share": [_number(100 * share) for share in own.share],
+                "low": [_number(100 * low) if known else None for low in own.low],
+                "high": [_number(100 * high) if known else None for high in own.high],
+            }
+        )
+    for place in {(value["task"], value["spend"]) for value in values}:
+        _placed([v for v in values if (v["task"], v["spend"]) == place and v["main"]])
+    spends = [spend for spend in SPENDS if (data.spend == spend).any()]
+    spend = alt.param(
+        name="spend",
+        value=spends[0],
+        bind=alt.binding_select(
+            options=spends, labels=[NAMES[name] for name in spends], name="Against "
+        ),
+    )
+    chosen = (*_choices(tasks, told_of.values(), map(family_of, labels)), spend)
+    every = alt.param(name="every", value=False, bind=alt.binding_checkbox(name="All methods "))
+    near = alt.selection_point(
+        name="near", fields=["name"], on="pointerover", clear="pointerout", empty=False
+    )
+    base = _filtered(_chart(values), chosen[:3])
+    base = base.transform_filter("datum.spend === spend")
+    base = base.transform_filter("every || datum.main || family !== 'all'")
+    ends = base
+    base = base.transform_flatten(["budget", "share", "low", "high"])
+    base = base.transform_calculate(
+        interval="isValid(datum.low) ? format(datum.low, '.0f') + ' to ' + "
+        "format(datum.high, '.0f')  + ' %' : 'none: too few runs'"
+    )
+    names = [spoken_name(label) for label in labels]
+    color: Any = alt.Color(
+        "name:N",
+        scale=alt.Scale(
+            domain=names, range=[_paint(looks[look_alike(label)].color) for label in labels]
+        ),
+        legend=None,
+    )
+    dash: Any = alt.StrokeDash(
+        "name:N",
+        scale=alt.Scale(
+            domain=names, range=[_dash(looks[look_alike(label)].dash) for label in labels]
+        ),
+        legend=None,
+    )
+    x: Any = alt.X(
+        "budget:Q",
+        scale=alt.Scale(type="log", nice=False),
+        title="spent (left edge: nothing)",
+        axis=alt.Axis(format="~s", tickCount=6, grid=False),
+    )
+    y: Any = alt.Y("share:Q", title="targets reached (%)", scale=alt.Scale(domain=[0, 100]))
+    band = base.mark_area(interpolate="step-after").encode(
+        x=x, y=alt.Y("low:Q"), y2="high:Q", color=color,
+        opacity=alt.condition(near, alt.value(0.35), alt.value(0.12)),
+    )  # fmt: skip
+    line = base.mark_line(interpolate="step-after").encode(
+        x=x, y=y, color=color, strokeDash=dash,
+        strokeWidth=alt.condition(near, alt.value(4), alt.value(1.8)),
+    )  # fmt: skip
+    tips = [
+        alt.Tooltip("name:N", title="method"),
+        alt.Tooltip("budget:Q", title="spent", format=".3~s"),
+        alt.Tooltip("share:Q", title="targets reached (%)", format=".0f"),
+        alt.Tooltip("interval:N", title="95 % interval"),
+        *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
+    ]
+    points = base.mark_point(size=90, opacity=0, filled=True).encode(
+        x=x, y=y, color=color, tooltip=tips
+    ).add_params(near)  # fmt: skip
+    last = (
+        ends.transform_filter("isValid(datum.label)")
+        .mark_text(align="left", dx=4, fontSize=10.5)
+        .encode(x=alt.X("end:Q"), y=alt.Y("label:Q"), text="name:N", color=color)
+    )
+    layers = alt.layer(band, line, points, last)
+    return _finished(
+        layers.properties(width="container", height=_TALL), *chosen, every
+    ).properties(description="Share of targets reached within a budget, by method.")
+
+
+def _placed(values: list[dict[str, Any]]) -> None:
+    """Heights of the names of curves at their ends, so that none covers another."""
+    lowest = -math.inf
+    ordered = sorted(values, key=lambda value: value["share"][-1])
+    for value in ordered:
+        lowest = value["label"] = max(value["share"][-1], lowest + _APART)
+    highest = 100.0
+    for value in reversed(ordered):
+        value["label"] = _number(min(value["label"], highest))
+        highest = value["label"] - _APART
+
+
+def _choices(tasks: list[str], told: Iterable[str], families: Iterable[str]) -> tuple[Any, ...]:
+    known = set(told)
+    groups = [words for words in (*INFORMED.values(), UNTOLD) if words in known]
+    return (
+        alt.param(
+            name="task", value=tasks[0], bind=alt.binding_select(options=tasks, name="Task ")
+        ),
+        _any("told", "Told ", groups),
+        _any("family", "Family ", list(dict.fromkeys(families))),
+    )
+
+
+def _any(name: str, words: str, options: list[str]) -> Any:
+    bound = alt.binding_select(options=[_ANY, *options], name=words)
+    return alt.param(name=name, value=_ANY, bind=bound)
+
+
+def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
+    for param in chosen:
+        name = param.param.name
+        if name == "task":
+            chart = chart.transform_filter("datum.task === task")
+        else:
+            chart = chart.transform_filter(f"{name} === 'all' || datum.{name} === {name}")
+    return chart
+
+
+def _brief(label: str) -> str:
+    """The name of a method where there is little room."""
+    return spoken_name(label) if learner(label) else short_name(label)
+
+
+def _chart(values: list[dict[str, Any]]) -> Any:
+    return alt.Chart(alt.InlineData(values=values))
+
+
+def _finished(chart: Any, *params: Any) -> Any:
+    return chart.add_params(*params).configure(**_CONFIG)
+
+
+def _told(study: Study) -> dict[str, str]:
+    """What methods know of the reward by label, those over all tasks as their parts."""
+    found = {label: informed(row.told) for (_, label), row in study.method_rows.items()}
+    of_parts = study.scores.drop_duplicates("method")
+    joint = zip(map(str, of_parts.method), map(str, of_parts.label), strict=True)
+    return {**{name: found[label] for name, label in joint}, **found}
+
+
+def _number(value: float) -> float | None:
+    """With four figures, which is more than are seen."""
+    return None if math.isnan(value) else float(f"{value:.4g}")
+
+
+def _interval(low: float, high: float) -> str:
+    return "none: run once" if math.isnan(low) else f"{low:.2f} to {high:.2f}"
+
+
+def _paint(color: str) -> str:
+    return _INK if color == style.INK else color
+
+
+def _dash(dash: Any) -> list[float]:
+    return [1, 0] if dash == style.SOLID else list(dash[1])

@@ -1,0 +1,119 @@
+"""The tables that a paper has room for: every method on every task, every claim's verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pandas as pd
+
+from analysis.comparisons.methods import median
+from analysis.comparisons.reached import ALL_TASKS
+from analysis.figures.ranking import GROUPS, learner, standings
+from analysis.report.document import Column, DataTable, Row, Value
+from analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from analysis.study import Study
+from analysis.words import slugs
+
+MAIN = ("main-methods", "published-and-ours", "main-verdicts")
+"""Ids of the tables for a paper, in their order; all others are its supplement."""
+_METHODS, _VERDICTS = LAYOUTS["main-methods"], LAYOUTS["main-verdicts"]
+
+
+def main_methods(study: Study) -> DataTable | None:
+    """Gaps of every method without its variants: one row a method, one column a task."""
+    found = standings(study)
+    names = {task: slug.replace("-", "_") for task, slug in slugs(study.tasks).items()}
+    shown = [task for task in study.tasks if (found.task == task).any()]
+    over_all = (found.task == ALL_TASKS).any()
+    rows = []
+    for method, own in sorted(found.groupby("method", sort=False), key=_order):
+        if over_all and ALL_TASKS not in set(own.task) and not learner(str(method)):
+            continue
+        rows.append(_row(study, str(method), own, shown))
+    layout = _METHODS.plus(_columns(study, shown, names))
+    if not over_all:
+        layout = layout.model_copy(
+            update={"columns": tuple(c for c in layout.columns if c.name != "all_tasks")}
+        )
+        rows = [_without_third(row) for row in rows]
+    return layout.table(rows)
+
+
+def _without_third(row: Row) -> Row:
+    first, second, _, *rest = row.values  # noqa: PD011
+    return replace(row, values=(first, second, *rest))
+
+
+def _order(item: tuple[object, pd.DataFrame]) -> tuple[int, float]:
+    """What is told the most first, the nearest over all tasks; what is not everywhere last."""
+    own = item[1]
+    whole = own[own.task == ALL_TASKS].gap
+    return GROUPS.index(str(own.told.iloc[0])), float(whole.iloc[0]) if len(whole) else math.inf
+
+
+def _columns(study: Study, tasks: list[str], names: dict[str, str]) -> Iterator[Column]:
+    for task in tasks:
+        dagger = " †" * bool(study.tasks[task].reconstructed)
+        yield Column(
+            *(f"on_{names[task]}", f"{study.tasks[task].label}{dagger}", "number", "%", 1),
+            rests_on=("runs", "optimum"),
+        )
+    yield Column("trials", "trials", "number", digits=0, rests_on=("runs",))
+    yield Column("kinematics", "kinematics", "number", digits=0, rests_on=("runs",))
+
+
+def _row(study: Study, method: str, own: pd.DataFrame, tasks: list[str]) -> Row:
+    gaps = own.set_index("task")
+    whole: Value = None
+    if ALL_TASKS in gaps.index:
+        gap, low, high = (float(gaps[name][ALL_TASKS]) for name in ("gap", "low", "high"))
+        whole = with_interval(gap, low, high)
+    cells = _cells(study, method, own)
+    by_task = {key[0]: key for key in cells}
+    values = [float(gaps.gap[task]) if task in gaps.index else None for task in tasks]
+    if ALL_TASKS in gaps.index and not any(v is not None for v in values):
+        values = [
+            100 * study.method_rows[by_task[task]].gap_share if task in by_task else None
+            for task in tasks
+        ]
+    spent = (
+        finite(sum(median(study.cells[key].runs[name]) for key in cells) / len(cells))
+        for name in ("trials", "forward_kinematics")
+    )
+    return Row(
+        method,
+        (method, str(own.told.iloc[0]), whole, *values, *spent),
+        cells,
+        group=str(own.told.iloc[0]),
+    )
+
+
+def _cells(study: Study, method: str, own: pd.DataFrame) -> tuple[tuple[str, str], ...]:
+    """The cells behind a method's row, those of the learner over all tasks from its parts."""
+    scores = study.scores
+    parts = scores[scores.method == method].drop_duplicates(["task", "label"])
+    joint = tuple(zip(map(str, parts.task), map(str, parts.label), strict=True))
+    single = tuple((str(task), method) for task in own.task if (task, method) in study.cells)
+    return single or joint
+
+
+def main_verdicts(study: Study) -> DataTable | None:
+    """Every claim of the paper in words, with its verdict."""
+    by_run = {str(run): key for key, cell in study.cells.items() for run in cell.runs.run_id}
+    rows = []
+    judged = [entry for entry in study.judged if entry.claim.place]
+    for number, entry in enumerate(judged, 1):
+        row = _VERDICTS.row(
+            entry.claim.id,
+            entry,
+            dict.fromkeys(by_run[run] for run in entry.run_ids),
+            number=number,
+            statement=entry.claim.statement,
+            verdict=entry.marked,
+        )
+        tested = "beside" if entry.claim.beside else "paper"
+        family = entry.claim.id if math.isnan(entry.p) else tested
+        rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
+    return _VERDICTS.table(rows)
