@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.generality.sample import Sample
+from analysis.generality.sample import INITIAL, Sample
 from analysis.statistics.instances import Components, Paired, components, paired
 
 DIFFERENCE = 0.01
@@ -62,8 +62,11 @@ class Needed(NamedTuple):
 
 
 def needed(sample: Sample) -> list[Needed]:
-    """Every pair of methods without variants on two instances of a family or more."""
-    labels = [label for label in sample.labels if " " not in label]
+    """Every pair of methods without variants on two instances of a family or more.
+
+    But for the initial solution, which none is near.
+    """
+    labels = [label for label in sample.labels if " " not in label and label != INITIAL]
     found = []
     for first, second in itertools.combinations(labels, 2):
         scores = sample.gaps(first, second)

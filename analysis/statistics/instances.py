@@ -16,7 +16,7 @@ Components, chapter 4: expected mean squares), which needs no distribution.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +65,20 @@ def other_tasks(scores: Scores, *, seed: int) -> Inference:
     if not np.ptp(drawn):
         return Inference(estimate, n, _METHOD, estimate, estimate, note=NO_SPREAD)
     low, high = estimate + np.quantile(drawn / len(values), TAILS)
-    return Inference(estimate, n, _METHOD, float(low), float(high), seed=seed)
+    least, most = (
+        math.fsum(f(_extreme(runs, f) for runs in own) for own in scores.values()) / len(values)
+        for f in (min, max)
+    )
+    low, high = max(float(low), least), min(float(high), most)
+    return Inference(estimate, n, _METHOD, low, high, seed=seed)
+
+
+def _extreme(runs: Runs, of: Callable[..., float]) -> float:
+    """Least or greatest of the values that an instance's runs can make, which no mean exceeds."""
+    if len(runs) == 1:
+        return float(of(runs[0]))
+    other = max if of is min else min
+    return float(of(runs[0])) - float(other(runs[1]))
 
 
 def _deviations(own: Sequence[Runs], values: Array, rng: np.random.Generator) -> Array:

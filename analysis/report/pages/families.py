@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from analysis.generality.exploration import EC2, EC3, EC4, Contrast
 from analysis.generality.precision import DIFFERENCE, RUNS, needed
-from analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
 from analysis.markup import escaped
 from analysis.methods import short_name
 from analysis.report.document import Block, Bullets, Prose, Section
@@ -87,11 +87,14 @@ def _exploration(study: Study, by_pair: dict[tuple[str, str], Contrast]) -> Iter
         better = [c.family.partition("/")[0] for c in own if c.difference.low > 0]
         parts = [f"better in {', '.join(better)}"] * bool(better)
         parts += [f"worse in {', '.join(worse)}"] * bool(worse)
-        hands = f"{100 * found.hands:+.1f}{NARROW_SPACE}%"
+        hands, joints = (
+            true_minus(f"{100 * part:+.1f}")
+            for part in (found.hands, found.difference.estimate - found.hands)
+        )
         yield escaped(
             f"{what} ({short_name(first)} over {short_name(second)}): "
-            f"{_share(found.difference, '+')}, {true_minus(hands)} of it by the hands that are "
-            f"learned; better on {found.better}, worse on {found.worse} of "
+            f"{_share(found.difference, '+')} (by the hands that are learned {hands}, by joints "
+            f"{joints}); better on {found.better}, worse on {found.worse} of "
             f"{counted(found.instances, 'instance')}; "
             f"by family {' and '.join(parts) or 'told apart in none'}."
         )
@@ -114,25 +117,23 @@ def _known(sample: Sample) -> str:
 
 def _seen(sample: Sample) -> Iterator[str]:
     """How many instances show a small difference, for the closest rivals."""
-    rows = [row for row in needed(sample) if INITIAL not in (row.first, row.second)]
-    if not rows or RUNS[-2] != 10:
+    rows = needed(sample)
+    if not rows:
         return
     place = RUNS.index(10)
     counts = sorted(row.needed[place] for row in rows)
-    pairs = {(row.first, row.second): row for row in rows}
-    of_learner = pairs.get((EC3, EC4))
     text = (
         f"A difference of {100 * DIFFERENCE:.0f}{NARROW_SPACE}% between two methods would be seen "
-        f"with {counts[0]} to {counts[-1]} instances of 10 runs (half of the pairs with "
-        f"{counts[len(counts) // 2]})"
+        f"with {counts[len(counts) // 2]} instances of 10 runs for half of the pairs of methods "
+        f"(fewest {counts[0]}, most {counts[-1]})"
     )
-    if of_learner is not None:
-        once, many = of_learner.needed[0], of_learner.needed[-1]
+    own = next((row for row in rows if {row.first, row.second} == {EC3, EC4}), None)
+    if own is not None:
         text += (
-            f"; between EC4 and EC3 with {of_learner.needed[place]}, {once} of one run, {many} "
-            f"of {RUNS[-1]}"
+            f"; between EC4 and EC3 with {own.needed[place]}, with {own.needed[0]} of one run, "
+            f"with {own.needed[-1]} of {RUNS[-1]}"
         )
-    yield escaped(f"{text}. More instances help, more runs hardly.")
+    yield escaped(f"{text}.")
 
 
 def _share(found: Inference, sign: str = "") -> str:

@@ -124,7 +124,7 @@ def gaps_table(sample: Sample) -> DataTable | None:
     return layout.table(
         rows,
         instances=escaped(_instances(sample)),
-        families=counted(len(sample.families), "family"),
+        families="one family" if len(sample.families) == 1 else f"{len(sample.families)} families",
     )
 
 
@@ -223,6 +223,8 @@ def _budget_table(sample: Sample) -> DataTable | None:
 def _presence_table(study: Study, sample: Sample) -> DataTable | None:
     layout, rows = LAYOUTS["family-presence"], []
     for found in sorted(presence(sample, study.signs), key=lambda r: list(SIGNS).index(r.sign)):
+        if found.family and found.label != learner_on(sample, found.family):
+            continue  # of what explores less over all families
         name, label = _SIGN_NAMES[found.sign], short_name(found.label)
         family = found.family.partition("/")[0] or ALL
         row = layout.row(
