@@ -63,8 +63,8 @@ def normalised_scores(study: Study) -> pd.DataFrame:
         start = alone.get((cell.task, initial_hands(study.tasks[cell.task], model=study.model)))
         if best is None or start is None or pd.isna(start):
             continue
-        if best.reward in (0, start):  # nothing to fall short of, or to gain
-            continue
+        if best.reward == 0 or best.reward <= start:
+            continue  # nothing to fall short of, or to gain; or a search that missed the optimum
         rewards = cell.runs.reward.where(cell.runs.status == "ok")
         values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
         own = {
