@@ -40,6 +40,8 @@ def test_scores_of_a_results_folder(tmp_path):
     assert scores[["reward", "score", "gap"]].iloc[1].isna().all()
     values = by_task(scores, "dual-process/EC2", "gap")["two-armed-1"]
     assert values == pytest.approx([first.gap, math.nan], nan_ok=True)
+    missed = {("two-armed-1", "free"): replace(optima["two-armed-1", "free"], reward=-680)}
+    assert normalised_scores(MadeUp(study.results, optima=missed)).empty  # below the initial one
     without_sequences = MadeUp(results, optima=optima)  # hence without an initial solution
     assert normalised_scores(without_sequences).empty
 
