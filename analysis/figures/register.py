@@ -21,6 +21,7 @@ from analysis.figures.recruitment import recruitment
 from analysis.figures.selection import known_methods
 from analysis.figures.signature_matrix import signature_matrix
 from analysis.figures.tasks import tasks_of
+from analysis.generality.sample import one_by_one
 from analysis.study import Study
 from coartic import CoarticError
 from coartic.text import did_you_mean
@@ -151,7 +152,10 @@ class Figures(Mapping[str, Figure]):
         """The figures of a row, drawn once, or why there are none."""
         if entry.name not in self._drawn:
             tasks = len(self._study.tasks)
+            together = tasks - len(one_by_one(self._study))
             try:
+                if together and self._most is not None and entry.section != "families":
+                    raise CoarticError(f"{together} instances of families are shown together")
                 if entry.by_task and self._most is not None and tasks > self._most:
                     raise CoarticError(f"there would be one for each of {tasks} tasks")
                 found = entry.draw(self._study, methods=self._methods)

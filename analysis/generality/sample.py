@@ -20,6 +20,8 @@ from coartic.robot import Array
 if TYPE_CHECKING:
     from analysis.study import Study
 
+MOST_INSTANCES = 8
+"""Instances that a report has one by one; more are shown together, by family."""
 INITIAL = "corrective-alone/given"
 """Whose solution is the initial one."""
 CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in (2, 3, 4))
@@ -173,6 +175,12 @@ class Sample:
             best = own.groupby("hands").reward.max()
             found[str(name)] = {str(hands): int(reward) for hands, reward in best.items()}
         return found
+
+
+def one_by_one(study: Study) -> set[str]:
+    """Names of the tasks that a report has one by one: all, but instances of families if many."""
+    drawn = {name for name, task in study.tasks.items() if task.family is not None}
+    return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
 
 
 def sample(study: Study) -> Sample | None:

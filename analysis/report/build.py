@@ -12,6 +12,7 @@ import pandas as pd
 from analysis.figures import Figures, Plot
 from analysis.figures.plot import FILES, rendered, svg_text
 from analysis.figures.register import Section as FigureSection
+from analysis.generality.sample import one_by_one
 from analysis.markup import escaped, words
 from analysis.report.document import (
     Block,
@@ -203,8 +204,9 @@ def _by_task(
     study: Study, name: str, blocks_of: Callable[[str], Sequence[Block]]
 ) -> Iterator[Section]:
     """A section a task, where there is something to show of it."""
+    alone = one_by_one(study)
     for task, slug in table_ids(study).items():
-        if _many(study) and study.tasks[task].family is not None:
+        if task not in alone:
             continue  # the section of families has them together
         blocks = blocks_of(task)
         if blocks:

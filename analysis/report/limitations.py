@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.generality.sample import one_by_one
 from analysis.markup import code, escaped
 from analysis.methods import LEARNER
 from analysis.published import RUNS, TRIALS
@@ -22,8 +23,6 @@ from analysis.words import typographic
 from coartic.exploration import CONDITIONS
 from coartic.text import counted
 
-MOST_INSTANCES = 8
-"""Instances of families that are named one by one."""
 _SENTENCES: dict[str, str] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )
@@ -44,19 +43,13 @@ def limitations(study: Study) -> tuple[str, ...]:
     )
 
 
-def _alone(study: Study) -> set[str]:
-    """Names of the tasks that are named one by one: all but instances of families, if many."""
-    drawn = {name for name, task in study.tasks.items() if task.family is not None}
-    return study.tasks.keys() - (drawn if len(drawn) > MOST_INSTANCES else set())
-
-
 def _said(sentence: str, **facts: Any) -> str:
     return _SENTENCES[sentence].format(**facts)
 
 
 def _learned(study: Study) -> Iterator[str]:
     """What a learned reward is, beside what a learner would do without its noise."""
-    parts, alone = [], _alone(study)
+    parts, alone = [], one_by_one(study)
     for (task, label), cell in study.cells.items():
         if task not in alone:
             continue
@@ -72,7 +65,7 @@ def _learned(study: Study) -> Iterator[str]:
 
 
 def _reconstructed(study: Study) -> Iterator[str]:
-    alone = _alone(study)
+    alone = one_by_one(study)
     if len(alone) < len(study.tasks):
         yield _said("drawn", count=len(study.tasks) - len(alone))
     for name, task in study.results.tasks.items():
@@ -146,7 +139,7 @@ def _numbers_of_runs(study: Study) -> Iterator[str]:
     learner = {key: cell for key, cell in study.cells.items() if key[1].startswith(LEARNER)}
     if any((cell.runs.trials != TRIALS).any() for cell in learner.values()):
         yield _said("trials", trials=TRIALS)
-    alone = _alone(study)
+    alone = one_by_one(study)
     found = [text for key in learner if key[0] in alone for text in _detectable(study, key)]
     if found:
         yield _said("detectable", power=_percent(POWER), cells="; ".join(found))
@@ -182,7 +175,7 @@ def _optima(study: Study) -> Iterator[str]:
     without = [task for task in study.results.tasks if (task, "free") not in study.optima]
     if without:
         yield _said("no_optimum", tasks=escaped(", ".join(without)))
-    alone = _alone(study)
+    alone = one_by_one(study)
     others = [
         best
         for (task, arm), best in study.optima.items()

@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from pydantic import TypeAdapter
 
+from analysis.generality.sample import one_by_one
 from analysis.signatures.between import Contexts, Members
 from analysis.signatures.context import context_pairs
 from analysis.signatures.locus import LEAST, families, variants
 from analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
-from analysis.signatures.trajectories import Trajectories
+from analysis.signatures.trajectories import Trajectories, trajectories_of
 from coartic.robot import HANDS
 
 if TYPE_CHECKING:
@@ -56,13 +57,18 @@ def signature_rows(study: Study) -> list[SignatureRow]:
     Differences between contexts stand with the first task of the pair and name the other; tasks
     that locus families join are no pairs, their slopes say how each depends on the others.
     """
+    alone = one_by_one(study)
+    if len(alone) == len(study.tasks):
+        trajectories = study.trajectories
+    else:  # many instances of families, which have fewer: analysis.generality.presence
+        trajectories = {key: trajectories_of(study, key) for key in study.cells if key[0] in alone}
     groups = families(study.tasks)
     joined = variants(groups)
     pairs = context_pairs(study.tasks)
     pairs = [pair for pair in pairs if not any({*pair[:2]} <= names for names in joined)]
     rows: list[SignatureRow] = []
-    for (task, label), cell in study.trajectories.items():
-        done = {name: its for (name, whose), its in study.trajectories.items() if whose == label}
+    for (task, label), cell in trajectories.items():
+        done = {name: its for (name, whose), its in trajectories.items() if whose == label}
         own = [group for group in groups if task in group.tasks]
         values = list(_measured(WITHIN, cell))
         partners = [pair for pair in pairs if task in pair[:2] and {*pair[:2]} <= done.keys()]
