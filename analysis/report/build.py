@@ -112,13 +112,14 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
             for plot in plots
         ]
 
+    played = bool(one_by_one(study))  # of many instances alone there is too much to be played
     sections = (
         _summary(study),
         families_section(study, drawn("families")),
         _section("tasks-drawn", "Tasks", drawn("tasks-drawn")),
         _section("paper", "Published and ours", [*drawn("paper"), *_tables(*beside_paper(study))]),
         _claims(study, {} if figures is None else figures.like_the_paper),
-        *([] if figures is None else [_movements(study, drawn("movements"))]),
+        *([_movements(study, drawn("movements"))] if figures is not None and played else []),
         _section("learning", "Learning", drawn("learning")),
         _methods(study, drawn("methods")),
         _cost(study, drawn("cost")),
