@@ -180,7 +180,7 @@ def _summary(study: Study) -> Section:
         items = (*items, note)
     blocks: list[Block] = [
         Prose((facts,)),
-        *_tables(tasks_table(study), folded=_many(study)),
+        *_tables(tasks_table(study)),
         Bullets(items),
     ]
     overall = overall_table(study)
