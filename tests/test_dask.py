@@ -23,9 +23,10 @@ import pytest
 
 from benchmarks import cluster as cluster_module
 from benchmarks.cluster import Dask
+from benchmarks.suites import load_suite, select_cells
 from coartic import CoarticError
 from tests.support.commands import call
-from tests.support.suites import paper_cells, run_and_write, same_tables
+from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables
 
 LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 
@@ -255,6 +256,19 @@ def test_results_equal_the_local_ones_though_a_worker_dies(cluster, tmp_path):
     )
     assert [worker.alive for worker in workers] == [False, True]
     assert len(seen) == len(set(seen)) == 12
+    same_tables(far, local)
+
+
+def test_instances_of_families_on_two_workers(cluster, tmp_path):
+    """Tasks that no file has reach the workers whole."""
+    names, methods = ["two-armed/v1/i003", "redundancy/v1/i000"], ["EC4", "corrective-alone/given"]
+    cells = select_cells(load_suite("families"), KNOWN, tasks=names, methods=methods)
+    local = run_and_write(tmp_path / "local", cells, runs=2, trials=200)
+    cluster.workers(2)
+    far = run_and_write(
+        tmp_path / "far", cells, runs=2, trials=200, executor=Dask(cluster.address)
+    )
+    assert len(far.runs) == 6
     same_tables(far, local)
 
 

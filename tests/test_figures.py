@@ -66,7 +66,7 @@ def kinds(figures):
     by_kind = {row.name.partition("-")[0]: [] for row in REGISTER if row.name != "published"}
     for plot in figures.plots:
         by_kind[plot.id.partition("-")[0]].append(plot)
-    return [max(plots, key=lambda plot: len(plot.title)) for plots in by_kind.values()]
+    return [max(plots, key=lambda plot: len(plot.title)) for plots in by_kind.values() if plots]
 
 
 def test_every_figure_of_the_papers_cells(figures):
@@ -112,7 +112,7 @@ def test_each_is_drawn_when_it_is_asked_for(study, monkeypatch):
         figures["published"]
     assert "nothing" not in figures
     assert drawn[:2] == ["learned-reward", "published"]
-    assert sorted(drawn) == sorted(row.name for row in REGISTER)
+    assert sorted(drawn) == sorted(row.name for row in REGISTER if row.section != "families")
     assert list(figures) == [plot.id for plot in figures.plots]
 
 

@@ -157,6 +157,8 @@ class Figures(Mapping[str, Figure]):
 
     def _found(self, entry: Entry) -> list[Plot] | CoarticError:
         """The figures of a row, drawn once, or why there are none."""
+        if entry.section == "families" and self._study.instances is None:
+            return []  # nothing that is missed
         if entry.name not in self._drawn:
             tasks = len(self._study.tasks)
             together = tasks - len(one_by_one(self._study))

@@ -134,7 +134,8 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
 
     limits = limitations(study)
     pictures = {picture.id: picture for picture in drawn("answers")}
-    player = None if figures is None else _player(study)
+    played = bool(one_by_one(study))  # of many instances alone there is too much to be played
+    player = _player(study) if figures is not None and played else None
     sections = (
         answers(study, pictures, player),
         families_section(study, drawn("families")),

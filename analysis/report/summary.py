@@ -11,6 +11,7 @@ from dataclasses import replace
 from analysis.claims.register import Judged, Verdict
 from analysis.comparisons.overall import variant
 from analysis.comparisons.paper import paper_rows
+from analysis.generality.sample import one_by_one
 from analysis.methods import LEARNER
 from analysis.published import published_cell
 from analysis.report.document import Bullets, DataTable
@@ -63,7 +64,8 @@ def tasks_table(study: Study) -> DataTable | None:
         searches = dict.fromkeys(("optimum", "proof"), best.cells) if best else {}
         sources = {"published": (printed.source,)} if printed else {}
         rows.append(replace(row, cells_by_column=searches, rests_on=sources))
-    return layout.table(rows)
+    short = layout.model_copy(update={"folded": len(one_by_one(study)) < len(study.tasks)})
+    return short.table(rows)
 
 
 def verdicts(judged: Sequence[Judged]) -> Bullets:
