@@ -411,6 +411,26 @@ def test_the_base_reverses_where_goals_lie_back_and_forth(tmp_path):
     assert verdict_of("initial-base-reverses", study).verdict == "not supported"
 
 
+def test_corrections_early_and_late(tmp_path):
+    """Counts of runs differ around a drift that is there in some of the cells, or in none."""
+    for drift, verdict in ((40, "supported"), (-40, "not supported"), (0, "cannot tell")):
+        rows = [
+            {
+                **entry,
+                "early_corrections": 2000 + drift + 9 * (k % 5),
+                "late_corrections": 2000 + 9 * (3 * k % 5),
+            }
+            for k, entry in enumerate(seven([9, 10, 11, 12, 13]))
+        ]
+        study = Study(planted_results(rows, tmp_path))
+        for which in ("one", "two"):
+            judged = verdict_of(f"corrections-{which}-armed", study)
+            assert judged.verdict == verdict
+        # Of 999.9 trials with four goals; first and last tenth.
+        early = np.mean([row["early_corrections"] for row in rows[-5:]]) / 3999.6
+        assert f"two-armed-2 EC4 {early:.1%}" in judged.evidence
+
+
 def ensured(failed=0):
     return [
         {**entry, "failed_trials": failed * (k == 5)} for k, entry in enumerate(seven([9, 10, 11]))
