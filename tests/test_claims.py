@@ -933,7 +933,7 @@ def test_tables_of_evidence_are_recomputed_from_their_cells(study):
         assert (column.other_arm == "still") == column.name.endswith("_still")
     for line in tables["computation"].rows:
         own, shown = runs(line), values("computation", line.key)
-        spent = own.forward_kinematics.median() + own.jacobians.median()
+        spent = (own.forward_kinematics + own.jacobians).median()
         assert shown["evaluations"] == spent
         assert shown["reward"] == pytest.approx(own.reward.astype(float).mean())
         trials = own.trials.median()

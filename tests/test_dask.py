@@ -261,7 +261,7 @@ def test_results_equal_the_local_ones_though_a_worker_dies(cluster, tmp_path):
 
 def test_instances_of_families_on_two_workers(cluster, tmp_path):
     """Tasks that no file has reach the workers whole."""
-    names, methods = ["two-armed/v1/i003", "redundancy/v1/i000"], ["EC4", "corrective-alone/given"]
+    names, methods = ["two-armed/v1/i003", "aligned/v1/i000"], ["EC4", "corrective-alone/given"]
     cells = select_cells(load_suite("families"), KNOWN, tasks=names, methods=methods)
     local = run_and_write(tmp_path / "local", cells, runs=2, trials=200)
     cluster.workers(2)
