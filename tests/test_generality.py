@@ -323,7 +323,7 @@ def test_a_small_folder_through_a_report(folder, undrawn):
     document = build(study).document
     (section,) = [s for s in document.sections if s.id == "families"]
     assert document.sections.index(section) == 1
-    (lead,) = section.blocks[0].paragraphs
+    lead = section.finding
     assert lead.startswith("On 6 random tasks (6 test; one-armed 3, two-armed 3)")
     assert "the learner (EC1 on one arm, EC4 on two) stays" in lead
     tables = {table.id: table for table in document.tables()}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from analysis.generality.exploration import EC2, EC3, EC4, Contrast
 from analysis.generality.precision import DIFFERENCE, RUNS, needed
 from analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
 from analysis.markup import escaped
 from analysis.methods import short_name
-from analysis.report.document import Block, Bullets, Prose, Section
+from analysis.report.document import Block, Bullets, Section
 from analysis.report.tables.families import (
     family_tables,
     learner_gaps,
@@ -28,9 +29,10 @@ def families_section(study: Study, figures: Sequence[Block]) -> Section:
     sample = study.instances
     if sample is None:
         return Section("families", TITLE)
-    lead = Prose((_in_a_sentence(sample),))
     said = Bullets(tuple(_sentences(study, sample)))
-    return Section("families", TITLE, (lead, said, *figures, *family_tables(study)))
+    tables = (replace(table, folded=True) for table in family_tables(study))
+    blocks = (said, *figures, *tables)
+    return Section("families", TITLE, blocks, finding=_in_a_sentence(sample))
 
 
 def _in_a_sentence(sample: Sample) -> str:
