@@ -44,7 +44,7 @@ docs: $(VENV)/.docs
 	@echo "Look at build/docs/index.html."
 
 speed: $(READY)
-	$(BIN)/python -m benchmarks.speed
+	$(BIN)/python -m coartic.benchmarks.speed
 
 example: $(READY)  # the report in the repository, of what make benchmark left
 	$(BIN)/coartic report $(OUT)/comparison --out benchmarks/example --formats svg

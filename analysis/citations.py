@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.methods import METHODS
-from analysis.references import Reference, references
-from analysis.words import slugs
 from coartic import __version__
+from coartic.analysis.methods import METHODS
+from coartic.analysis.references import Reference, references
+from coartic.analysis.words import slugs
 from coartic.text import one_line
 
 PAPER = "shah2013"
@@ -66,7 +66,7 @@ def software(environment: Mapping[str, Any] | None = None) -> Reference:
 
 def behind_analysis() -> tuple[str, ...]:
     """Keys of the works behind signatures and statistics."""
-    from analysis.signatures.register import REGISTER  # with all that measures them
+    from coartic.analysis.signatures.register import REGISTER  # with all that measures them
 
     sources = dict.fromkeys(key for signature in REGISTER.values() for key in signature.sources)
     return (*_STATISTICS, *sources)

@@ -13,7 +13,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
-from analysis.references import Key
+from coartic.analysis.references import Key
 from coartic.learning import METHOD_PREFIX
 from coartic.text import one_line
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
-from analysis.printed import (
+from coartic.analysis.printed import (
     ENTRIES,
     Best,
     Count,

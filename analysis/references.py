@@ -71,7 +71,7 @@ def parse(text: str, source: str) -> dict[str, Reference]:
 @cache
 def references() -> Mapping[str, Reference]:
     """Every entry of ``references.bib`` by key."""
-    file = resources.files("analysis") / "references.bib"
+    file = resources.files("coartic.analysis") / "references.bib"
     return parse(file.read_text(encoding="utf-8"), "references.bib")
 
 

@@ -2,7 +2,7 @@
 
 ``load("results/all")`` reads a folder; everything else is a property, computed when it is first
 asked for. Most are functions of the study, whose docstrings say what they hold: ``optima`` is
-``optima(study)`` of :mod:`analysis.results.optima`, kept.
+``optima(study)`` of :mod:`coartic.analysis.results.optima`, kept.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from typing import TYPE_CHECKING, NoReturn
 
 import pandas as pd
 
-from analysis.claims import judge, register_table
-from analysis.comparisons.anytime import anytime_curves
-from analysis.comparisons.areas import areas
-from analysis.comparisons.methods import method_rows
-from analysis.comparisons.overall import combined, normalised_scores, over_tasks, profiles
-from analysis.comparisons.pairs import compared, pairs_table
-from analysis.comparisons.pareto import pareto_sets
-from analysis.comparisons.progress import best_so_far
-from analysis.comparisons.reached import reached
-from analysis.comparisons.targets import targets
-from analysis.generality.exploration import Contrast, contrasts
-from analysis.generality.presence import Signs, signs
-from analysis.generality.sample import sample
-from analysis.results.folder import CellKey, CellRuns, Results, load_results
-from analysis.results.optima import optima
-from analysis.signatures.register import signature_rows, signatures_table
-from analysis.signatures.trajectories import all_trajectories, movements_by_run
 from coartic import MotionModel, Task
+from coartic.analysis.claims import judge, register_table
+from coartic.analysis.comparisons.anytime import anytime_curves
+from coartic.analysis.comparisons.areas import areas
+from coartic.analysis.comparisons.methods import method_rows
+from coartic.analysis.comparisons.overall import combined, normalised_scores, over_tasks, profiles
+from coartic.analysis.comparisons.pairs import compared, pairs_table
+from coartic.analysis.comparisons.pareto import pareto_sets
+from coartic.analysis.comparisons.progress import best_so_far
+from coartic.analysis.comparisons.reached import reached
+from coartic.analysis.comparisons.targets import targets
+from coartic.analysis.generality.exploration import Contrast, contrasts
+from coartic.analysis.generality.presence import Signs, signs
+from coartic.analysis.generality.sample import sample
+from coartic.analysis.results.folder import CellKey, CellRuns, Results, load_results
+from coartic.analysis.results.optima import optima
+from coartic.analysis.signatures.register import signature_rows, signatures_table
+from coartic.analysis.signatures.trajectories import all_trajectories, movements_by_run
 from coartic.files import folder_named
 from coartic.text import counted, did_you_mean
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 def load(folder: str | Path) -> Study:
     """Read a results folder.
 
-    Raises CoarticError as :func:`analysis.results.folder.load_results` does.
+    Raises CoarticError as :func:`coartic.analysis.results.folder.load_results` does.
     """
     return Study(load_results(folder_named(folder)))
 
@@ -126,12 +126,12 @@ class Study:
 
     @cached_property
     def overall(self) -> pd.DataFrame:
-        """Methods over all tasks (:func:`~analysis.comparisons.overall.over_tasks`)."""
+        """Methods over all tasks (:func:`~coartic.analysis.comparisons.overall.over_tasks`)."""
         return over_tasks(self.scores)
 
     @cached_property
     def profiles(self) -> pd.DataFrame:
-        """Shares of runs by threshold (:func:`~analysis.comparisons.overall.profiles`)."""
+        """Shares of runs by threshold (:func:`~coartic.analysis.comparisons.overall.profiles`)."""
         return profiles(self.scores)
 
     @cached_property
@@ -147,14 +147,14 @@ class Study:
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
         """Figures by id (docs/figures.md), each drawn when it is first asked for."""
-        from analysis.figures import Figures
+        from coartic.analysis.figures import Figures
 
         return Figures(self)
 
     @cached_property
     def tables(self) -> Mapping[str, pd.DataFrame]:
         """The report's tables by id, with the columns of their CSV files."""
-        from analysis.report.build import report_tables
+        from coartic.analysis.report.build import report_tables
 
         return Tables(report_tables(self))
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from analysis.statistics.estimates import Inference
+    from coartic.analysis.statistics.estimates import Inference
 
 NONE = "–"
 """Shown where there is no value."""

@@ -216,7 +216,7 @@ def cascade_for(
     """The one cascade of this process for such a task, this solver and statement."""
     if modelling == "none":
         return Cascade(rows, joints, solver)
-    from baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
+    from coartic.baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
 
     return ModelledCascade(rows, joints, solver)
 

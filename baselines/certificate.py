@@ -6,7 +6,7 @@ movement, so that its ticks are at least
 
     (shortest path through such configurations) / m + (goals that are moved for).
 
-The path is bounded from below within boxes of link angles by :mod:`baselines.relaxation`;
+The path is bounded from below within boxes of link angles by :mod:`coartic.baselines.relaxation`;
 the narrower the intervals, the tighter the bound. Three things are split, until every part
 is bounded above the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 
@@ -32,9 +32,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from baselines.relaxation import Hands, Lagrangian, Relaxation
-from baselines.whole_ticks import mergeable
 from coartic import MotionModel, Task
+from coartic.baselines.relaxation import Hands, Lagrangian, Relaxation
+from coartic.baselines.whole_ticks import mergeable
 from coartic.robot import HANDS, Array
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below

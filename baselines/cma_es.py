@@ -31,7 +31,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from baselines.uninformed import TOLD, Practice, UninformedParameters
+from coartic.baselines.uninformed import TOLD, Practice, UninformedParameters
 from coartic.initial import too_many_sequences
 from coartic.method import Method, Result, Session
 from coartic.robot import Array

@@ -1,7 +1,8 @@
 """The cascade of two quadratic programs as cvxpy states it.
 
-The levels are written here as they are defined; :mod:`baselines.cascade` has the same programs as
-numbers, which saves 94 to 99 % of the time (``python -m benchmarks.qp_solvers``).
+The levels are written here as they are defined; :mod:`coartic.baselines.cascade` has the same
+programs as
+numbers, which saves 94 to 99 % of the time (``python -m coartic.benchmarks.qp_solvers``).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import warnings
 import cvxpy as cp
 import numpy as np
 
-from baselines.cascade import (
+from coartic.baselines.cascade import (
     DAMPING,
     LIMIT,
     SETTINGS,
@@ -50,7 +51,7 @@ class ModelledCascade(Cascade):
         self.iterations = self.solves = 0
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Array:
-        """As :meth:`baselines.cascade.Cascade.solve`."""
+        """As :meth:`coartic.baselines.cascade.Cascade.solve`."""
         self._rows.value = rows
         self._least.value = least
         self._state(1)

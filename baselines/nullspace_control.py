@@ -2,8 +2,8 @@
 
 It keeps a **posture** for the current goal and for each of those that it looks ahead to, and
 both what they are and how the robot gets there are answers of one cascade
-(:mod:`baselines.cascade`): level 1 is a disc that a hand has to be in, level 2 what the joints
-would rather do.
+(:mod:`coartic.baselines.cascade`): level 1 is a disc that a hand has to be in, level 2 what the
+joints would rather do.
 
 - A posture has its hand in its goal's disc, anywhere in it; of all such postures it is the one
   that makes the way from posture to posture shortest in the metric of the reward, which is
@@ -24,8 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.cascade import Cascade
 from coartic import Movement, Task
+from coartic.baselines.cascade import Cascade
 from coartic.method import Session
 from coartic.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions

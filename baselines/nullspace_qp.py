@@ -1,6 +1,7 @@
 """Prioritised nullspace control by quadratic programs, one method a secondary objective.
 
-The controller of :mod:`baselines.nullspace_control` has the hand come nearer to the disc of the
+The controller of :mod:`coartic.baselines.nullspace_control` has the hand come nearer to the disc
+of the
 current goal (level 1) and lets the joints go, as far as that leaves them free to, straight to a
 posture that hits it (level 2). The objective decides which one:
 
@@ -48,9 +49,16 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from baselines.cascade import Cascade, CascadeError, Modelling, SolverName, cascade_for
-from baselines.nullspace_control import FACES, Aim, Controller, Leg, StuckError, UnfinishedError
 from coartic import Task
+from coartic.baselines.cascade import Cascade, CascadeError, Modelling, SolverName, cascade_for
+from coartic.baselines.nullspace_control import (
+    FACES,
+    Aim,
+    Controller,
+    Leg,
+    StuckError,
+    UnfinishedError,
+)
 from coartic.initial import changes_of_hand, too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.robot import HANDS, Hand
@@ -76,7 +84,7 @@ class NullspaceParameters(Parameters):
     at each goal the hand that is nearest when the last one is hit, without a secondary
     objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
     solver: SolverName = "daqp"
-    """Of both levels; ``python -m benchmarks.qp_solvers`` compares them."""
+    """Of both levels; ``python -m coartic.benchmarks.qp_solvers`` compares them."""
     modelling: Modelling = "none"
     """``cvxpy`` states the programs in its language, ``none`` fills in their numbers; the same
     programs, and with DAQP the same rates to the last bit."""

@@ -17,11 +17,16 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from baselines.certificate import certify
-from baselines.posture_graph import PostureGraph, spread_out
-from baselines.trajectory_problem import Instance, Plan, TrajectoryProblem, trajectory_problem
-from baselines.whole_ticks import Rounding, movements
 from coartic import Movement, Task, TaskError, execute, parse_task
+from coartic.baselines.certificate import certify
+from coartic.baselines.posture_graph import PostureGraph, spread_out
+from coartic.baselines.trajectory_problem import (
+    Instance,
+    Plan,
+    TrajectoryProblem,
+    trajectory_problem,
+)
+from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.corrective import correct
 from coartic.initial import hand_sequences, too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session

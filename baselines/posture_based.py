@@ -43,8 +43,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from baselines.posture_graph import PostureGraph
 from coartic import Movement, Task
+from coartic.baselines.posture_graph import PostureGraph
 from coartic.compiled import entry, inner
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.robot import BASE_DOF, Array, Hand, chain, lever

@@ -4,7 +4,7 @@ A layer is a goal; its nodes are postures (base and one arm) that put a hand ins
 goal's disc. A movement moves the base and the arm that is chosen; the other arm keeps the
 posture it was last used in. The state at a goal is therefore a pair of nodes, one for
 each arm, and the cheapest chain for a hand sequence follows exactly, given the nodes.
-It is the global part of a search whose local part is :mod:`baselines.trajectory_problem`.
+It is the global part of a search whose local part is :mod:`coartic.baselines.trajectory_problem`.
 """
 
 from __future__ import annotations

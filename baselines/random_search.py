@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from baselines.uninformed import TOLD, Practice, UninformedParameters
+from coartic.baselines.uninformed import TOLD, Practice, UninformedParameters
 from coartic.dual_process import spend_search
 from coartic.initial import search_initial_hands
 from coartic.method import Information, Method, Result, Session

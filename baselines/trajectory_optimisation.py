@@ -16,8 +16,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from baselines.posture_graph import PostureGraph, spread_out
-from baselines.trajectory_problem import (
+from coartic import Movement, Task
+from coartic.baselines.posture_graph import PostureGraph, spread_out
+from coartic.baselines.trajectory_problem import (
     Cost,
     Instance,
     Plan,
@@ -25,8 +26,7 @@ from baselines.trajectory_problem import (
     spline,
     trajectory_problem,
 )
-from baselines.whole_ticks import Rounding, movements
-from coartic import Movement, Task
+from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.movement import follow
 from coartic.robot import Array, Hand

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
 from coartic import MotionModel, Movement, Task
+from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
 from coartic.movement import move
 from coartic.robot import Array, Hand
 

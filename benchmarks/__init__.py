@@ -1,12 +1,12 @@
 """Suites, the runner, and the records it keeps. Imports ``coartic`` and ``baselines``.
 
-``benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`benchmarks.run`).
+``benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.run`).
 """
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from benchmarks.run import RunReport, Selection, SuitePlan, plan_suite, run_suite
+    from coartic.benchmarks.run import RunReport, Selection, SuitePlan, plan_suite, run_suite
 
 __all__ = ["RunReport", "Selection", "SuitePlan", "plan_suite", "run_suite"]
 
@@ -15,6 +15,6 @@ def __getattr__(name: str) -> Any:
     """What is imported when it is asked for: a worker needs none of it."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from benchmarks import run
+    from coartic.benchmarks import run
 
     return getattr(run, name)

@@ -15,9 +15,9 @@ import warnings
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.executors import Answer, Job
-from benchmarks.sandbox import failure, supervise
 from coartic import CoarticError
+from coartic.benchmarks.executors import Answer, Job
+from coartic.benchmarks.sandbox import failure, supervise
 from coartic.text import plain
 
 if TYPE_CHECKING:

@@ -14,27 +14,27 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from benchmarks.declaration import Foreign, MethodFileError, brief
+from coartic.benchmarks.declaration import Foreign, MethodFileError, brief
 from coartic.compiled import PACKAGE, model_files
 from coartic.inputs import read_bytes
 
 LARGEST_MODULE = 10_000_000
 """Bytes of a module that belongs to a method."""
-_PACKAGES = {"coartic", "baselines", "benchmarks", "analysis"}
+_BASELINES = "coartic.baselines."
 
 
 @cache
 def built_in_code(module: str) -> str:
     """Hash for a method of this project, defined in ``module``, with all of ``baselines`` it
     imports."""
-    if module.partition(".")[0] == "coartic":
+    if module.startswith("coartic.") and not module.startswith(_BASELINES):
         return _code_hash([])  # part of the model's code anyway
     found: dict[str, bytes] = {}
     waiting = [module]
     while waiting:
         name = waiting.pop()
         path = PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")
-        if name in found or name.partition(".")[0] != "baselines" or not path.is_file():
+        if name in found or not name.startswith(_BASELINES) or not path.is_file():
             continue
         found[name] = _text(path)
         waiting += _imported(found[name], name)
@@ -47,8 +47,7 @@ def built_in_sources(code: str) -> str:
     of, with the Python that reads it: where this is equal, that need not be made again, which
     takes a hundred times as long."""
     digest = hashlib.sha256(f"{code} {sys.version}".encode())
-    folder = PACKAGE.parent
-    for path in [*_model_files(), *sorted((folder / "baselines").rglob("*.py"))]:
+    for path in [*_model_files(), *sorted((PACKAGE / "baselines").rglob("*.py"))]:
         text = _text(path)
         digest.update(f"{path.parent.name}/{path.name} {len(text)} ".encode() + text)
     return digest.hexdigest()
@@ -66,7 +65,7 @@ def foreign_code(foreign: Foreign) -> str:
     waiting = _imported(foreign.source, foreign.where)
     while waiting:
         root = waiting.pop().partition(".")[0]
-        if root in local or root in sys.stdlib_module_names or root in _PACKAGES:
+        if root in local or root in sys.stdlib_module_names or root == "coartic":
             continue
         local[root] = [path for path in _files_of(root) if "site-packages" not in path.parts]
         waiting += [name for path in local[root] for name in _imported(_text(path), str(path))]

@@ -16,11 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import record_of
-from benchmarks.registry import Entry, Registry
-from benchmarks.reproduce import differences, perform_once
-from benchmarks.sandbox import Keeper, keeper
-from benchmarks.specification import Limits, RunSpec, Setting
 from coartic import (
     CoarticError,
     NotApplicableError,
@@ -32,6 +27,11 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.registry import Entry, Registry
+from coartic.benchmarks.reproduce import differences, perform_once
+from coartic.benchmarks.sandbox import Keeper, keeper
+from coartic.benchmarks.specification import Limits, RunSpec, Setting
 from coartic.method import METERED
 from coartic.record import Record
 from coartic.task import checked_task

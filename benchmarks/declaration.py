@@ -1,7 +1,8 @@
 """What a method declares of itself, as plain data, and the questions that it answers.
 
 A method of this project is asked where it is. Any other one runs code that nobody here has
-read, from its import on, so it is asked in a process of its own (:mod:`benchmarks.registry`),
+read, from its import on, so it is asked in a process of its own
+(:mod:`coartic.benchmarks.registry`),
 and what comes back is checked here: :class:`Declaration` is the border.
 """
 

@@ -1,4 +1,5 @@
-"""Where runs are performed: on this machine, or on a Dask cluster (``benchmarks.cluster``).
+"""Where runs are performed: on this machine, or on a Dask cluster
+(``coartic.benchmarks.cluster``).
 
 An executor takes jobs and yields their answers in any order. It may lose some (a
 worker dies, the pool breaks): the harness asks again for what is missing.
@@ -12,7 +13,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from benchmarks.sandbox import Keeper, keeper
+from coartic.benchmarks.sandbox import Keeper, keeper
 
 Job = dict[str, Any]
 Answer = dict[str, Any]

@@ -1,7 +1,7 @@
 """The process between a suite and a worker: it sees to it that nothing outlives its purpose.
 
-``python -m benchmarks.guard PARENT`` starts a worker on its own standard streams and waits.
-When the worker ends, or the parent does, every process that the worker has started is ended
+``python -m coartic.benchmarks.guard PARENT`` starts a worker on its own standard streams and
+waits. When the worker ends, or the parent does, every process that the worker has started is ended
 as well: on Linux those that detached themselves too, because the guard is where the kernel
 hands orphans to (``PR_SET_CHILD_SUBREAPER``); elsewhere those that are still linked to it.
 """
@@ -20,7 +20,7 @@ import psutil
 _LOOK_S = 0.2  # between looks at the parent
 _END_LIMIT_S = 5.0
 # What is imported stays: to look through it for garbage would be a fifth of a worker's start.
-_WORKER = "import gc; gc.disable(); from benchmarks.worker import main; main()"
+_WORKER = "import gc; gc.disable(); from coartic.benchmarks.worker import main; main()"
 
 
 def end_below(process: psutil.Process, *, patience_s: float = _END_LIMIT_S) -> None:

@@ -10,11 +10,11 @@ from typing import Annotated
 
 from pydantic import Field, ValidationError
 
-from benchmarks.executors import Answer, Executor, Local
-from benchmarks.provenance import surroundings
-from benchmarks.specification import RunSpec
-from benchmarks.store import Damage, Store
 from coartic import CoarticError
+from coartic.benchmarks.executors import Answer, Executor, Local
+from coartic.benchmarks.provenance import surroundings
+from coartic.benchmarks.specification import RunSpec
+from coartic.benchmarks.store import Damage, Store
 from coartic.errors import IncompleteError
 from coartic.inputs import problems_inline
 from coartic.method import Information

@@ -1,7 +1,7 @@
 """Kills a suite at random times, resumes it, and checks that nothing is lost, doubled or left.
 
-``python -m benchmarks.kill_resume [--kills 100] [--seed 0]`` runs a small suite once without
-interruption, then again and again under SIGKILL at random times, each time going on in the
+``python -m coartic.benchmarks.kill_resume [--kills 100] [--seed 0]`` runs a small suite once
+without interruption, then again and again under SIGKILL at random times, each time going on in the
 same folder, until the wanted number of kills has hit. Each folder has two turns: kills anywhere
 in the length of a whole suite, until it is complete, and then in the later half of one whose
 runs are all done, which only makes the tables and the comparison. Every folder that gets

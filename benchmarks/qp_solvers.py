@@ -1,9 +1,9 @@
 """Time and accuracy of the QP solvers, and what stating the problems to cvxpy costs.
 
-``python -m benchmarks.qp_solvers`` records the two-level problems that
+``python -m coartic.benchmarks.qp_solvers`` records the two-level problems that
 ``nullspace-qp/next-goal`` meets on a two-armed task and gives them to every solver, once
-as numbers (:mod:`baselines.cascade`) and once through cvxpy
-(:mod:`baselines.modelled_cascade`), all in turn on each problem, so that whatever else the
+as numbers (:mod:`coartic.baselines.cascade`) and once through cvxpy
+(:mod:`coartic.baselines.modelled_cascade`), all in turn on each problem, so that whatever else the
 machine does meets them alike. A problem that a solver does not solve is counted and its
 reason shown.
 """
@@ -18,7 +18,8 @@ from typing import NamedTuple, Protocol, get_args
 
 import numpy as np
 
-from baselines.cascade import (
+from coartic import execute, load_task
+from coartic.baselines.cascade import (
     LIMIT,
     SLACK,
     Cascade,
@@ -26,12 +27,11 @@ from baselines.cascade import (
     SolverName,
     damped_projection,
 )
-from baselines.modelled_cascade import ModelledCascade
-from baselines.nullspace_control import FACES
-from baselines.nullspace_qp import NextGoal
-from benchmarks.provenance import environment
-from benchmarks.sandbox import THREADS
-from coartic import execute, load_task
+from coartic.baselines.modelled_cascade import ModelledCascade
+from coartic.baselines.nullspace_control import FACES
+from coartic.baselines.nullspace_qp import NextGoal
+from coartic.benchmarks.provenance import environment
+from coartic.benchmarks.sandbox import THREADS
 from coartic.method import MethodError, Session
 from coartic.robot import Array
 
@@ -43,7 +43,7 @@ _PACKAGES = ("cvxpy", "clarabel", "daqp", "osqp", "proxsuite", "numpy", "scipy")
 
 
 class Problem(NamedTuple):
-    """What :meth:`baselines.cascade.Cascade.solve` is given."""
+    """What :meth:`coartic.baselines.cascade.Cascade.solve` is given."""
 
     rows: Array
     least: Array
@@ -186,7 +186,7 @@ def conditions() -> str:
 def main() -> None:
     """Record, measure, print."""
     if len(sys.argv) > 1:
-        sys.exit("usage: python -m benchmarks.qp_solvers (it takes no arguments)")
+        sys.exit("usage: python -m coartic.benchmarks.qp_solvers (it takes no arguments)")
     problems = recorded(PROBLEMS)
     figures = measure(problems)
     free = sum(_closed_form(problem) is not None for problem in problems)

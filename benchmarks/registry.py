@@ -18,15 +18,16 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-import baselines.cma_es
-import baselines.corrective_alone
-import baselines.nullspace_qp
-import baselines.optimum
-import baselines.posture_based
-import baselines.random_search
-import baselines.trajectory_optimisation
-from benchmarks.code_identity import built_in_code, foreign_code
-from benchmarks.declaration import (
+import coartic.baselines.cma_es
+import coartic.baselines.corrective_alone
+import coartic.baselines.nullspace_qp
+import coartic.baselines.optimum
+import coartic.baselines.posture_based
+import coartic.baselines.random_search
+import coartic.baselines.trajectory_optimisation
+from coartic import CoarticError, Task, record
+from coartic.benchmarks.code_identity import built_in_code, foreign_code
+from coartic.benchmarks.declaration import (
     Declaration,
     Foreign,
     MethodFileError,
@@ -34,8 +35,7 @@ from benchmarks.declaration import (
     declared,
     reason_against,
 )
-from benchmarks.sandbox import Failure, Sandbox
-from coartic import CoarticError, Task, record
+from coartic.benchmarks.sandbox import Failure, Sandbox
 from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import problems_inline, read_text
 from coartic.learning import METHOD_PREFIX
@@ -51,13 +51,13 @@ QUESTION_LIMIT_S = 60.0
 """Seconds that a method which is not built in has to say what it is."""
 BUILT_IN: tuple[type[Method], ...] = (
     *DUAL_PROCESS,
-    *baselines.corrective_alone.METHODS,
-    *baselines.random_search.METHODS,
-    *baselines.cma_es.METHODS,
-    *baselines.nullspace_qp.METHODS,
-    *baselines.posture_based.METHODS,
-    *baselines.trajectory_optimisation.METHODS,
-    *baselines.optimum.METHODS,
+    *coartic.baselines.corrective_alone.METHODS,
+    *coartic.baselines.random_search.METHODS,
+    *coartic.baselines.cma_es.METHODS,
+    *coartic.baselines.nullspace_qp.METHODS,
+    *coartic.baselines.posture_based.METHODS,
+    *coartic.baselines.trajectory_optimisation.METHODS,
+    *coartic.baselines.optimum.METHODS,
 )
 CLASSES: Mapping[str, type[Method]] = {method.name: method for method in BUILT_IN}
 """The built-in methods by id."""

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness import record_of
-from benchmarks.registry import Registry, unknown
-from benchmarks.sandbox import supervise
-from benchmarks.specification import Limits, RunSpec, Setting
-from benchmarks.store import Store
 from coartic import CoarticError, Trajectory, trajectory
+from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.registry import Registry, unknown
+from coartic.benchmarks.sandbox import supervise
+from coartic.benchmarks.specification import Limits, RunSpec, Setting
+from coartic.benchmarks.store import Store
 from coartic.packs import Packs, check_layout
 from coartic.record import Record, RecordError
 from coartic.text import shell_line

@@ -1,7 +1,8 @@
 """Run a suite into a folder, from Python: what ``coartic run`` does, without a terminal.
 
 ``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite, performs what the
-folder lacks, and writes its tables, which ``analysis.load("results/quick")`` reads.
+folder lacks, and writes its tables, which
+``coartic.analysis.load("results/quick")`` reads.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.executors import Executor, Local
-from benchmarks.harness import Progress, Watcher, perform_missing
-from benchmarks.registry import registry
-from benchmarks.specification import Limits, RunSpec
-from benchmarks.store import Store
-from benchmarks.suites import (
+from coartic import CoarticError
+from coartic.benchmarks.executors import Executor, Local
+from coartic.benchmarks.harness import Progress, Watcher, perform_missing
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.specification import Limits, RunSpec
+from coartic.benchmarks.store import Store
+from coartic.benchmarks.suites import (
     Cell,
     CellPlan,
     Suite,
@@ -26,8 +28,14 @@ from benchmarks.suites import (
     manifest_of,
     select_cells,
 )
-from benchmarks.tables import OWNER, PAGES, check_results_folder, is_done, statuses, write_tables
-from coartic import CoarticError
+from coartic.benchmarks.tables import (
+    OWNER,
+    PAGES,
+    check_results_folder,
+    is_done,
+    statuses,
+    write_tables,
+)
 from coartic.files import folder_named, publish
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.packs import Packs
@@ -41,7 +49,7 @@ from coartic.text import counted
 class Selection:
     """Which part of a suite is run, and what of one's own beside it.
 
-    As in :func:`benchmarks.suites.select_cells`: without names, all of it.
+    As in :func:`coartic.benchmarks.suites.select_cells`: without names, all of it.
     """
 
     tasks: Sequence[str] = ()
@@ -138,7 +146,12 @@ class SuitePlan:
         folder, another suite is at work in it, it cannot be written, or runs keep getting lost.
         """
         if executor is not None:
-            _check("executor", executor, Executor, "one of benchmarks.executors, as Local(jobs=2)")
+            _check(
+                "executor",
+                executor,
+                Executor,
+                "one of coartic.benchmarks.executors, as Local(jobs=2)",
+            )
         folder = folder_named(folder)
         manifest, clock = self._manifest(), time.perf_counter()
         check_results_folder(folder)

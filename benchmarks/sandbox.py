@@ -1,6 +1,6 @@
 """Processes that methods run in, and the clock outside them.
 
-A :class:`Sandbox` is a worker process under a guard (:mod:`benchmarks.guard`); it answers
+A :class:`Sandbox` is a worker process under a guard (:mod:`coartic.benchmarks.guard`); it answers
 questions, one JSON line each. Where it takes too long, says too much or dies, that is a
 :class:`Failure`, and the worker ends with all that it has started. A :class:`Keeper` performs
 jobs in one sandbox after another: methods of this project share one, any other method has one
@@ -26,7 +26,7 @@ from typing import IO, Any
 
 import psutil
 
-from benchmarks.guard import end, end_below
+from coartic.benchmarks.guard import end, end_below
 from coartic.errors import CoarticError
 from coartic.learning import METHOD_PREFIX
 from coartic.text import plain
@@ -77,7 +77,7 @@ class Sandbox:
         self._mark = secrets.token_hex(8)
         try:
             self._guard = subprocess.Popen(
-                [sys.executable, "-P", "-m", "benchmarks.guard", str(os.getpid())],
+                [sys.executable, "-P", "-m", "coartic.benchmarks.guard", str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,

@@ -1,6 +1,6 @@
 """How the cost of planners and of the proof grows with goals and joints.
 
-    python -m benchmarks.scaling
+    python -m coartic.benchmarks.scaling
 
 Development instances of the families, the median CPU time of three for each size, and the
 exponent of a power of the number of goals or joints, by least squares on logarithms.
@@ -16,11 +16,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from baselines.certificate import certify
-from baselines.optimum import DynamicProgramming
-from baselines.posture_based import TwoGoals
-from baselines.trajectory_optimisation import METHODS as PLANNERS
 from coartic import PAPER, Task, corrective_trial, load_task
+from coartic.baselines.certificate import certify
+from coartic.baselines.optimum import DynamicProgramming
+from coartic.baselines.posture_based import TwoGoals
+from coartic.baselines.trajectory_optimisation import METHODS as PLANNERS
 from coartic.initial import initial_hands
 from coartic.method import Method, MethodError, Session
 

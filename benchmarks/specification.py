@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from benchmarks.code_identity import built_in_sources
-from benchmarks.provenance import command
-from benchmarks.registry import Entry
 from coartic import PAPER, MotionModel, Task
+from coartic.benchmarks.code_identity import built_in_sources
+from coartic.benchmarks.provenance import command
+from coartic.benchmarks.registry import Entry
 from coartic.record import RECORD_FORMAT, Asked, Specification
 
 

@@ -1,6 +1,7 @@
 """How fast the compiled learner is, how fast it could be, and how that grows.
 
-``python -m benchmarks.speed`` measures in one run, on the cells of suite ``paper`` at full size,
+``python -m coartic.benchmarks.speed`` measures in one run, on the cells of suite ``paper`` at
+full size,
 microseconds a trial and core of: the step-by-step loop in plain NumPy (on a few trials of every
 cell, whose rewards have to be equal; its cost per trial hardly changes with learning); the
 compiled kernel with one run at a time; the same with the runs of the cell side by side; and the
@@ -20,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.registry import registry
-from benchmarks.run import plan_suite
-from benchmarks.suites import Suite, load_suite, select_cells
 from coartic import CONDITIONS, Robot, Task, learn_many, load_task, parse_task, reference
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.run import plan_suite
+from coartic.benchmarks.suites import Suite, load_suite, select_cells
 from coartic.compiled import addresses, entry, generator_at
 from coartic.exploration import ExplorationCondition
 from coartic.lanes import LANES, board, lanes_for, place
@@ -76,7 +77,9 @@ class Times:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m coartic.benchmarks.speed", description=__doc__
+    )
     parser.add_argument("--repeats", type=int, default=1, help="measure so many times")
     repeats = parser.parse_args().repeats
     suite = load_suite("paper")

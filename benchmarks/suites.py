@@ -19,9 +19,6 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from benchmarks.provenance import surroundings
-from benchmarks.registry import Entry, Registry, unknown
-from benchmarks.specification import UNLIMITED, Limits, RunSpec, Setting
 from coartic import (
     CONDITIONS,
     VARIANTS,
@@ -31,6 +28,9 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.benchmarks.provenance import surroundings
+from coartic.benchmarks.registry import Entry, Registry, unknown
+from coartic.benchmarks.specification import UNLIMITED, Limits, RunSpec, Setting
 from coartic.families import named_by
 from coartic.inputs import (
     MOST_CELLS,

@@ -1,7 +1,7 @@
 """The process that methods run in: it describes them, asks them, lets them solve.
 
-Its guard starts it (:mod:`benchmarks.guard`). It reads questions and writes answers, one JSON
-line each. It may run code that nobody has read, so nothing that it says is more than a
+Its guard starts it (:mod:`coartic.benchmarks.guard`). It reads questions and writes answers, one
+JSON line each. It may run code that nobody has read, so nothing that it says is more than a
 statement: what it hands over as a solution is executed and scored elsewhere.
 """
 
@@ -18,8 +18,9 @@ from typing import Any
 
 from pydantic_core import PydanticSerializationError, to_json
 
-from benchmarks.code_identity import built_in_code, built_in_sources, foreign_code
-from benchmarks.declaration import (
+from coartic import CoarticError, MotionModel, NotApplicableError, Task, parse_task
+from coartic.benchmarks.code_identity import built_in_code, built_in_sources, foreign_code
+from coartic.benchmarks.declaration import (
     Foreign,
     MethodFileError,
     brief,
@@ -28,9 +29,8 @@ from benchmarks.declaration import (
     methods_of,
     reason_against,
 )
-from benchmarks.provenance import environment, process_peak_mb
-from benchmarks.sandbox import THREADS
-from coartic import CoarticError, MotionModel, NotApplicableError, Task, parse_task
+from coartic.benchmarks.provenance import environment, process_peak_mb
+from coartic.benchmarks.sandbox import THREADS
 from coartic.errors import SolutionError
 from coartic.learning import warm_up
 from coartic.method import (
@@ -224,7 +224,7 @@ def _foreign_code(foreign: Foreign) -> str:
 
 def _method(name: str, foreign: Foreign | None) -> type[Method]:
     if foreign is None:
-        from benchmarks.registry import CLASSES  # its imports are no use to other methods
+        from coartic.benchmarks.registry import CLASSES  # its imports are no use to other methods
 
         if name not in CLASSES:
             raise MethodFileError("it is not installed on this worker")

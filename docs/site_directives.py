@@ -53,7 +53,7 @@ def commands() -> Iterator[str]:
 
 def information() -> Iterator[str]:
     """What a method can be told, with the letters of the tables."""
-    from analysis.comparisons.methods import TOLD
+    from coartic.analysis.comparisons.methods import TOLD
     from coartic.method import METERED, Information
 
     words = attribute_words("coartic.method", "Information")
@@ -73,8 +73,8 @@ def information() -> Iterator[str]:
 
 def methods() -> Iterator[str]:
     """Every built-in method: what it is told, whether its seed matters, its source."""
-    from analysis.comparisons.methods import TOLD
-    from benchmarks.registry import CLASSES
+    from coartic.analysis.comparisons.methods import TOLD
+    from coartic.benchmarks.registry import CLASSES
     from coartic.method import Information
 
     def told(method: Any) -> str:
@@ -92,7 +92,7 @@ def methods() -> Iterator[str]:
 
 def parameters() -> Iterator[str]:
     """Parameters of every built-in method with their defaults; methods that share them once."""
-    from benchmarks.registry import CLASSES
+    from coartic.benchmarks.registry import CLASSES
 
     shared: dict[Any, list[str]] = {}
     for name, method in CLASSES.items():
@@ -105,7 +105,7 @@ def parameters() -> Iterator[str]:
             continue
         words: dict[str, str] = {}
         for owner in reversed(kind.__mro__):
-            if owner.__module__.startswith(("coartic", "baselines")):
+            if owner.__module__.startswith("coartic"):
                 words |= attribute_words(owner.__module__, owner.__name__)
         yield from table(
             ("parameter", "default", "meaning"),
@@ -139,7 +139,7 @@ def conditions() -> Iterator[str]:
 
 def suites() -> Iterator[str]:
     """The suites that are shipped."""
-    from benchmarks.suites import SUITE_FOLDER, load_suite
+    from coartic.benchmarks.suites import SUITE_FOLDER, load_suite
 
     loaded = [load_suite(path.stem) for path in sorted(SUITE_FOLDER.glob("*.toml"))]
     yield from table(

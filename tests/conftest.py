@@ -8,7 +8,7 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from benchmarks.sandbox import THREADS
+from coartic.benchmarks.sandbox import THREADS
 
 # While modules are imported and tests collected, nothing is garbage: see the end of this file.
 gc.disable()
@@ -77,18 +77,18 @@ def undrawn():
 @pytest.fixture
 def in_this_process(monkeypatch):
     """Runs without processes of their own, which take long and have tests of their own."""
-    import benchmarks.executors
-    import benchmarks.reproduce
+    import coartic.benchmarks.executors
+    import coartic.benchmarks.reproduce
     from tests.support.suites import InProcess, performed
 
-    monkeypatch.setattr(benchmarks.executors, "Local", InProcess)
-    monkeypatch.setattr(benchmarks.reproduce, "supervise", performed)
+    monkeypatch.setattr(coartic.benchmarks.executors, "Local", InProcess)
+    monkeypatch.setattr(coartic.benchmarks.reproduce, "supervise", performed)
 
 
 @pytest.fixture
 def one_by_one(monkeypatch):
     """Runs that are performed each by a job of its own, whatever their method would have."""
-    from benchmarks.registry import Entry
+    from coartic.benchmarks.registry import Entry
 
     monkeypatch.setattr(Entry, "most_together", lambda entry, parameters: 1)
 
@@ -99,7 +99,7 @@ def traced(session_folder):
 
     The first worker makes it for all.
     """
-    from analysis import load
+    from coartic.analysis import load
     from tests.support.suites import run_and_write, traced_cells, with_environment
 
     folder = session_folder / "traced" / "results"

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.comparisons.overall import by_task, normalised_scores, profiles
-from analysis.statistics import across_tasks
+from coartic.analysis.comparisons.overall import by_task, normalised_scores, profiles
+from coartic.analysis.statistics import across_tasks
 from tests.support.made_up import MadeUp, fake_results, made_up_optima
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.results.folder import load_results
+from coartic.analysis.results.folder import load_results
 from tests.support.commands import call
 from tests.support.suites import run_and_write, suite_of
 

@@ -9,12 +9,6 @@ import pytest
 from matplotlib import rc_context
 from PIL import Image
 
-from analysis.figures.animation import Panel, _figure, animate, timing
-from analysis.figures.robot import MARKERS
-from benchmarks.registry import registry
-from benchmarks.reproduce import trajectory_of
-from benchmarks.store import Store
-from benchmarks.suites import Cell
 from coartic import (
     PAPER,
     CoarticError,
@@ -25,6 +19,12 @@ from coartic import (
     load_task,
     trajectory,
 )
+from coartic.analysis.figures.animation import Panel, _figure, animate, timing
+from coartic.analysis.figures.robot import MARKERS
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.reproduce import trajectory_of
+from coartic.benchmarks.store import Store
+from coartic.benchmarks.suites import Cell
 from coartic.codec import decode, encode, lines
 from coartic.scores import solved
 from tests.support.commands import call

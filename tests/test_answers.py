@@ -7,12 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparisons.overall import ends
-from analysis.comparisons.reached import ALL_TASKS, WAY
-from analysis.figures import ranking
-from analysis.report import answers
-from analysis.report.charts import charts
-from analysis.report.tables.main import MAIN, main_methods, main_verdicts
+from coartic.analysis.comparisons.overall import ends
+from coartic.analysis.comparisons.reached import ALL_TASKS, WAY
+from coartic.analysis.figures import ranking
+from coartic.analysis.report import answers
+from coartic.analysis.report.charts import charts
+from coartic.analysis.report.tables.main import MAIN, main_methods, main_verdicts
 from tests.support.reports import shown
 
 

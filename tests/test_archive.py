@@ -8,9 +8,9 @@ import zipfile
 
 import pytest
 
-from analysis import load
-from analysis.results.archive import LISTED, opened, pack, unpack
 from coartic import CoarticError
+from coartic.analysis import load
+from coartic.analysis.results.archive import LISTED, opened, pack, unpack
 from tests.support.commands import call
 
 

@@ -15,9 +15,6 @@ def test_a_bad_answer_is_noticed(tmp_path):
     package = tmp_path / "coartic"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    for other in ("benchmarks", "analysis"):  # or those that are installed would be imported
-        (tmp_path / other).mkdir()
-        (tmp_path / other / "__init__.py").write_text("")
     (package / "cli.py").write_text(
         "import signal, sys, os\n"
         "def main():\n"

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
-from baselines.certificate import certify
-from baselines.relaxation import Multipliers, Relaxation, _normals, _support
-from baselines.whole_ticks import mergeable
 from coartic import PAPER, Robot, Task, execute, load_task
+from coartic.baselines.certificate import certify
+from coartic.baselines.relaxation import Multipliers, Relaxation, _normals, _support
+from coartic.baselines.whole_ticks import mergeable
 from coartic.initial import hand_sequences
 from coartic.robot import directions
 from coartic.solution import Movement

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from analysis.citations import PAPER, MethodSource, behind_analysis, bibliography, software
-from analysis.methods import METHODS, KnownMethod
-from analysis.references import parse, references
-from analysis.results.laws import read_manifest
-from analysis.signatures.register import REGISTER
-from benchmarks.registry import BUILT_IN, registry
-from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
+from coartic.analysis.citations import PAPER, MethodSource, behind_analysis, bibliography, software
+from coartic.analysis.methods import METHODS, KnownMethod
+from coartic.analysis.references import parse, references
+from coartic.analysis.results.laws import read_manifest
+from coartic.analysis.signatures.register import REGISTER
+from coartic.benchmarks.registry import BUILT_IN, registry
+from coartic.benchmarks.suites import Cell
 from coartic.record import Commit
 from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
@@ -71,9 +71,9 @@ def test_every_entry_is_used():
 def test_solvers_are_cited_where_the_code_uses_them(method):
     text = Path(inspect.getsourcefile(method)).read_text(encoding="utf-8")
     due = set()
-    if "from baselines.trajectory_problem import" in text:
+    if "from coartic.baselines.trajectory_problem import" in text:
         due = {"wachter2006", "andersson2019"}
-    if "from baselines.cascade import" in text:
+    if "from coartic.baselines.cascade import" in text:
         due = {"arnstrom2022"}
         assert method.Parameters().solver == "daqp"
     assert set(METHODS[method.name].solvers) == due

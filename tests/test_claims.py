@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.claims import (
+from coartic import corrective_trial, load_task, trajectory
+from coartic.analysis.claims import (
     CLAIMS,
     Claim,
     Finding,
@@ -16,28 +17,27 @@ from analysis.claims import (
     general,
     judge,
 )
-from analysis.claims.data import FREE
-from analysis.claims.general import shortest_reach
-from analysis.claims.page import SENTENCES, page
-from analysis.claims.power import powers
-from analysis.claims.presence import REPRESENTATIVES
-from analysis.claims.reconstructions import held_by
-from analysis.claims.statements import MARGINS, REASONS
-from analysis.published import published_cells
-from analysis.report.document import Estimate
-from analysis.report.formats.markdown import markdown
-from analysis.report.pages.claims import claims_document
-from analysis.results.folder import Results
-from analysis.signatures.context import context_dependence, dependence_below
-from analysis.signatures.rows import Place, SignatureRow
-from analysis.signatures.subtasks import isolated_reach, served
-from analysis.signatures.trajectories import Trajectories
-from analysis.statistics.estimates import Inference, mean
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.study import Study
-from analysis.words import interval
-from benchmarks.suites import Cell
-from coartic import corrective_trial, load_task, trajectory
+from coartic.analysis.claims.data import FREE
+from coartic.analysis.claims.general import shortest_reach
+from coartic.analysis.claims.page import SENTENCES, page
+from coartic.analysis.claims.power import powers
+from coartic.analysis.claims.presence import REPRESENTATIVES
+from coartic.analysis.claims.reconstructions import held_by
+from coartic.analysis.claims.statements import MARGINS, REASONS
+from coartic.analysis.published import published_cells
+from coartic.analysis.report.document import Estimate
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pages.claims import claims_document
+from coartic.analysis.results.folder import Results
+from coartic.analysis.signatures.context import context_dependence, dependence_below
+from coartic.analysis.signatures.rows import Place, SignatureRow
+from coartic.analysis.signatures.subtasks import isolated_reach, served
+from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.statistics.estimates import Inference, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.study import Study
+from coartic.analysis.words import interval
+from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp, manifest_for, replanned, row
 from tests.support.strategies import as_released, changed
 from tests.support.suites import KNOWN, ROOT, run_and_write
@@ -1164,7 +1164,7 @@ def test_the_chosen_arm_serves_the_next_goal(part, verdict, tmp_path):
 
 def test_the_page_of_the_register_is_current():
     text = (ROOT / "docs" / "register.md").read_text(encoding="utf-8")
-    assert text == page(), "python -m analysis.claims.page > docs/register.md"
+    assert text == page(), "python -m coartic.analysis.claims.page > docs/register.md"
     assert "| half-choose-rlrr | 0% | 36% | 80 |" in text
 
 

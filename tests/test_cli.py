@@ -12,11 +12,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.report import analyses
-from benchmarks import conformance, executors
-from benchmarks.conformance import Law
-from benchmarks.store import Store
 from coartic import __version__
+from coartic.analysis.report import analyses
+from coartic.benchmarks import conformance, executors
+from coartic.benchmarks.conformance import Law
+from coartic.benchmarks.store import Store
 from coartic.files import LISTING
 from coartic.record import run_seeds
 from tests.support import commands

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.comparisons.paper import paper_rows, sequence_rows
-from analysis.markup import words
-from analysis.published import (
+from coartic.analysis.comparisons.paper import paper_rows, sequence_rows
+from coartic.analysis.markup import words
+from coartic.analysis.published import (
     Summary,
     pooled,
     published_cell,
     published_exhaustive,
     published_initial,
 )
-from analysis.report.comparison import comparison_document, notes_of
-from analysis.report.formats.markdown import markdown
-from analysis.report.tables.paper import published_table, sequences_table
-from analysis.report.text import parts
-from analysis.study import Study
-from benchmarks.registry import registry
-from benchmarks.suites import load_suite, select_cells
+from coartic.analysis.report.comparison import comparison_document, notes_of
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.tables.paper import published_table, sequences_table
+from coartic.analysis.report.text import parts
+from coartic.analysis.study import Study
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.made_up import fake_results
 
 MIXED = {

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from analysis.results.optima import entries
-from benchmarks import registry as registry_module
-from benchmarks import reproduce
-from benchmarks.conformance import check_method, check_task_file
-from benchmarks.harness import record_of
-from benchmarks.registry import registry
-from benchmarks.specification import RunSpec
 from coartic import load_task
+from coartic.analysis.results.optima import entries
+from coartic.benchmarks import registry as registry_module
+from coartic.benchmarks import reproduce
+from coartic.benchmarks.conformance import check_method, check_task_file
+from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.specification import RunSpec
 from coartic.task import TASK_FOLDER
 from tests.support.strategies import tiny_task
 from tests.support.suites import InProcess, ask_here, performed, spec_of

@@ -21,10 +21,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import dask
 import pytest
 
-from benchmarks import cluster as cluster_module
-from benchmarks.cluster import Dask
-from benchmarks.suites import load_suite, select_cells
 from coartic import CoarticError
+from coartic.benchmarks import cluster as cluster_module
+from coartic.benchmarks.cluster import Dask
+from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
 from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables
 
@@ -379,7 +379,7 @@ WRONG_ADDRESSES = {  # and what is said of them
 def test_wrong_addresses_get_a_sentence_each_and_nothing_else():
     program = """if True:
         import json, sys, time
-        from benchmarks.cluster import Dask
+        from coartic.benchmarks.cluster import Dask
         from coartic import CoarticError
         for address in json.loads(sys.argv[1]):
             clock = time.monotonic()

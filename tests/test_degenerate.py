@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from analysis.signatures.context import context_dependence, distance, permutation_p
-from analysis.signatures.locus import locus_slopes, slope_norm
-from analysis.signatures.manifold import movable, synergy
-from analysis.statistics import intervals, spread
-from analysis.statistics.across_tasks import interquartile_mean
-from analysis.statistics.equivalence import bootstrap_equivalence, difference
-from analysis.statistics.hypotheses import bootstrap_test, permutation_test, standard_error
 from coartic import load_task
+from coartic.analysis.signatures.context import context_dependence, distance, permutation_p
+from coartic.analysis.signatures.locus import locus_slopes, slope_norm
+from coartic.analysis.signatures.manifold import movable, synergy
+from coartic.analysis.statistics import intervals, spread
+from coartic.analysis.statistics.across_tasks import interquartile_mean
+from coartic.analysis.statistics.equivalence import bootstrap_equivalence, difference
+from coartic.analysis.statistics.hypotheses import bootstrap_test, permutation_test, standard_error
 from tests.support.commands import call
 
 STUCK = """

@@ -37,7 +37,9 @@ def test_figures_are_made_by_the_functions_that_are_named():
     named = re.findall(r"\| `(\w+)\.(\w+)` \|", page)
     assert len(named) == 12
     for module, function in named:
-        assert hasattr(importlib.import_module(f"analysis.figures.{module}"), function), function
+        assert hasattr(importlib.import_module(f"coartic.analysis.figures.{module}"), function), (
+            function
+        )
 
 
 def test_the_example_report():

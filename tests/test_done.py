@@ -5,15 +5,15 @@ import json
 
 import pytest
 
-import benchmarks.suites
-from analysis.results.folder import load_results
-from analysis.results.laws import read_manifest
-from benchmarks.provenance import surroundings
-from benchmarks.run import plan_cells
-from benchmarks.specification import Limits
-from benchmarks.suites import load_suite
-from benchmarks.tables import PAGES
+import coartic.benchmarks.suites
 from coartic import CoarticError
+from coartic.analysis.results.folder import load_results
+from coartic.analysis.results.laws import read_manifest
+from coartic.benchmarks.provenance import surroundings
+from coartic.benchmarks.run import plan_cells
+from coartic.benchmarks.specification import Limits
+from coartic.benchmarks.suites import load_suite
+from coartic.benchmarks.tables import PAGES
 from coartic.packs import Packs
 from coartic.record import Commit, Record
 from tests.support.packs import packs_of, read_pack, records_of, write_pack
@@ -26,7 +26,7 @@ HERE = surroundings().model_copy(update={"commit": Commit(id="0" * 40, dirty=Fal
 @pytest.fixture(autouse=True)
 def unchanged(monkeypatch):
     """A checkout without changes."""
-    monkeypatch.setattr(benchmarks.suites, "surroundings", lambda: HERE)
+    monkeypatch.setattr(coartic.benchmarks.suites, "surroundings", lambda: HERE)
 
 
 @pytest.fixture
@@ -130,7 +130,7 @@ def test_another_version_checks_all(update, tmp_path, checks, monkeypatch):
     perform(tmp_path)
     checks.clear()
     other = HERE.model_copy(update=update)
-    monkeypatch.setattr(benchmarks.suites, "surroundings", lambda: other)
+    monkeypatch.setattr(coartic.benchmarks.suites, "surroundings", lambda: other)
     assert perform(tmp_path).progress.done == 0
     assert len(set(checks)) == 2
 

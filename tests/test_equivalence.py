@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.statistics.equivalence import bootstrap_equivalence, difference, shares
+from coartic.analysis.statistics.equivalence import bootstrap_equivalence, difference, shares
 
 
 def test_interval_is_welchs():

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from analysis.calibration import error_rates
-from analysis.calibration.simulation import Check, lines, rate
+from coartic.analysis.calibration import error_rates
+from coartic.analysis.calibration.simulation import Check, lines, rate
 
 
 def test_errors_are_counted_and_marked():

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.run import Selection, plan_suite, run_suite
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task, parse_task
+from coartic.benchmarks.run import Selection, plan_suite, run_suite
 from coartic.families import (
     CORRECTIVE,
     MOST_NUMBER,
@@ -430,7 +430,7 @@ def test_a_small_suite(tmp_path):
 
 
 def load_runs(folder):
-    from analysis.results.folder import load_results
+    from coartic.analysis.results.folder import load_results
 
     return load_results(folder).runs
 

@@ -11,31 +11,31 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from analysis import load
-from analysis.figures import REGISTER, Figures, register
-from analysis.figures.bars import bars, stars
-from analysis.figures.configurations import (
+from coartic import CoarticError, corrective_trial, execute, load_task
+from coartic.analysis import load
+from coartic.analysis.figures import REGISTER, Figures, register
+from coartic.analysis.figures.bars import bars, stars
+from coartic.analysis.figures.configurations import (
     PAPER,
     common_sequences,
     configurations,
     typical_run,
 )
-from analysis.figures.context import context
-from analysis.figures.frontier import frontier
-from analysis.figures.learning_curves import learning_curves
-from analysis.figures.plot import FORMATS, Plot, _settle, save, svg_text
-from analysis.figures.profiles import profiles
-from analysis.figures.published import published
-from analysis.figures.recruitment import recruitment
-from analysis.figures.signature_matrix import signature_matrix
-from analysis.figures.style import RC, amount, looks, number, on
-from analysis.figures.svg import compact, relative
-from analysis.figures.tasks import tasks_plot
-from analysis.methods import METHODS, short_name
-from analysis.published import TRIALS
-from analysis.study import Study
-from benchmarks.suites import load_suite, select_cells
-from coartic import CoarticError, corrective_trial, execute, load_task
+from coartic.analysis.figures.context import context
+from coartic.analysis.figures.frontier import frontier
+from coartic.analysis.figures.learning_curves import learning_curves
+from coartic.analysis.figures.plot import FORMATS, Plot, _settle, save, svg_text
+from coartic.analysis.figures.profiles import profiles
+from coartic.analysis.figures.published import published
+from coartic.analysis.figures.recruitment import recruitment
+from coartic.analysis.figures.signature_matrix import signature_matrix
+from coartic.analysis.figures.style import RC, amount, looks, number, on
+from coartic.analysis.figures.svg import compact, relative
+from coartic.analysis.figures.tasks import tasks_plot
+from coartic.analysis.methods import METHODS, short_name
+from coartic.analysis.published import TRIALS
+from coartic.analysis.study import Study
+from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.rows import movements_from
 from tests.support.made_up import MadeUp
 from tests.support.suites import KNOWN, run_and_write
@@ -300,7 +300,7 @@ def test_any_methods_side_by_side(study):
 
 def test_learning_curves_against_a_loop(study, monkeypatch):
     window = 7
-    monkeypatch.setattr("analysis.figures.learning_curves.WINDOW", window)
+    monkeypatch.setattr("coartic.analysis.figures.learning_curves.WINDOW", window)
     data = learning_curves(study).data
     learning = study.results.learning()
     spread = 0

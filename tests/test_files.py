@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.report.write import check_report_folder
 from coartic import CoarticError
+from coartic.analysis.report.write import check_report_folder
 from coartic.files import (
     LISTING,
     check_folder,

@@ -18,33 +18,41 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
 
-import analysis.report.build
-import analysis.results.folder
-import analysis.study
-import benchmarks.registry
-import benchmarks.reproduce
-from analysis.citations import MethodSource, bibliography
-from analysis.comparisons.versions import compare_versions
-from analysis.figures.plot import svg_text
-from analysis.figures.tasks import tasks_plot
-from analysis.markup import code, escaped, markdown, markdown_text, words
-from analysis.report.build import build, write
-from analysis.report.comparison import comparison_document
-from analysis.report.document import Bullets, Column, DataTable, Document, Prose, Row, Section
-from analysis.report.formats.html import vega
-from analysis.report.formats.latex import latex_text
-from analysis.report.formats.markdown import markdown as to_markdown
-from analysis.report.formats.terminal import terminal_table
-from analysis.report.numbers import Number, numbers_tex
-from analysis.report.pages.versions import versions_document
-from analysis.report.trace import trace, trace_text
-from analysis.report.trace_file import command_of
-from analysis.study import Study
-from analysis.words import MINUS, NONE
-from benchmarks.harness import Progress
-from benchmarks.store import Store
-from benchmarks.suites import Cell
+import coartic.analysis.report.build
+import coartic.analysis.results.folder
+import coartic.analysis.study
+import coartic.benchmarks.registry
+import coartic.benchmarks.reproduce
 from coartic import CoarticError, load_task
+from coartic.analysis.citations import MethodSource, bibliography
+from coartic.analysis.comparisons.versions import compare_versions
+from coartic.analysis.figures.plot import svg_text
+from coartic.analysis.figures.tasks import tasks_plot
+from coartic.analysis.markup import code, escaped, markdown, markdown_text, words
+from coartic.analysis.report.build import build, write
+from coartic.analysis.report.comparison import comparison_document
+from coartic.analysis.report.document import (
+    Bullets,
+    Column,
+    DataTable,
+    Document,
+    Prose,
+    Row,
+    Section,
+)
+from coartic.analysis.report.formats.html import vega
+from coartic.analysis.report.formats.latex import latex_text
+from coartic.analysis.report.formats.markdown import markdown as to_markdown
+from coartic.analysis.report.formats.terminal import terminal_table
+from coartic.analysis.report.numbers import Number, numbers_tex
+from coartic.analysis.report.pages.versions import versions_document
+from coartic.analysis.report.trace import trace, trace_text
+from coartic.analysis.report.trace_file import command_of
+from coartic.analysis.study import Study
+from coartic.analysis.words import MINUS, NONE
+from coartic.benchmarks.harness import Progress
+from coartic.benchmarks.store import Store
+from coartic.benchmarks.suites import Cell
 from coartic.cli import terminal
 from coartic.record import Commit
 from coartic.tables import label_of
@@ -446,7 +454,7 @@ def printable(text):
 
 
 def test_analyse(hostile, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(analysis.study, "load_results", lambda folder: hostile)
+    monkeypatch.setattr(coartic.analysis.study, "load_results", lambda folder: hostile)
     code, out, error = call(monkeypatch, capsys, "analyse", tmp_path)
     assert (code, error) == (0, "")
     assert printable(out)
@@ -479,7 +487,7 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
         "&lt;", "<").replace("&gt;", ">")  # fmt: skip
     folders = {"a": hostile}
     monkeypatch.setattr(
-        "analysis.comparisons.versions.load",
+        "coartic.analysis.comparisons.versions.load",
         lambda folder: Study(folders.get(folder.name, other)),
     )
     out = tmp_path / "page.md"
@@ -493,9 +501,9 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
 def report(hostile, tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign") / "report"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
+        patch.setattr(coartic.analysis.report.build, "svg_text", lambda plot: SVG)
         patch.setattr(
-            analysis.report.build, "rendered",
+            coartic.analysis.report.build, "rendered",
             lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
         )  # fmt: skip
         study = Study(hostile)
@@ -611,7 +619,7 @@ def test_figures(hostile):
 
 
 def test_terminal(hostile, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(analysis.results.folder, "load_results", lambda folder: hostile)
+    monkeypatch.setattr(coartic.analysis.results.folder, "load_results", lambda folder: hostile)
     code, out, error = call(monkeypatch, capsys, "cite", tmp_path)
     assert (code, error) == (0, "")
     assert printable(out)
@@ -621,7 +629,7 @@ def test_terminal(hostile, monkeypatch, capsys, tmp_path):
         warnings.warn(EVIL, stacklevel=1)
         raise CoarticError(f"first {EVIL}")
 
-    monkeypatch.setattr(benchmarks.registry, "registry", fail)
+    monkeypatch.setattr(coartic.benchmarks.registry, "registry", fail)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         code, out, error = call(monkeypatch, capsys, "list")
@@ -704,7 +712,7 @@ def test_show(hostile, monkeypatch, capsys, tmp_path):
         def path(self, run_id):
             return self.folder / run_id
 
-    monkeypatch.setattr(benchmarks.reproduce, "find_record", lambda *_: (Folder(), record))
+    monkeypatch.setattr(coartic.benchmarks.reproduce, "find_record", lambda *_: (Folder(), record))
     code, out, error = call(monkeypatch, capsys, "show", "0a")
     assert (code, error) == (0, "")
     assert printable(out)

@@ -11,23 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import bootstrap
 
-from analysis.comparisons.anytime import anytime_curves
-from analysis.comparisons.areas import areas
-from analysis.comparisons.pareto import dominated, pareto_sets
-from analysis.comparisons.progress import SPENDS, by_trial
-from analysis.comparisons.targets import targets
-from analysis.report.document import Estimate
-from analysis.report.formats.markdown import markdown
-from analysis.report.pages.frontier import (
+from coartic import load_task
+from coartic.analysis.comparisons.anytime import anytime_curves
+from coartic.analysis.comparisons.areas import areas
+from coartic.analysis.comparisons.pareto import dominated, pareto_sets
+from coartic.analysis.comparisons.progress import SPENDS, by_trial
+from coartic.analysis.comparisons.targets import targets
+from coartic.analysis.report.document import Estimate
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pages.frontier import (
     areas_table,
     frontier_document,
     pareto_table,
     targets_table,
 )
-from analysis.report.text import parts
-from analysis.results.folder import Results
-from analysis.study import Study
-from coartic import load_task
+from coartic.analysis.report.text import parts
+from coartic.analysis.results.folder import Results
+from coartic.analysis.study import Study
 from coartic.tables import PlanLimits
 from tests.support.made_up import MadeUp, made_up_optima, manifest_for, replanned
 from tests.support.reports import shown

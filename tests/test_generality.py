@@ -6,22 +6,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.claims import CLAIMS, Claim, Finding, judge
-from analysis.claims.catalogue import family_sizes
-from analysis.claims.power import over_instances
-from analysis.generality.exploration import EC2, EC3, EC4, budgets, contrasts
-from analysis.generality.precision import RUNS, needed, variance_shares
-from analysis.generality.presence import Signs, presence, recruitment
-from analysis.generality.properties import properties, what_pays
-from analysis.generality.sample import INITIAL, ONE_ARMED
-from analysis.report.build import build
-from analysis.report.formats.markdown import markdown
-from analysis.results.folder import Results
-from analysis.results.optima import Optimum
-from analysis.statistics.estimates import Inference
-from analysis.study import Study
-from analysis.words import true_minus
 from coartic import load_task
+from coartic.analysis.claims import CLAIMS, Claim, Finding, judge
+from coartic.analysis.claims.catalogue import family_sizes
+from coartic.analysis.claims.power import over_instances
+from coartic.analysis.generality.exploration import EC2, EC3, EC4, budgets, contrasts
+from coartic.analysis.generality.precision import RUNS, needed, variance_shares
+from coartic.analysis.generality.presence import Signs, presence, recruitment
+from coartic.analysis.generality.properties import properties, what_pays
+from coartic.analysis.generality.sample import INITIAL, ONE_ARMED
+from coartic.analysis.report.build import build
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.results.folder import Results
+from coartic.analysis.results.optima import Optimum
+from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.study import Study
+from coartic.analysis.words import true_minus
 from coartic.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
 from tests.support.suites import run_and_write, suite_of

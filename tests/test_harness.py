@@ -10,25 +10,6 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.comparisons.paper import paper_rows
-from analysis.results.folder import load_results
-from analysis.results.laws import read_manifest
-from analysis.study import Study
-from benchmarks.declaration import declared
-from benchmarks.executors import Local
-from benchmarks.registry import CLASSES, Entry, registry
-from benchmarks.run import Selection, run_suite
-from benchmarks.specification import Limits
-from benchmarks.store import Store
-from benchmarks.suites import (
-    Cell,
-    distinct,
-    load_suite,
-    select_cells,
-    suites,
-)
-from benchmarks.tables import write_tables
-from benchmarks.worker import ForeignCodeError, perform
 from coartic import (
     CoarticError,
     Movement,
@@ -39,6 +20,25 @@ from coartic import (
     learn,
     load_task,
 )
+from coartic.analysis.comparisons.paper import paper_rows
+from coartic.analysis.results.folder import load_results
+from coartic.analysis.results.laws import read_manifest
+from coartic.analysis.study import Study
+from coartic.benchmarks.declaration import declared
+from coartic.benchmarks.executors import Local
+from coartic.benchmarks.registry import CLASSES, Entry, registry
+from coartic.benchmarks.run import Selection, run_suite
+from coartic.benchmarks.specification import Limits
+from coartic.benchmarks.store import Store
+from coartic.benchmarks.suites import (
+    Cell,
+    distinct,
+    load_suite,
+    select_cells,
+    suites,
+)
+from coartic.benchmarks.tables import write_tables
+from coartic.benchmarks.worker import ForeignCodeError, perform
 from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
 from coartic.method import Information, Parameters, Session
@@ -698,7 +698,7 @@ def test_a_name_is_no_list_of_names():
     [
         ({"runs": "3"}, "runs is '3'; it must be an int from 1 to "),
         ({"trials": 2.5}, "trials is 2.5; it must be an int from 1 to "),
-        ({"executor": 2}, "executor is 2; it must be one of benchmarks.executors"),
+        ({"executor": 2}, "executor is 2; it must be one of coartic.benchmarks.executors"),
         ({"select": {}}, "select is {}; it must be a Selection"),
         ({"suite": 3}, "suite is 3; it must be a name, a path or a Suite"),
         ({"runs": True}, "runs is True; it must be an int from 1 to "),

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.statistics.estimates import NO_SPREAD
-from analysis.statistics.instances import (
+from coartic.analysis.statistics.estimates import NO_SPREAD
+from coartic.analysis.statistics.instances import (
     Paired,
     chance,
     components,
@@ -14,7 +14,7 @@ from analysis.statistics.instances import (
     paired,
     regression,
 )
-from analysis.statistics.power import power
+from coartic.analysis.statistics.power import power
 
 
 def simulated(rng, instances, runs, *, between=0.1, within=0.05, mean=0.3):

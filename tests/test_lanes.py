@@ -8,11 +8,11 @@ import pytest
 from llvmlite import binding
 from numba import njit
 
-from benchmarks.harness import _lots, perform_missing, records_of
-from benchmarks.sandbox import failure
-from benchmarks.specification import Limits
-from benchmarks.store import Store
 from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
+from coartic.benchmarks.harness import _lots, perform_missing, records_of
+from coartic.benchmarks.sandbox import failure
+from coartic.benchmarks.specification import Limits
+from coartic.benchmarks.store import Store
 from coartic.compiled import entry
 from coartic.corrective import Corrector, correct_lanes
 from coartic.lanes import LANES, board, ends_of, lanes_for, place

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.report.limitations import limitations
-from analysis.results.optima import entries
-from analysis.study import Study
 from coartic import load_task
+from coartic.analysis.report.limitations import limitations
+from coartic.analysis.results.optima import entries
+from coartic.analysis.study import Study
 from tests.support.made_up import replanned
 
 

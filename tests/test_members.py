@@ -6,20 +6,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.reconstruction import targets
-from analysis.reconstruction.constraints import try_sequences
-from analysis.reconstruction.curve import specification_curve
-from analysis.reconstruction.reconstruct import search_for
-from analysis.reconstruction.specifications import (
+from coartic import PAPER, CoarticError, TaskError, load_task
+from coartic.analysis.reconstruction import targets
+from coartic.analysis.reconstruction.constraints import try_sequences
+from coartic.analysis.reconstruction.curve import specification_curve
+from coartic.analysis.reconstruction.reconstruct import search_for
+from coartic.analysis.reconstruction.specifications import (
     PAPERS,
     judged_specifications,
     shares,
     specifications,
 )
-from analysis.results.folder import Results
-from analysis.study import Study
-from benchmarks.suites import load_suite, select_cells
-from coartic import PAPER, CoarticError, TaskError, load_task
+from coartic.analysis.results.folder import Results
+from coartic.analysis.study import Study
+from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.members import members, members_file, task_of, with_members
 from coartic.tables import DeclaredMethod
 from tests.support.made_up import manifest_for, replanned, row

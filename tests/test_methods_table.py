@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparisons.methods import TOLD
-from analysis.report.tables.methods import methods_table, reading_of_methods
-from analysis.results.folder import Results
-from analysis.study import Study
 from coartic import load_task
+from coartic.analysis.comparisons.methods import TOLD
+from coartic.analysis.report.tables.methods import methods_table, reading_of_methods
+from coartic.analysis.results.folder import Results
+from coartic.analysis.study import Study
 from coartic.method import Information
 from tests.support.made_up import MadeUp, made_up_optima, manifest_for, row
 from tests.support.strategies import changed

@@ -10,7 +10,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import null_space
 from scipy.optimize import LinearConstraint, minimize
 
-from baselines.cascade import (
+from coartic import PAPER, Robot, execute, load_task
+from coartic.baselines.cascade import (
     DAMPING,
     LIMIT,
     SETTINGS,
@@ -20,12 +21,11 @@ from baselines.cascade import (
     cascade_for,
     damped_projection,
 )
-from baselines.corrective_alone import EverySequence
-from baselines.modelled_cascade import ModelledCascade
-from baselines.nullspace_control import FACES, Aim, Controller
-from baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
-from benchmarks import qp_solvers
-from coartic import PAPER, Robot, execute, load_task
+from coartic.baselines.corrective_alone import EverySequence
+from coartic.baselines.modelled_cascade import ModelledCascade
+from coartic.baselines.nullspace_control import FACES, Aim, Controller
+from coartic.baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
+from coartic.benchmarks import qp_solvers
 from coartic.method import MethodError, Session
 from coartic.robot import directions
 from tests.support.strategies import configurations, tiny_task

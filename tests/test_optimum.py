@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.results import optima
-from analysis.results.folder import Results
-from analysis.results.optima import Entry, collect, entries, essence
-from baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic import builtin_tasks, execute, load_task
+from coartic.analysis.results import optima
+from coartic.analysis.results.folder import Results
+from coartic.analysis.results.optima import Entry, collect, entries, essence
+from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.method import MethodError, Session
 from coartic.rows import movement_rows, movements_from
 from coartic.solution import other_arm_travel

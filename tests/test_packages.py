@@ -16,7 +16,7 @@ from tests.support.suites import ROOT
 pytestmark = pytest.mark.skipif(
     os.environ.get("COARTIC_PACKAGES") != "1", reason="minutes: only with COARTIC_PACKAGES=1"
 )
-OWN = ()
+OWN = ("analysis", "baselines", "benchmarks")
 """Folders of the user's own in the place where commands are run."""
 
 

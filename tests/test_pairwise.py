@@ -7,19 +7,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.comparisons.overall import WITHIN, everywhere, over_tasks, profiles
-from analysis.comparisons.pairs import pairs
-from analysis.report.document import Estimate
-from analysis.report.formats.markdown import markdown
-from analysis.report.pages.comparisons import comparisons_document, cost_table, pairwise_table
-from analysis.results.folder import Results
-from analysis.statistics.estimates import SEED, difference_of_means
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.statistics.power import power, runs_needed
-from analysis.study import Study
-from benchmarks.registry import registry
-from benchmarks.suites import Cell
 from coartic import load_task
+from coartic.analysis.comparisons.overall import WITHIN, everywhere, over_tasks, profiles
+from coartic.analysis.comparisons.pairs import pairs
+from coartic.analysis.report.document import Estimate
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pages.comparisons import (
+    comparisons_document,
+    cost_table,
+    pairwise_table,
+)
+from coartic.analysis.results.folder import Results
+from coartic.analysis.statistics.estimates import SEED, difference_of_means
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.power import power, runs_needed
+from coartic.analysis.study import Study
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp, made_up_optima, manifest_for, row
 from tests.support.reports import shown
 from tests.support.suites import run_and_write

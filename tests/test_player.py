@@ -8,7 +8,8 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from analysis.report.player import (
+from coartic import Movement, Robot, corrective_trial, load_task, trajectory
+from coartic.analysis.report.player import (
     TOLERANCE,
     _movement,
     key_frames,
@@ -16,9 +17,8 @@ from analysis.report.player import (
     player_json,
     rounding_unit,
 )
-from analysis.signatures.trajectories import Trajectories
-from analysis.study import Study
-from coartic import Movement, Robot, corrective_trial, load_task, trajectory
+from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.study import Study
 from coartic.model import PAPER
 from coartic.robot import HANDS
 from tests.support.suites import run_and_write
@@ -45,7 +45,7 @@ console.log(JSON.stringify(played));
 def play(data):
     if not shutil.which("node"):
         pytest.skip("node is not installed")
-    script = files("analysis.report") / "player.js"
+    script = files("coartic.analysis.report") / "player.js"
     done = subprocess.run(
         ["node", "-e", DRIVER, str(script)],
         input=json.dumps(data), capture_output=True, text=True, check=False, timeout=120,

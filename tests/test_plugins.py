@@ -10,11 +10,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from benchmarks import executors, reproduce
-from benchmarks import registry as registry_module
-from benchmarks.registry import registry
-from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
+from coartic.benchmarks import executors, reproduce
+from coartic.benchmarks import registry as registry_module
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
 from tests.support.suites import InProcess, ask_here, performed, run_specs
 
@@ -280,7 +280,7 @@ def test_the_pages_show_the_example_as_it_is():
 
 
 def test_the_suite_of_the_page_can_be_used(tmp_path):
-    from benchmarks.suites import load_suite, select_cells
+    from coartic.benchmarks.suites import load_suite, select_cells
 
     page = (ROOT / "docs" / "howto" / "suite.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```toml\n(# noise.toml.*?)```", page, re.DOTALL)

@@ -9,8 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from baselines.posture_based import OneGoal, TwoGoals
 from coartic import execute, load_task
+from coartic.baselines.posture_based import OneGoal, TwoGoals
 from coartic.method import MethodError, Session
 from coartic.task import letters_of
 from tests.support.strategies import UNEVEN, tiny_task
@@ -232,7 +232,8 @@ def test_what_is_planned_is_what_happens(goals, locked, method, seed):
     """The ticks are those expected, and the other arm stands still, up to rounding.
 
     A movement is planned from where the planner has the one before it end. Its points are
-    those of the executor's formula, computed in another order (``baselines.posture_based``,
+    those of the executor's formula, computed in another order
+    (``coartic.baselines.posture_based``,
     ``coartic.movement``), so that they may differ in the last digit.
     """
     if locked == ["x"]:

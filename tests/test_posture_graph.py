@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from baselines.posture_graph import PostureGraph, Spent, sample_postures, spread_out
 from coartic import load_task
+from coartic.baselines.posture_graph import PostureGraph, Spent, sample_postures, spread_out
 from tests.support.strategies import changed
 
 TASKS = {

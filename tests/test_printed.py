@@ -5,9 +5,10 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from analysis import printed
-from analysis.claims.statements import STATEMENTS
-from analysis.printed import (
+from coartic import PAPER, CoarticError, Robot, corrective_trial, hand_sequences, load_task
+from coartic.analysis import printed
+from coartic.analysis.claims.statements import STATEMENTS
+from coartic.analysis.printed import (
     ENTRIES,
     Base,
     Best,
@@ -26,8 +27,7 @@ from analysis.printed import (
     constant,
     parse_entries,
 )
-from analysis.published import RUNS, TRIALS
-from coartic import PAPER, CoarticError, Robot, corrective_trial, hand_sequences, load_task
+from coartic.analysis.published import RUNS, TRIALS
 from coartic.exploration import CONDITIONS
 from coartic.readings import readings
 from coartic.task import builtin_tasks

@@ -13,24 +13,6 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.reconstruction import targets
-from analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
-from analysis.reconstruction.ensemble import features, spread_out
-from analysis.reconstruction.layout import Layout, layouts
-from analysis.reconstruction.likelihood import likelihoods, together
-from analysis.reconstruction.lines import lines
-from analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
-from analysis.reconstruction.scoring import (
-    FARTHEST,
-    Figure,
-    Learned,
-    Order,
-    compared,
-    distance,
-    distance_error,
-)
-from analysis.reconstruction.search import Search
-from analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from coartic import (
     PAPER,
     CoarticError,
@@ -40,6 +22,24 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.analysis.reconstruction import targets
+from coartic.analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
+from coartic.analysis.reconstruction.ensemble import features, spread_out
+from coartic.analysis.reconstruction.layout import Layout, layouts
+from coartic.analysis.reconstruction.likelihood import likelihoods, together
+from coartic.analysis.reconstruction.lines import lines
+from coartic.analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
+from coartic.analysis.reconstruction.scoring import (
+    FARTHEST,
+    Figure,
+    Learned,
+    Order,
+    compared,
+    distance,
+    distance_error,
+)
+from coartic.analysis.reconstruction.search import Search
+from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from coartic.sequences import CorrectiveTrials, corrective_trials
 from tests.support.commands import call
 
@@ -354,7 +354,7 @@ def test_tables_of_others_are_not_written_over(
     other = tmp_path / "other"
     other.mkdir()
     (other / "printed.csv").write_text("mine", encoding="utf-8")
-    monkeypatch.setattr("analysis.reconstruction.lines.lines", None)  # nothing is computed
+    monkeypatch.setattr("coartic.analysis.reconstruction.lines.lines", None)  # nothing is computed
     assert "printed.csv" in said(other)
     assert (other / "printed.csv").read_text(encoding="utf-8") == "mine"
     assert str(own / "printed.csv") in said(own / "printed.csv")

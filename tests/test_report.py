@@ -17,8 +17,8 @@ import pytest
 from pydantic import ValidationError
 from rich.console import Console
 
-from analysis.markup import Span, inline
-from analysis.report.document import (
+from coartic.analysis.markup import Span, inline
+from coartic.analysis.report.document import (
     Bullets,
     Column,
     DataTable,
@@ -32,17 +32,17 @@ from analysis.report.document import (
     Strip,
     Verdict,
 )
-from analysis.report.formats.csv import runs_csv, table_csv
-from analysis.report.formats.html import MOST_ROWS, WIDTHS, html
-from analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
-from analysis.report.formats.latex import PACKAGES, is_long, latex_table, latex_text
-from analysis.report.formats.markdown import markdown
-from analysis.report.formats.terminal import terminal_table
-from analysis.report.summary import without_variants
-from analysis.report.tables.layout import LAYOUTS, Layout, with_legends
-from analysis.report.text import number_text, parts, texts
-from analysis.report.write import write_report
-from analysis.words import typographic
+from coartic.analysis.report.formats.csv import runs_csv, table_csv
+from coartic.analysis.report.formats.html import MOST_ROWS, WIDTHS, html
+from coartic.analysis.report.formats.latex import MOST_ROWS as MOST_LATEX
+from coartic.analysis.report.formats.latex import PACKAGES, is_long, latex_table, latex_text
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.formats.terminal import terminal_table
+from coartic.analysis.report.summary import without_variants
+from coartic.analysis.report.tables.layout import LAYOUTS, Layout, with_legends
+from coartic.analysis.report.text import number_text, parts, texts
+from coartic.analysis.report.write import write_report
+from coartic.analysis.words import typographic
 from coartic.files import LISTING
 from tests.support.reports import Page, needs_latex
 
@@ -337,7 +337,7 @@ def test_variants_are_set_apart():
 def node(script):
     if not shutil.which("node"):
         pytest.skip("node is not installed")
-    code = (files("analysis.report") / "sort.js").read_text(encoding="utf-8")
+    code = (files("coartic.analysis.report") / "sort.js").read_text(encoding="utf-8")
     done = subprocess.run(
         ["node", "-e", code + script], capture_output=True, check=True, timeout=60
     )
@@ -458,7 +458,7 @@ def test_latex_escapes():
 
 
 def test_every_character_of_ours_has_an_escape():
-    home = files("analysis")
+    home = files("coartic.analysis")
     texts = [path.read_text(encoding="utf-8") for path in home.rglob("*.toml")]
     for path in home.rglob("*.py"):
         if path.name != "latex.py":

@@ -6,17 +6,17 @@ import shutil
 
 import pytest
 
-import analysis.report.build
-import analysis.report.headlines
-from analysis.figures import register
-from analysis.report.build import build, write
-from analysis.report.headlines import headline_numbers
-from analysis.report.numbers import Names, macro_names, words
-from analysis.report.trace import find_report, trace
-from analysis.study import Study
-from analysis.words import slugs
-from benchmarks.suites import Cell, load_suite, select_cells
+import coartic.analysis.report.build
+import coartic.analysis.report.headlines
 from coartic import CoarticError, builtin_tasks
+from coartic.analysis.figures import register
+from coartic.analysis.report.build import build, write
+from coartic.analysis.report.headlines import headline_numbers
+from coartic.analysis.report.numbers import Names, macro_names, words
+from coartic.analysis.report.trace import find_report, trace
+from coartic.analysis.study import Study
+from coartic.analysis.words import slugs
+from coartic.benchmarks.suites import Cell, load_suite, select_cells
 from coartic.cli.arguments import labels_in
 from tests.support.commands import call
 from tests.support.packs import records_of
@@ -113,7 +113,7 @@ def test_macros_that_run_together_are_told_apart(odd, monkeypatch):
     of = Study(odd)
     labels = macro_names(of).labels
     same = Names(dict.fromkeys(odd.tasks, "X"), labels)
-    monkeypatch.setattr(analysis.report.headlines, "macro_names", lambda of: same)
+    monkeypatch.setattr(coartic.analysis.report.headlines, "macro_names", lambda of: same)
     numbers = headline_numbers(of)
     names = [number.macro + suffix for number in numbers for suffix, _ in number.companions()]
     assert len(names) == len(set(names))
@@ -262,7 +262,7 @@ def test_damaged_folders(name, monkeypatch, capsys, tmp_path, odd, undrawn):
 
 
 def test_many_tasks_make_a_short_report(monkeypatch, odd, undrawn):
-    monkeypatch.setattr(analysis.report.build, "MOST_TASKS", 5)
+    monkeypatch.setattr(coartic.analysis.report.build, "MOST_TASKS", 5)
     own = [row for row in register.REGISTER if row.name == "signatures"]
     monkeypatch.setattr(register, "REGISTER", own)
     document = build(Study(odd)).document

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.statistics.power import POWER, power, runs_needed, smallest_difference
+from coartic.analysis.statistics.power import POWER, power, runs_needed, smallest_difference
 
 
 @pytest.mark.parametrize(("effect", "runs"), [(0.2, 310), (0.5, 51), (0.8, 21), (1.0, 14)])

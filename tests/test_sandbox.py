@@ -12,16 +12,16 @@ from typing import ClassVar
 import psutil
 import pytest
 
-from benchmarks import registry as registry_module
-from benchmarks import sandbox
-from benchmarks.executors import Local
-from benchmarks.harness import record_of
-from benchmarks.registry import registry
-from benchmarks.reproduce import perform_once
-from benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
-from benchmarks.specification import Limits
-from benchmarks.store import Store
 from coartic import CoarticError, load_task
+from coartic.benchmarks import registry as registry_module
+from coartic.benchmarks import sandbox
+from coartic.benchmarks.executors import Local
+from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.reproduce import perform_once
+from coartic.benchmarks.sandbox import Failure, Keeper, Sandbox, close_all
+from coartic.benchmarks.specification import Limits
+from coartic.benchmarks.store import Store
 from tests.support.packs import packs_of
 from tests.support.suites import InProcess, ask_here, perform_plan, spec_of
 
@@ -157,7 +157,9 @@ def workers_of(pid):
                 return True
         return False
 
-    return [p for p, (_, line) in parents.items() if b"benchmarks.worker" in line and below(p)]
+    return [
+        p for p, (_, line) in parents.items() if b"coartic.benchmarks.worker" in line and below(p)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +226,7 @@ def test_what_is_kept_of_a_run_is_bounded(known, shared, monkeypatch):
 def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     """Killed or interrupted at work or as it starts, a suite takes its workers along.
 
-    ``python -m benchmarks.kill_resume`` does it at a hundred moments.
+    ``python -m coartic.benchmarks.kill_resume`` does it at a hundred moments.
     """
     jobs = "2" if word == signal.SIGINT else "1"  # a suite that ends has to end each of them
     # Many short lots: something is kept soon, and much is left to do.
@@ -255,7 +257,7 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
                 time.sleep(0.05)
             # At least one: a worker about to start a program of its own counts twice.
             soon = time.monotonic() + 10
-            while not any("benchmarks.worker" in command for command in marked()):
+            while not any("coartic.benchmarks.worker" in command for command in marked()):
                 if time.monotonic() > soon:  # between two workers, on a machine at its limits
                     break
                 time.sleep(0.01)

@@ -8,18 +8,18 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
-from analysis.report.document import Estimate
-from analysis.report.formats.markdown import markdown
-from analysis.report.pages.signatures import signatures_document
-from analysis.report.tables.contexts import contexts_table, slopes_tables
-from analysis.report.tables.layout import LAYOUTS
-from analysis.report.tables.signatures import definitions_table, signatures_tables
-from analysis.report.text import number_text
-from analysis.signatures import register, within
-from analysis.signatures.register import REGISTER
-from analysis.signatures.rows import Place, Shown, Signature
-from analysis.study import Study
 from coartic import corrective_trial, initial_hands
+from coartic.analysis.report.document import Estimate
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pages.signatures import signatures_document
+from coartic.analysis.report.tables.contexts import contexts_table, slopes_tables
+from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.report.tables.signatures import definitions_table, signatures_tables
+from coartic.analysis.report.text import number_text
+from coartic.analysis.signatures import register, within
+from coartic.analysis.signatures.register import REGISTER
+from coartic.analysis.signatures.rows import Place, Shown, Signature
+from coartic.analysis.study import Study
 from tests.support.suites import run_and_write, suite_of
 
 EC1, EC4, ALONE = "dual-process/EC1", "dual-process/EC4", "corrective-alone/given"

@@ -11,26 +11,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from analysis.calibration import signatures as simulated
-from analysis.calibration.simulation import rate
-from analysis.references import references
-from analysis.results.folder import Results
-from analysis.signatures.context import (
+from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
+from coartic.analysis.calibration import signatures as simulated
+from coartic.analysis.calibration.simulation import rate
+from coartic.analysis.references import references
+from coartic.analysis.results.folder import Results
+from coartic.analysis.signatures.context import (
     context_dependence,
     context_pairs,
     distance,
     lead_time,
     permutation_p,
 )
-from analysis.signatures.locus import families, locus_slopes, slope_norm, variants
-from analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
-from analysis.signatures.other_arm import (
+from coartic.analysis.signatures.locus import families, locus_slopes, slope_norm, variants
+from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
+from coartic.analysis.signatures.other_arm import (
     preshaping,
     readiness,
     readiness_from_base,
     travel,
 )
-from analysis.signatures.paths import (
+from coartic.analysis.signatures.paths import (
     base_reversals,
     dimensionless_jerk,
     reversals_of,
@@ -38,9 +39,9 @@ from analysis.signatures.paths import (
     spectral_arc_length,
     turning_angles,
 )
-from analysis.signatures.register import REGISTER
-from analysis.signatures.rows import Place
-from analysis.signatures.subtasks import (
+from coartic.analysis.signatures.register import REGISTER
+from coartic.analysis.signatures.rows import Place
+from coartic.analysis.signatures.subtasks import (
     change_from,
     excess,
     isolated_agreement,
@@ -48,10 +49,9 @@ from analysis.signatures.subtasks import (
     sacrifice_p,
     sacrifices,
 )
-from analysis.signatures.trajectories import Trajectories, best_sequences, entropy
-from analysis.statistics import intervals
-from analysis.study import Study
-from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
+from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, entropy
+from coartic.analysis.statistics import intervals
+from coartic.analysis.study import Study
 from coartic.rows import movement_rows
 from coartic.solution import other_arm_travel
 from tests.support.made_up import manifest_for

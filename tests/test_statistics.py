@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.statistics import estimates as statistics
-from analysis.statistics import hypotheses
-from analysis.statistics.across_tasks import interquartile_mean
-from analysis.statistics.equivalence import difference_of_shares
+from coartic.analysis.statistics import estimates as statistics
+from coartic.analysis.statistics import hypotheses
+from coartic.analysis.statistics.across_tasks import interquartile_mean
+from coartic.analysis.statistics.equivalence import difference_of_shares
 
 # Survival times of mice in days: Efron & Tibshirani (1993), table 2.1.
 TREATMENT = [94, 197, 16, 38, 99, 141, 23]

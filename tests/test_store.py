@@ -12,10 +12,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from benchmarks.harness import record_of
-from benchmarks.specification import Limits
-from benchmarks.store import Damage, RecordError, Store
 from coartic import CoarticError, codec, files
+from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.specification import Limits
+from coartic.benchmarks.store import Damage, RecordError, Store
 from tests.support.packs import (
     pack_lines,
     packs_of,

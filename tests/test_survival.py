@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.statistics.intervals import kaplan_meier_median
+from coartic.analysis.statistics.intervals import kaplan_meier_median
 
 # Remission times in weeks of Freireich et al. (1963), as printed by Cox (1972): 6-MP and
 # placebo; False where the patient was still in remission.

@@ -24,7 +24,7 @@ def hits(cell: Trajectories, signature: Signature) -> Rows:
 SIGNATURE = """
 [[within]]
 name = "goals hit"
-measure = "analysis.signatures.within.hits"
+measure = "coartic.analysis.signatures.within.hits"
 unit = "goals"
 extent = "goals"
 meaning = "how many goals a run hits"
@@ -50,7 +50,7 @@ FIGURE = '''"""Rewards as dots."""
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures.plot import Plot
+from coartic.analysis.figures.plot import Plot
 
 
 def dots(study, *, methods=None):
@@ -78,13 +78,11 @@ ticks = { kind = "number" }
 RUN = """
 import os
 import sys
-import analysis
-import baselines
-import benchmarks
-from analysis.figures import register
-from analysis.report.build import build
-from benchmarks import Selection, run_suite
-from benchmarks.registry import CLASSES
+from coartic import analysis, baselines, benchmarks
+from coartic.analysis.figures import register
+from coartic.analysis.report.build import build
+from coartic.benchmarks import Selection, run_suite
+from coartic.benchmarks.registry import CLASSES
 from tests.support.reports import undrawn
 from tests.support.suites import InProcess
 
@@ -112,10 +110,9 @@ LEFT_OUT = shutil.ignore_patterns("example")
 
 @pytest.fixture
 def house(tmp_path):
-    """The sources that change. What does not is taken from where it is, compiled already; the
-    bytecode of those that stay as they are is copied along, and Python sees which are."""
-    for package in ("baselines", "benchmarks", "analysis"):
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=LEFT_OUT)
+    """All sources, with their kernels as they are compiled and the bytecode of those that stay."""
+    for package in ("coartic", "baselines", "benchmarks", "analysis"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=LEFT_OUT, symlinks=True)
     return tmp_path
 
 
@@ -133,13 +130,13 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     append("baselines/nearest_hand.py", METHOD)
     change(
         "benchmarks/registry.py",
-        "import baselines.optimum\n",
-        "import baselines.nearest_hand\nimport baselines.optimum\n",
+        "import coartic.baselines.optimum\n",
+        "import baselines.nearest_hand\nimport coartic.baselines.optimum\n",
     )
     change(
         "benchmarks/registry.py",
-        "    *baselines.optimum.METHODS,\n",
-        "    baselines.nearest_hand.NearestHand,\n    *baselines.optimum.METHODS,\n",
+        "    *coartic.baselines.optimum.METHODS,\n",
+        "    baselines.nearest_hand.NearestHand,\n    *coartic.baselines.optimum.METHODS,\n",
     )
     append("analysis/methods.toml", LOOK)
     # A signature: a function, a row.
@@ -152,8 +149,8 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     append("analysis/figures/dots.py", FIGURE)
     change(
         "analysis/figures/register.py",
-        "from analysis.figures.frontier import",
-        "from analysis.figures.dots import dots\nfrom analysis.figures.frontier import",
+        "from coartic.analysis.figures.frontier import",
+        "from coartic.analysis.figures.dots import dots\nfrom coartic.analysis.figures.frontier import",  # noqa: E501
     )
     change(
         "analysis/figures/register.py",

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import markup
-from analysis.report.document import Document
-from analysis.report.numbers import Number
-from analysis.report.trace import trace, trace_text
-from analysis.report.trace_file import FILE, trace_json
-from analysis.results import optima as shipped
-from analysis.results.folder import load_results
-from analysis.statistics import estimates as statistics
-from analysis.study import Study
-from benchmarks.suites import Cell
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
+from coartic.analysis import markup
+from coartic.analysis.report.document import Document
+from coartic.analysis.report.numbers import Number
+from coartic.analysis.report.trace import trace, trace_text
+from coartic.analysis.report.trace_file import FILE, trace_json
+from coartic.analysis.results import optima as shipped
+from coartic.analysis.results.folder import load_results
+from coartic.analysis.statistics import estimates as statistics
+from coartic.analysis.study import Study
+from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp
 from tests.support.packs import records_of
 from tests.support.reports import compiled, document_of, report_of, without_figures

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from baselines.posture_graph import PostureGraph
-from baselines.trajectory_optimisation import METHODS, path_movements
-from baselines.trajectory_problem import (
+from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
+from coartic.baselines.posture_graph import PostureGraph
+from coartic.baselines.trajectory_optimisation import METHODS, path_movements
+from coartic.baselines.trajectory_problem import (
     COSTS,
     Instance,
     _segment_cost,
     spline,
     trajectory_problem,
 )
-from baselines.whole_ticks import Rounding, movements
-from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
+from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 from tests.support.strategies import changed
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.calibration.tuning import (
+from coartic import CONDITIONS, learn_many, load_task
+from coartic.analysis.calibration.tuning import (
     EPSILON,
     NOISE,
     TASKS,
@@ -12,7 +13,6 @@ from analysis.calibration.tuning import (
     against_printed,
     tuned,
 )
-from coartic import CONDITIONS, learn_many, load_task
 
 TRIALS = 40
 

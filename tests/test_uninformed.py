@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from baselines import cma_es, random_search
-from baselines.uninformed import TOLD, Attempt, Practice, UninformedParameters
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic.baselines import cma_es, random_search
+from coartic.baselines.uninformed import TOLD, Attempt, Practice, UninformedParameters
 from coartic.method import Meter, MethodError, Session
 from tests.support.strategies import tiny_task
 

@@ -10,17 +10,17 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.comparisons.versions import compare_versions, load_pair
-from analysis.report.document import Estimate
-from analysis.report.formats.markdown import markdown
-from analysis.report.pages.versions import versions_document, versions_table
-from analysis.results.folder import load_results
-from analysis.results.laws import read_manifest
-from analysis.statistics.equivalence import MARGIN
-from analysis.study import Study
-from benchmarks.registry import registry
-from benchmarks.suites import Cell
 from coartic import CoarticError, load_task
+from coartic.analysis.comparisons.versions import compare_versions, load_pair
+from coartic.analysis.report.document import Estimate
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pages.versions import versions_document, versions_table
+from coartic.analysis.results.folder import load_results
+from coartic.analysis.results.laws import read_manifest
+from coartic.analysis.statistics.equivalence import MARGIN
+from coartic.analysis.study import Study
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.suites import Cell
 from coartic.tables import FORMAT, Manifest
 from tests.support.commands import call
 from tests.support.packs import packs_of, records_of, write_pack

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from analysis.statistics import estimates as statistics
-from analysis.words import interval, short, tally
+from coartic.analysis.statistics import estimates as statistics
+from coartic.analysis.words import interval, short, tally
 
 
 @pytest.mark.parametrize(

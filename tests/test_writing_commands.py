@@ -5,10 +5,10 @@ import signal
 
 import pytest
 
-from analysis.report.document import Document
-from analysis.report.write import write_report
-from benchmarks.run import run_suite
 from coartic import CoarticError
+from coartic.analysis.report.document import Document
+from coartic.analysis.report.write import write_report
+from coartic.benchmarks.run import run_suite
 from tests.support.commands import call
 
 BEFORE = "nothing is written in {}"
@@ -38,15 +38,17 @@ def interrupted(monkeypatch, capsys):
 
 @pytest.mark.parametrize("command", ["analyse", "report"])
 def test_interrupted_before_it_writes(command, interrupted, monkeypatch, tmp_path):
-    monkeypatch.setattr("analysis.study.load", interrupt)
+    monkeypatch.setattr("coartic.analysis.study.load", interrupt)
     out = tmp_path / "report" if command == "report" else tmp_path
     assert interrupted(command, tmp_path) == f"interrupted; {BEFORE.format(out)}\n"
     assert list(tmp_path.iterdir()) == []
 
 
 def test_interrupted_while_it_writes(interrupted, monkeypatch, tmp_path):
-    monkeypatch.setattr("analysis.study.load", lambda folder: None)
-    monkeypatch.setattr("analysis.report.analyses.analyse", lambda study: {"claims.md": b""})
+    monkeypatch.setattr("coartic.analysis.study.load", lambda folder: None)
+    monkeypatch.setattr(
+        "coartic.analysis.report.analyses.analyse", lambda study: {"claims.md": b""}
+    )
     monkeypatch.setattr("coartic.files.publish", interrupt)
     assert interrupted("analyse", tmp_path) == f"interrupted; {WITHIN.format(tmp_path)}\n"
 
@@ -54,8 +56,8 @@ def test_interrupted_while_it_writes(interrupted, monkeypatch, tmp_path):
         begin()
         interrupt()
 
-    monkeypatch.setattr("analysis.report.build.build", lambda *_: None)
-    monkeypatch.setattr("analysis.report.build.write", write)
+    monkeypatch.setattr("coartic.analysis.report.build.build", lambda *_: None)
+    monkeypatch.setattr("coartic.analysis.report.build.write", write)
     out = tmp_path / "report"
     assert interrupted("report", tmp_path) == f"interrupted; {WITHIN.format(out)}\n"
 

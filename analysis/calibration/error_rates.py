@@ -1,6 +1,6 @@
 """Do the tests and intervals of this package hold their nominal rates on data like ours?
 
-``python -m analysis.calibration.error_rates`` simulates samples of 20 runs from normal
+``python -m coartic.analysis.calibration.error_rates`` simulates samples of 20 runs from normal
 distributions and from distributions shaped like learned rewards (skewed, with several levels, in
 whole ticks), applies the functions that the tables use, and prints how often each errs: type-I
 error of tests at level 0.05, intervals of 95 % that miss the truth, and how often means that
@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from analysis.calibration.simulation import Check, Draw, simulate
-from analysis.statistics import across_tasks, estimates
-from analysis.statistics.equivalence import Equivalence, bootstrap_equivalence, difference
-from analysis.statistics.estimates import LEVEL, Inference
-from analysis.statistics.hypotheses import (
+from coartic.analysis.calibration.simulation import Check, Draw, simulate
+from coartic.analysis.statistics import across_tasks, estimates
+from coartic.analysis.statistics.equivalence import Equivalence, bootstrap_equivalence, difference
+from coartic.analysis.statistics.estimates import LEVEL, Inference
+from coartic.analysis.statistics.hypotheses import (
     Alternative,
     bootstrap_test,
     permutation_test,

@@ -1,4 +1,5 @@
-"""What the signatures' tests and intervals do: ``python -m analysis.calibration.signatures``.
+"""What the signatures' tests and intervals do: ``python -m
+coartic.analysis.calibration.signatures``.
 
 Every row simulates 2000 data sets and prints a share with its exact binomial interval. Nulls:
 nothing to find, tested at 5 %, how often a test rejects. Planted effects: of a known size, how
@@ -18,15 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.calibration.simulation import Check, Draw, simulate
-from analysis.signatures.context import lead_time, permutation_p
-from analysis.signatures.locus import locus_slopes, slope_norm
-from analysis.signatures.manifold import movable, subspaces, synergy
-from analysis.signatures.subtasks import ROUNDING, change_from, sacrifice_p, sacrifices
-from analysis.signatures.trajectories import entropy
-from analysis.statistics import intervals
-from analysis.statistics.intervals import Interval
 from coartic import Movement, corrective_trial, execute, hand_sequences, load_task
+from coartic.analysis.calibration.simulation import Check, Draw, simulate
+from coartic.analysis.signatures.context import lead_time, permutation_p
+from coartic.analysis.signatures.locus import locus_slopes, slope_norm
+from coartic.analysis.signatures.manifold import movable, subspaces, synergy
+from coartic.analysis.signatures.subtasks import ROUNDING, change_from, sacrifice_p, sacrifices
+from coartic.analysis.signatures.trajectories import entropy
+from coartic.analysis.statistics import intervals
+from coartic.analysis.statistics.intervals import Interval
 from coartic.robot import Array
 
 ALPHA = 0.05
@@ -317,4 +318,4 @@ def main() -> None:
 
 if __name__ == "__main__":
     # Other processes import what they are handed: by the module's name, not as __main__.
-    import_module("analysis.calibration.signatures").main()
+    import_module("coartic.analysis.calibration.signatures").main()

@@ -12,7 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy import stats
 
-from analysis.statistics.intervals import Interval
+from coartic.analysis.statistics.intervals import Interval
 from coartic.robot import Array
 
 Draw = Callable[[np.random.Generator, int], Array]

@@ -1,4 +1,4 @@
-"""The learner tuned as CMA-ES was: ``python -m analysis.calibration.tuning``.
+"""The learner tuned as CMA-ES was: ``python -m coartic.analysis.calibration.tuning``.
 
 CMA-ES's two parameters were chosen among five and four values with three or four runs each, on
 the paper's tasks (baselines/cma_es.py). Here the learner's two get as much: four values of the
@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.statistics.estimates import SEED, Inference, paired_difference
 from coartic import CONDITIONS, ExplorationCondition, learn_many, load_task
+from coartic.analysis.statistics.estimates import SEED, Inference, paired_difference
 from coartic.robot import Array
 
 NOISE = (0.02, 0.05, 0.1, 0.2)

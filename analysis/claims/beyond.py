@@ -6,18 +6,18 @@ import itertools
 import math
 from dataclasses import replace
 
-from analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
-from analysis.claims.evidence import by_optimum, estimate_of, layout, measured
-from analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
-from analysis.claims.register import Finding
-from analysis.claims.statements import decides
-from analysis.methods import LEARNER
-from analysis.published import Summary, published_cell
-from analysis.report.document import Estimate, RestsOn
-from analysis.results.optima import OtherArm
-from analysis.statistics.equivalence import MARGIN, difference
-from analysis.statistics.estimates import SEED, difference_of_means, mean
-from analysis.words import NONE, interval
+from coartic.analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
+from coartic.analysis.claims.evidence import by_optimum, estimate_of, layout, measured
+from coartic.analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import decides
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import Summary, published_cell
+from coartic.analysis.report.document import Estimate, RestsOn
+from coartic.analysis.results.optima import OtherArm
+from coartic.analysis.statistics.equivalence import MARGIN, difference
+from coartic.analysis.statistics.estimates import SEED, difference_of_means, mean
+from coartic.analysis.words import NONE, interval
 
 
 @decides("learned-rewards-as-printed")

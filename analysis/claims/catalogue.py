@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.claims import (  # noqa: F401  (their judges enter themselves)
+from coartic.analysis.claims import (  # noqa: F401  (their judges enter themselves)
     beyond,
     coarticulation,
     costs,
@@ -21,14 +21,14 @@ from analysis.claims import (  # noqa: F401  (their judges enter themselves)
     rules,
     two_armed,
 )
-from analysis.claims.data import Data, MissingError
-from analysis.claims.power import Chances, over_instances, powers
-from analysis.claims.register import Claim, Correction, Judged
-from analysis.claims.statements import JUDGED, STATEMENTS
-from analysis.statistics.hypotheses import holm
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.power import Chances, over_instances, powers
+from coartic.analysis.claims.register import Claim, Correction, Judged
+from coartic.analysis.claims.statements import JUDGED, STATEMENTS
+from coartic.analysis.statistics.hypotheses import holm
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 if STATEMENTS.keys() - JUDGED.keys():
     without = ", ".join(STATEMENTS.keys() - JUDGED.keys())

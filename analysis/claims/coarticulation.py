@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import ONE, TWO, Data, MissingError
-from analysis.claims.evidence import all_hold, exceeds, shown
-from analysis.claims.register import Finding
-from analysis.claims.statements import MARGINS, decides
-from analysis.methods import LEARNER
-from analysis.signatures.other_arm import preshaping, readiness
-from analysis.signatures.subtasks import isolated_agreement, served
-from analysis.signatures.trajectories import Trajectories
-from analysis.statistics.estimates import FEWEST
-from analysis.statistics.hypotheses import share_test
+from coartic.analysis.claims.data import ONE, TWO, Data, MissingError
+from coartic.analysis.claims.evidence import all_hold, exceeds, shown
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import MARGINS, decides
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.signatures.other_arm import preshaping, readiness
+from coartic.analysis.signatures.subtasks import isolated_agreement, served
+from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.statistics.estimates import FEWEST
+from coartic.analysis.statistics.hypotheses import share_test
 from coartic.robot import Array
 
 _CONTROLS = ("corrective-alone/every", "posture-based/one-goal hands=every, other_arm=free")
@@ -58,7 +58,8 @@ def _arm_prepares(data: Data) -> Finding:
 
 
 def _served(cell: Trajectories) -> Array:
-    """Means over goals of :func:`analysis.signatures.subtasks.served`, shape ``(2, runs)``."""
+    """Means over goals of :func:`coartic.analysis.signatures.subtasks.served`, shape ``(2,
+    runs)``."""
     gains = np.array([served(run) for run in cell.runs])
     if not np.isfinite(gains).all():
         raise MissingError(f"the corrective process alone misses a goal of {cell.task.name}")
@@ -68,7 +69,7 @@ def _served(cell: Trajectories) -> Array:
 def prepared_by_waiting(cell: Trajectories) -> Array:
     """How much nearer the waiting arm has brought its hand to its next goal, mean over goals.
 
-    :func:`analysis.signatures.other_arm.preshaping` of each run, shape ``(runs,)``:
+    :func:`coartic.analysis.signatures.other_arm.preshaping` of each run, shape ``(runs,)``:
     0 where the arm keeps still. Runs that use one hand only are left out. Raises MissingError
     where the corrective process alone does not complete the task.
     """

@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from typing import Any
 
-from analysis.claims.data import BEST, UNINFORMED, Data, MissingError
-from analysis.claims.evidence import by_optimum, layout, measured
-from analysis.claims.register import Finding
-from analysis.claims.statements import MARGINS, decides
-from analysis.comparisons.methods import TOLD, MethodRow
-from analysis.methods import LEARNER
-from analysis.report.document import Row, Value
+from coartic.analysis.claims.data import BEST, UNINFORMED, Data, MissingError
+from coartic.analysis.claims.evidence import by_optimum, layout, measured
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import MARGINS, decides
+from coartic.analysis.comparisons.methods import TOLD, MethodRow
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.report.document import Row, Value
 from coartic.method import Information
 from coartic.record import SEARCH
 

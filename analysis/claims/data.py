@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import TOLD, MethodRow
-from analysis.methods import LEARNER
-from analysis.published import TRIALS, published_cells
-from analysis.signatures.rows import SignatureRow
-from analysis.signatures.trajectories import Trajectories, best_sequences
-from analysis.statistics.estimates import FEWEST
 from coartic import Execution, Task
+from coartic.analysis.comparisons.methods import TOLD, MethodRow
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import TRIALS, published_cells
+from coartic.analysis.signatures.rows import SignatureRow
+from coartic.analysis.signatures.trajectories import Trajectories, best_sequences
+from coartic.analysis.statistics.estimates import FEWEST
 from coartic.method import Information
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 ASCENDING, DESCENDING = "ascending", "descending"
 ONE, TWO = "two-armed-1", "two-armed-2"

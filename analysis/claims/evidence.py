@@ -7,13 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.claims.register import Finding
-from analysis.report.document import DataTable, Estimate, Row, Value
-from analysis.report.tables.layout import LAYOUTS, Layout
-from analysis.results.optima import ARMS, OtherArm
-from analysis.statistics.estimates import SEED, Inference, mean
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.words import interval
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.report.document import DataTable, Estimate, Row, Value
+from coartic.analysis.report.tables.layout import LAYOUTS, Layout
+from coartic.analysis.results.optima import ARMS, OtherArm
+from coartic.analysis.statistics.estimates import SEED, Inference, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.words import interval
 from coartic.robot import Array
 
 

@@ -11,16 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import Data, MissingError
-from analysis.claims.evidence import all_hold, exceeds, shown
-from analysis.claims.register import Finding
-from analysis.claims.statements import MARGINS, STATEMENTS, decides
-from analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
-from analysis.methods import LEARNER
-from analysis.signatures.subtasks import ROUNDING
-from analysis.statistics import spread
-from analysis.statistics.estimates import FEWEST
-from analysis.words import tally
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.evidence import all_hold, exceeds, shown
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import MARGINS, STATEMENTS, decides
+from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.signatures.subtasks import ROUNDING
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import FEWEST
+from coartic.analysis.words import tally
 from coartic.robot import Array
 
 COMPARED = (

@@ -14,18 +14,18 @@ from functools import lru_cache
 import numpy as np
 from scipy import optimize, stats
 
-from analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
-from analysis.claims.evidence import all_hold, exceeds, shown
-from analysis.claims.register import Finding
-from analysis.claims.statements import MARGINS, decides, decides_apart
-from analysis.methods import LEARNER
-from analysis.printed import ENTRIES, Order, Solved
-from analysis.published import TRIALS, Summary, published_cell
-from analysis.signatures.manifold import movable
-from analysis.signatures.subtasks import postures_before
-from analysis.statistics.estimates import SEED
-from analysis.words import short
 from coartic import Hand, Task
+from coartic.analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
+from coartic.analysis.claims.evidence import all_hold, exceeds, shown
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import MARGINS, decides, decides_apart
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.printed import ENTRIES, Order, Solved
+from coartic.analysis.published import TRIALS, Summary, published_cell
+from coartic.analysis.signatures.manifold import movable
+from coartic.analysis.signatures.subtasks import postures_before
+from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.words import short
 from coartic.learner import PARTS
 from coartic.record import SEARCH
 from coartic.robot import Array, Robot

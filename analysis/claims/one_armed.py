@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
-from analysis.claims.evidence import all_hold, exceeds, shown
-from analysis.claims.register import Finding
-from analysis.claims.statements import MARGINS, decides
-from analysis.methods import LEARNER
-from analysis.signatures.context import dependence_below
-from analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
-from analysis.signatures.trajectories import postures
-from analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.claims.data import ASCENDING, DESCENDING, Data, MissingError
+from coartic.analysis.claims.evidence import all_hold, exceeds, shown
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import MARGINS, decides
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.signatures.context import dependence_below
+from coartic.analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
+from coartic.analysis.signatures.trajectories import postures
+from coartic.analysis.statistics.estimates import SEED, Inference
 from coartic.robot import Array
 
 CONTROLS = ("posture-based/one-goal", "corrective-alone/given")

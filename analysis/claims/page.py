@@ -1,4 +1,4 @@
-"""The register as a page: ``python -m analysis.claims.page > docs/register.md``.
+"""The register as a page: ``python -m coartic.analysis.claims.page > docs/register.md``.
 
 Rules, margins, claims with their power at the paper's number of runs, and the whole paper sentence
 by sentence; no verdicts, which are those of a folder.
@@ -14,13 +14,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from analysis.claims.catalogue import CLAIMS, family_sizes
-from analysis.claims.power import SIMULATIONS, TRIED, Chances, powers, runs_needed
-from analysis.claims.register import CHOSEN, FITTED, RULES, Claim
-from analysis.claims.statements import REASONS
-from analysis.published import RUNS
-from analysis.statistics.estimates import LEVEL
-from analysis.statistics.power import POWER, smallest_difference
+from coartic.analysis.claims.catalogue import CLAIMS, family_sizes
+from coartic.analysis.claims.power import SIMULATIONS, TRIED, Chances, powers, runs_needed
+from coartic.analysis.claims.register import CHOSEN, FITTED, RULES, Claim
+from coartic.analysis.claims.statements import REASONS
+from coartic.analysis.published import RUNS
+from coartic.analysis.statistics.estimates import LEVEL
+from coartic.analysis.statistics.power import POWER, smallest_difference
 
 SENTENCES: list[dict[str, Any]] = tomllib.loads(
     Path(__file__).with_name("sentences.toml").read_text(encoding="utf-8")
@@ -49,7 +49,7 @@ def _lines() -> Iterator[str]:
     yield ""
     yield (
         "What Shah, Barto & Fagg (2013) say of their model, and how each sentence is judged, "
-        "before any run is looked at. Made by `python -m analysis.claims.page` of "
+        "before any run is looked at. Made by `python -m coartic.analysis.claims.page` of "
         "`analysis/claims/claims.toml` and `sentences.toml`; verdicts are those of a folder "
         "(`claims.md` of `coartic analyse`, the report)."
     )

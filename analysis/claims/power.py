@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from analysis.claims.register import Claim, Correction
-from analysis.claims.rules import (
+from coartic.analysis.claims.register import Claim, Correction
+from coartic.analysis.claims.rules import (
     FEW,
     MOST,
     Side,
@@ -34,14 +34,14 @@ from analysis.claims.rules import (
     sides,
     unlike_p,
 )
-from analysis.methods import LEARNER
-from analysis.printed import ENTRIES, Order
-from analysis.published import RUNS, published_cell
-from analysis.statistics.estimates import FEWEST, LEVEL, SEED
-from analysis.statistics.hypotheses import independence_test, share_p
-from analysis.statistics.instances import chance
-from analysis.statistics.power import POWER
-from analysis.statistics.spread import sd
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.printed import ENTRIES, Order
+from coartic.analysis.published import RUNS, published_cell
+from coartic.analysis.statistics.estimates import FEWEST, LEVEL, SEED
+from coartic.analysis.statistics.hypotheses import independence_test, share_p
+from coartic.analysis.statistics.instances import chance
+from coartic.analysis.statistics.power import POWER
+from coartic.analysis.statistics.spread import sd
 from coartic.robot import Array
 
 SIMULATIONS = 2_000

@@ -7,15 +7,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NamedTuple
 
-from analysis.claims.coarticulation import prepared_by_waiting
-from analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError
-from analysis.claims.evidence import measured
-from analysis.claims.one_armed import context_distance, sacrifice
-from analysis.claims.register import Finding
-from analysis.claims.statements import MARGINS, decides
-from analysis.methods import LEARNER
-from analysis.report.document import CellKey, Row, Value
-from analysis.statistics.estimates import LEVEL
+from coartic.analysis.claims.coarticulation import prepared_by_waiting
+from coartic.analysis.claims.data import ASCENDING, DESCENDING, ONE, Data, MissingError
+from coartic.analysis.claims.evidence import measured
+from coartic.analysis.claims.one_armed import context_distance, sacrifice
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.statements import MARGINS, decides
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.report.document import CellKey, Row, Value
+from coartic.analysis.statistics.estimates import LEVEL
 
 _PLAN, _POSTURES = "trajectory-optimisation/", "posture-based/"
 _FREE = " hands=every, other_arm=free"

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from analysis.claims.data import Data
-from analysis.claims.reconstructions import held_by
-from analysis.report.document import DataTable
-from analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
+from coartic.analysis.claims.data import Data
+from coartic.analysis.claims.reconstructions import held_by
+from coartic.analysis.report.document import DataTable
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
 from coartic.robot import Array
 
 Verdict = Literal["supported", "not supported", "cannot tell", "measured"]
@@ -143,7 +143,7 @@ class Judged(Finding):
     """Chance of *supported* with so many runs if the paper's numbers are exactly right, or the
     claim's effect is; NaN where there is neither."""
     contrary_power: float = math.nan
-    """Chance of *not supported* if the contrary holds: :mod:`analysis.claims.power`."""
+    """Chance of *not supported* if the contrary holds: :mod:`coartic.analysis.claims.power`."""
 
     @property
     def p(self) -> float:

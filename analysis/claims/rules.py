@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.claims.data import Data
-from analysis.claims.evidence import all_hold, exceeds, shown
-from analysis.claims.register import Claim, Finding
-from analysis.claims.statements import JUDGED, MARGINS, STATEMENTS
-from analysis.printed import ENTRIES, Count
-from analysis.published import published_cell, published_exhaustive, published_initial
-from analysis.statistics.estimates import (
+from coartic.analysis.claims.data import Data
+from coartic.analysis.claims.evidence import all_hold, exceeds, shown
+from coartic.analysis.claims.register import Claim, Finding
+from coartic.analysis.claims.statements import JUDGED, MARGINS, STATEMENTS
+from coartic.analysis.printed import ENTRIES, Count
+from coartic.analysis.published import published_cell, published_exhaustive, published_initial
+from coartic.analysis.statistics.estimates import (
     SEED,
     Inference,
     difference_of_means,
     probability_of_improvement,
 )
-from analysis.statistics.hypotheses import Alternative, share_p, share_test
-from analysis.words import interval, tally
+from coartic.analysis.statistics.hypotheses import Alternative, share_p, share_test
+from coartic.analysis.words import interval, tally
 from coartic.robot import Array
 
 FEW, MOST = MARGINS["few"], MARGINS["most"]

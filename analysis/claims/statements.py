@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from analysis.claims.data import Cells
-from analysis.claims.register import Claim, Finding
-from analysis.printed import ENTRIES
+from coartic.analysis.claims.data import Cells
+from coartic.analysis.claims.register import Claim, Finding
+from coartic.analysis.printed import ENTRIES
 
 _APART = ("one-armed", "two-armed")
 _REGISTER = tomllib.loads((Path(__file__).parent / "claims.toml").read_text(encoding="utf-8"))

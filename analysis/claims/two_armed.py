@@ -7,15 +7,15 @@ from collections import Counter
 
 import numpy as np
 
-from analysis.claims.data import FREE, ONE, TWO, Data, MissingError
-from analysis.claims.register import Finding
-from analysis.claims.rules import nearly_all
-from analysis.claims.statements import decides
-from analysis.methods import LEARNER
-from analysis.published import published_exhaustive, published_initial
-from analysis.statistics.estimates import SEED, Inference
-from analysis.statistics.hypotheses import independence_test
-from analysis.words import tally
+from coartic.analysis.claims.data import FREE, ONE, TWO, Data, MissingError
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.claims.rules import nearly_all
+from coartic.analysis.claims.statements import decides
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import published_exhaustive, published_initial
+from coartic.analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.statistics.hypotheses import independence_test
+from coartic.analysis.words import tally
 from coartic.robot import Array
 
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.progress import BestSoFar, cells_by_spend
-from analysis.statistics.intervals import mean_interval
+from coartic.analysis.comparisons.progress import BestSoFar, cells_by_spend
+from coartic.analysis.statistics.intervals import mean_interval
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 POINTS = 60
 """Budgets on an anytime curve."""
@@ -35,11 +35,12 @@ def anytime_curves(study: Study) -> pd.DataFrame:
     A curve starts where the first run has a solution and ends where the first run ends, so
     that nothing is extrapolated. The mean is missing until every run has a solution, never
     one of the faster runs alone; the median counts a run without one as worse than any.
-    Intervals are those of :func:`analysis.statistics.intervals.mean_interval`, pointwise, not
+    Intervals are those of :func:`coartic.analysis.statistics.intervals.mean_interval`, pointwise,
+    not
     a band around the whole curve; they are missing for a single run. A cell's rows do not depend
     on other cells. Runs whose time is not taken
-    (:func:`analysis.comparisons.methods.solve_times`) have no part in the curve over time, nor
-    methods with a base that a parameter locks in any.
+    (:func:`coartic.analysis.comparisons.methods.solve_times`) have no part in the curve over
+    time, nor methods with a base that a parameter locks in any.
     """
     parts = []
     for cell, spend, runs in cells_by_spend(study):

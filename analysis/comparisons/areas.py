@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.progress import BestSoFar, cells_by_optimum, cells_by_spend
-from analysis.statistics.intervals import mean_interval
+from coartic.analysis.comparisons.progress import BestSoFar, cells_by_optimum, cells_by_spend
+from coartic.analysis.statistics.intervals import mean_interval
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 
 class Area(NamedTuple):
@@ -46,7 +46,8 @@ def areas(study: Study) -> pd.DataFrame:
 
     Columns: those of :class:`Area`. ``other_arm``: which optimum; ``area`` is the mean over
     ``runs`` with its interval ``low`` to ``high``
-    (:func:`analysis.statistics.intervals.mean_interval`). Tasks without a known optimum, spends
+    (:func:`coartic.analysis.statistics.intervals.mean_interval`). Tasks without a known optimum,
+    spends
     without a run that learns, and methods with a base that a parameter locks have no rows; of
     the optimum with the other arm still neither have methods that move that arm.
     """

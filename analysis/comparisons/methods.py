@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.results.folder import Cell, CellKey, CellRuns
-from analysis.results.optima import locks_base
-from analysis.statistics.spread import sd
-from analysis.words import tally
+from coartic.analysis.results.folder import Cell, CellKey, CellRuns
+from coartic.analysis.results.optima import locks_base
+from coartic.analysis.statistics.spread import sd
+from coartic.analysis.words import tally
 from coartic.method import Information
 from coartic.record import SEARCH
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 TOLD = {
     Information.GOALS: "G",

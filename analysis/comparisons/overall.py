@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from analysis.methods import LEARNER
-from analysis.statistics.across_tasks import (
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.statistics.across_tasks import (
     Reached,
     gap_share,
     interquartile_mean,
@@ -25,13 +25,13 @@ from analysis.statistics.across_tasks import (
     profile,
     task_mean,
 )
-from analysis.statistics.estimates import FEWEST, SEED, Inference
+from coartic.analysis.statistics.estimates import FEWEST, SEED, Inference
 from coartic.initial import initial_hands
 from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 NEAR = (0.01, 0.02, 0.05, 0.1)
 """Gaps, as shares of the optimum, that count as near."""
@@ -76,8 +76,8 @@ def normalised_scores(study: Study) -> pd.DataFrame:
 
     Columns ``task``, ``method`` (with its variant), ``label`` (the cell's, whatever becomes
     of ``method``), ``run``, ``seed``, ``reward``;
-    ``score`` (:func:`~analysis.statistics.across_tasks.normalised`) and ``gap``
-    (:func:`~analysis.statistics.across_tasks.gap_share`), both against the optimum
+    ``score`` (:func:`~coartic.analysis.statistics.across_tasks.normalised`) and ``gap``
+    (:func:`~coartic.analysis.statistics.across_tasks.gap_share`), both against the optimum
     with all joints free and the corrective process alone with the task's initial hands. A
     run without a solution has NaN for all three.
     """

@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import MethodRow
-from analysis.comparisons.targets import SHARES
-from analysis.methods import LEARNER
-from analysis.results.folder import CellRuns
-from analysis.statistics.estimates import (
+from coartic.analysis.comparisons.methods import MethodRow
+from coartic.analysis.comparisons.targets import SHARES
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.statistics.estimates import (
     SEED,
     cliffs_delta,
     difference_of_means,
@@ -37,17 +37,22 @@ from analysis.statistics.estimates import (
     paired_difference,
     probability_of_improvement,
 )
-from analysis.statistics.hypotheses import bootstrap_test, holm, permutation_test, sign_flip_test
-from analysis.statistics.power import runs_needed, smallest_difference
+from coartic.analysis.statistics.hypotheses import (
+    bootstrap_test,
+    holm,
+    permutation_test,
+    sign_flip_test,
+)
+from coartic.analysis.statistics.power import runs_needed, smallest_difference
 from coartic.exploration import CONDITIONS
 from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 SPENDS = ("trials", "movement_ticks", "evaluations", "solve_s")
-"""What a run spends, of :class:`analysis.comparisons.methods.MethodRow`."""
+"""What a run spends, of :class:`coartic.analysis.comparisons.methods.MethodRow`."""
 RUNS_FOR = {f"runs_{share:.0%}".removesuffix("%"): share for share in SHARES}
 """Differences, as shares of the optimum, for which so many runs are needed."""
 Kind = Literal["conditions", "variant", "method"]
@@ -138,7 +143,7 @@ class PairRow:
     p: float = math.nan
     p_holm: float = math.nan
     """Adjusted over the task's pairs that are not of conditions, whose one adjusted p-value is
-    that of the claims (:mod:`analysis.claims`)."""
+    that of the claims (:mod:`coartic.analysis.claims`)."""
     delta: float = math.nan
     """Cliff's."""
     delta_low: float = math.nan
@@ -156,7 +161,7 @@ class PairRow:
     solve_s: float
     told_more: str
     """Letters of the information that only the second is told
-    (:data:`analysis.comparisons.methods.TOLD`)."""
+    (:data:`coartic.analysis.comparisons.methods.TOLD`)."""
     told_less: str
     """That only the first is told."""
     runs_5: float

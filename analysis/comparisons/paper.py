@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from analysis.methods import LEARNER
-from analysis.published import (
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import (
     RUNS,
     TRIALS,
     PublishedCell,
@@ -14,12 +14,12 @@ from analysis.published import (
     published_cell,
     published_initial,
 )
-from analysis.results.folder import CellRuns
-from analysis.statistics.equivalence import Equivalence, difference
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.statistics.equivalence import Equivalence, difference
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 
 @dataclass(frozen=True)

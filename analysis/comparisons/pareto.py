@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.methods import solve_times
-from analysis.comparisons.progress import LABELS
-from analysis.results.folder import CellRuns
-from analysis.results.optima import locks_base
-from analysis.statistics.intervals import resampled
+from coartic.analysis.comparisons.methods import solve_times
+from coartic.analysis.comparisons.progress import LABELS
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.results.optima import locks_base
+from coartic.analysis.statistics.intervals import resampled
 from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 TIME_TOLERANCE = 0.1
 """Relative difference up to which two solve times are a tie."""
@@ -36,12 +36,12 @@ def pareto_sets(study: Study) -> pd.DataFrame:
     either one better; ties are all on it. Times within :data:`TIME_TOLERANCE` of each other
     are ties: they vary between machines and between runs. Columns: ``task``, ``method``,
     ``told`` (a letter for each kind of information,
-    :data:`analysis.comparisons.methods.TOLD`), ``runs``,
-    ``solved``, mean ``reward``, ``spend`` (:data:`~analysis.comparisons.progress.LABELS`;
+    :data:`coartic.analysis.comparisons.methods.TOLD`), ``runs``,
+    ``solved``, mean ``reward``, ``spend`` (:data:`~coartic.analysis.comparisons.progress.LABELS`;
     ``information`` is the number of kinds of information told, which does not weigh them),
     ``amount`` (median over runs), ``front``, ``front_share`` (of
-    :data:`~analysis.statistics.intervals.RESAMPLES` bootstrap resamples, in how many it is on
-    the front), and ``front_told`` and ``told_share``: the same among methods that were told
+    :data:`~coartic.analysis.statistics.intervals.RESAMPLES` bootstrap resamples, in how many it
+    is on the front), and ``front_told`` and ``told_share``: the same among methods that were told
     nothing that it was not.
 
     Runs are resampled within their cell, reward and spend of a run together, by run number:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.comparisons.methods import STILL, solve_times
-from analysis.results.folder import CellRuns
-from analysis.results.optima import ARMS, locks_base
+from coartic.analysis.comparisons.methods import STILL, solve_times
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.results.optima import ARMS, locks_base
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
 """What can be spent: columns of ``runs.parquet``; ``solve_s`` is wall time in s."""
@@ -75,7 +75,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     evaluations were 0.6 to 1.5 times their even share, 3.4 times for the first 10 trials of
     CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
     a learner without its corrective process spends most of them on its first trial. Times
-    are those of :func:`analysis.comparisons.methods.solve_times`: without building.
+    are those of :func:`coartic.analysis.comparisons.methods.solve_times`: without building.
 
     A run was stopped if it made as many trials as it was given: by its parameter ``trials``
     or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.comparisons.overall import ends, variant
-from analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
-from analysis.statistics.estimates import FEWEST, SEED, TAILS
+from coartic.analysis.comparisons.overall import ends, variant
+from coartic.analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
+from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS
 from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 WAY = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
@@ -38,7 +38,7 @@ class Reached(NamedTuple):
     method: str
     """Label, or the learner's over one-armed and two-armed tasks."""
     spend: str
-    """Of :data:`~analysis.comparisons.progress.SPENDS`."""
+    """Of :data:`~coartic.analysis.comparisons.progress.SPENDS`."""
     budget: float
     """0 is for what spends nothing."""
     share: float
@@ -51,7 +51,8 @@ class Reached(NamedTuple):
 def reached(study: Study) -> pd.DataFrame:
     """Rows as :class:`Reached`, where a share changes, of all methods without their variants.
 
-    Of the tasks that have a scale (:func:`~analysis.comparisons.overall.ends`); a run whose
+    Of the tasks that have a scale (:func:`~coartic.analysis.comparisons.overall.ends`); a run
+    whose
     steps are not known, such as the time of a cold one, has no part. A method has rows over all
     tasks if it ran on every one of them.
     """

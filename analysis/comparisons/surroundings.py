@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from analysis.study import Study
+from coartic.analysis.study import Study
 
 _WORDS = {"title", "description", "provenance"}  # of a task; they change no result
 

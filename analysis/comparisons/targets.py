@@ -11,14 +11,14 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from analysis.comparisons.progress import BestSoFar, cells_by_optimum
-from analysis.results.folder import CellRuns
-from analysis.statistics.estimates import CONFIDENCE
-from analysis.statistics.intervals import kaplan_meier_median
+from coartic.analysis.comparisons.progress import BestSoFar, cells_by_optimum
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.statistics.estimates import CONFIDENCE
+from coartic.analysis.statistics.intervals import kaplan_meier_median
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 SHARES = (0.05, 0.02, 0.01)
 """Distances from the optimum that count as reached, as shares of it."""
@@ -51,7 +51,7 @@ def targets(study: Study, *, shares: Sequence[float] = SHARES) -> pd.DataFrame:
     ``target`` (the reward that this takes), ``runs``, ``reached`` (how many runs),
     ``reached_low`` and ``reached_high`` (exact 95 % interval of the probability to reach it,
     Clopper & Pearson, 1934), ``median`` spend to reach it with the interval ``low`` to ``high``
-    (:func:`analysis.statistics.intervals.kaplan_meier_median`), and ``horizon``.
+    (:func:`coartic.analysis.statistics.intervals.kaplan_meier_median`), and ``horizon``.
 
     The median is over all runs, infinite where half of them did not reach the target; so
     are limits that the runs do not bound. Runs that could have gone on are right-censored,
@@ -59,7 +59,8 @@ def targets(study: Study, *, shares: Sequence[float] = SHARES) -> pd.DataFrame:
     would make censoring depend on the outcome: worse trials take more ticks. Lin et al.,
     1997, on costs.) What was reached behind the horizon counts in ``reached`` only. A run
     could have gone on if its budget of trials stopped it (:attr:`BestSoFar.stopped
-    <analysis.comparisons.progress.BestSoFar.stopped>`). Runs that ended by themselves never
+    <coartic.analysis.comparisons.progress.BestSoFar.stopped>`). Runs that ended by themselves
+    never
     reach a target that they missed: a planner's, an exhaustive search's that tried all it had,
     one without a solution. The horizon is infinite where all runs ended by themselves. Runs
     whose time is not taken have no part in those over time.

@@ -16,14 +16,19 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.comparisons.methods import MethodRow
-from analysis.comparisons.surroundings import Differing, codes, differing_tasks, surroundings
-from analysis.results.folder import CellRuns
-from analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
-from analysis.statistics.estimates import FEWEST, SEED, difference_of_means, paired_by_seed
-from analysis.statistics.hypotheses import bootstrap_test, holm
-from analysis.study import Study, load
 from coartic import CoarticError
+from coartic.analysis.comparisons.methods import MethodRow
+from coartic.analysis.comparisons.surroundings import (
+    Differing,
+    codes,
+    differing_tasks,
+    surroundings,
+)
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
+from coartic.analysis.statistics.estimates import FEWEST, SEED, difference_of_means, paired_by_seed
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.study import Study, load
 from coartic.packs import Packs
 from coartic.robot import Array
 
@@ -129,7 +134,7 @@ def load_pair(first: Path, second: Path) -> tuple[Study, Study]:
     """Two results folders that can be compared.
 
     Raises CoarticError for one folder given twice, and for one that is no results folder,
-    is damaged or has another format (:func:`~analysis.results.folder.load_results`).
+    is damaged or has another format (:func:`~coartic.analysis.results.folder.load_results`).
     """
     if first.exists() and second.exists() and first.samefile(second):
         raise CoarticError(

@@ -21,9 +21,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from analysis.figures.moving import moving_picture
-from analysis.figures.robot import MARKERS, box, numbered_below
 from coartic import CoarticError, Trajectory
+from coartic.analysis.figures.moving import moving_picture
+from coartic.analysis.figures.robot import MARKERS, box, numbered_below
 from coartic.files import check_outputs, write_outputs
 
 FORMATS = (".gif", ".mp4", ".svg")

@@ -12,16 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
-from analysis.comparisons.paper import published_of
-from analysis.figures import style
-from analysis.figures.configurations import initial_solution
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import CONDITIONS, has, missing, solved
-from analysis.methods import LEARNER, short_name
-from analysis.published import Summary, published_cell, published_initial
-from analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.study import Study
+from coartic.analysis.comparisons.paper import published_of
+from coartic.analysis.figures import style
+from coartic.analysis.figures.configurations import initial_solution
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import CONDITIONS, has, missing, solved
+from coartic.analysis.methods import LEARNER, short_name
+from coartic.analysis.published import Summary, published_cell, published_initial
+from coartic.analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.study import Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 

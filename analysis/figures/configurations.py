@@ -12,14 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.figures.selection import CONDITIONS, missing, solved
-from analysis.methods import short_name
-from analysis.signatures.trajectories import Trajectories
-from analysis.study import Study
 from coartic import Execution, Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
+from coartic.analysis.figures.selection import CONDITIONS, missing, solved
+from coartic.analysis.methods import short_name
+from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.study import Study
 from coartic.robot import Array
 from coartic.task import hands_of
 

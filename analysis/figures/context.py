@@ -12,13 +12,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures import style
-from analysis.figures.bars import stars
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import chosen, missing
-from analysis.methods import short_name
-from analysis.statistics.hypotheses import holm
-from analysis.study import Study
+from coartic.analysis.figures import style
+from coartic.analysis.figures.bars import stars
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import chosen, missing
+from coartic.analysis.methods import short_name
+from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.study import Study
 
 MOST = 6
 _OPEN: Any = {"marker": "s", "color": style.VERMILLION, "markerfacecolor": style.PAPER}

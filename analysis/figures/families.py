@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures import style
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import missing
-from analysis.generality.exploration import CONTRASTS, gains
-from analysis.generality.sample import INITIAL, Sample
-from analysis.methods import short_name
-from analysis.statistics.estimates import SEED
-from analysis.statistics.instances import RESAMPLES, other_tasks, value
-from analysis.study import Study
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import missing
+from coartic.analysis.generality.exploration import CONTRASTS, gains
+from coartic.analysis.generality.sample import INITIAL, Sample
+from coartic.analysis.methods import short_name
+from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.statistics.instances import RESAMPLES, other_tasks, value
+from coartic.analysis.study import Study
 
 _FARTHEST = 1.0
 """Gap at the right end; what is beyond stands at the end."""

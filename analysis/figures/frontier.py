@@ -10,13 +10,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.comparisons.progress import SPENDS
-from analysis.figures import style
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import chosen, missing
-from analysis.methods import short_name
-from analysis.study import Study
 from coartic import Task
+from coartic.analysis.comparisons.progress import SPENDS
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import chosen, missing
+from coartic.analysis.methods import short_name
+from coartic.analysis.study import Study
 from coartic.record import SEARCH
 
 NAMES = {

@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from analysis.figures import style
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import CONDITIONS, has, missing
-from analysis.methods import short_name
-from analysis.signatures.trajectories import Trajectories
-from analysis.study import Study
 from coartic import Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import CONDITIONS, has, missing
+from coartic.analysis.methods import short_name
+from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.study import Study
 from coartic.robot import Array
 
 WINDOW = 100

@@ -1,6 +1,7 @@
 """Movements tick by tick as one SVG that moves by itself, wherever pictures are shown.
 
-By the conventions of the films of :mod:`analysis.figures.animation`, in SVG's own animation
+By the conventions of the films of :mod:`coartic.analysis.figures.animation`, in SVG's own
+animation
 (SMIL), without a script. What does not move shows the end of each movement.
 """
 
@@ -12,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.figures.robot import box, numbered_below
 from coartic import Trajectory
+from coartic.analysis.figures.robot import box, numbered_below
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.figures.animation import Panel, Timing
+    from coartic.analysis.figures.animation import Panel, Timing
 
 _TITLE, _FOOT, _GAP = 26.0, 26.0, 14.0  # pixels above and below a panel, and between two
 _DEFS = (

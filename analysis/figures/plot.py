@@ -17,10 +17,10 @@ from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.text import Text
 from PIL import Image
 
-from analysis.figures.style import CONFIDENCE, GREY, INK, PAPER, RC, dagger
-from analysis.figures.svg import compact
-from analysis.methods import short_name
 from coartic import CoarticError, Task
+from coartic.analysis.figures.style import CONFIDENCE, GREY, INK, PAPER, RC, dagger
+from coartic.analysis.figures.svg import compact
+from coartic.analysis.methods import short_name
 from coartic.files import write_atomically
 from coartic.text import one_line, printed
 

@@ -13,13 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.robot import MARKERS, box
-from analysis.figures.selection import CONDITIONS, chosen, missing
-from analysis.methods import spoken_name
-from analysis.study import Study
 from coartic import Hand, Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.robot import MARKERS, box
+from coartic.analysis.figures.selection import CONDITIONS, chosen, missing
+from coartic.analysis.methods import spoken_name
+from coartic.analysis.study import Study
 from coartic.robot import Array
 from coartic.task import hands_of
 

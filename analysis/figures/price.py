@@ -9,13 +9,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.comparisons.reached import WAY
-from analysis.figures import style
-from analysis.figures.frontier import NAMES
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import CONDITIONS, HEADLINES, missing
-from analysis.methods import LEARNER, short_name
-from analysis.study import Study
+from coartic.analysis.comparisons.reached import WAY
+from coartic.analysis.figures import style
+from coartic.analysis.figures.frontier import NAMES
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import CONDITIONS, HEADLINES, missing
+from coartic.analysis.methods import LEARNER, short_name
+from coartic.analysis.study import Study
 
 SHOWN = ("trials", "forward_kinematics")
 """Spends that the printed figure has a panel of."""

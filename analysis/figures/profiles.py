@@ -9,14 +9,20 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.comparisons.overall import REACHED, by_task, normalised_scores
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.selection import CONDITIONS, HEADLINES, chosen, known_methods, missing
-from analysis.methods import short_name
-from analysis.statistics.across_tasks import profile
-from analysis.statistics.estimates import SEED
-from analysis.study import Study
+from coartic.analysis.comparisons.overall import REACHED, by_task, normalised_scores
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.selection import (
+    CONDITIONS,
+    HEADLINES,
+    chosen,
+    known_methods,
+    missing,
+)
+from coartic.analysis.methods import short_name
+from coartic.analysis.statistics.across_tasks import profile
+from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.study import Study
 
 LEARNER = "learner"
 """The paper's learner on all tasks: EC1 where there is one hand, EC4 where there are two."""

@@ -11,14 +11,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.selection import CONDITIONS, missing
-from analysis.methods import short_name
-from analysis.published import TRIALS, Summary
-from analysis.statistics.equivalence import MARGIN, Equivalence
-from analysis.study import Study
+from coartic.analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.selection import CONDITIONS, missing
+from coartic.analysis.methods import short_name
+from coartic.analysis.published import TRIALS, Summary
+from coartic.analysis.statistics.equivalence import MARGIN, Equivalence
+from coartic.analysis.study import Study
 
 _MARKS = {
     "equivalent": (style.BLUE, "o", style.BLUE),

@@ -10,15 +10,15 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.comparisons.methods import INFORMED, UNTOLD, informed
-from analysis.comparisons.overall import variant
-from analysis.comparisons.reached import ALL_TASKS
-from analysis.figures import style
-from analysis.figures.plot import Plot, spoken, worded
-from analysis.figures.selection import missing
-from analysis.methods import LEARNER, family_of, short_name
-from analysis.statistics.estimates import SEED, mean
-from analysis.study import Study
+from coartic.analysis.comparisons.methods import INFORMED, UNTOLD, informed
+from coartic.analysis.comparisons.overall import variant
+from coartic.analysis.comparisons.reached import ALL_TASKS
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.selection import missing
+from coartic.analysis.methods import LEARNER, family_of, short_name
+from coartic.analysis.statistics.estimates import SEED, mean
+from coartic.analysis.study import Study
 from coartic.record import SEARCH
 
 GROUPS = (*INFORMED.values(), UNTOLD)

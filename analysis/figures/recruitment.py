@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.comparisons.paper import published_of
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.selection import chosen, has, missing, solved
-from analysis.methods import short_name
-from analysis.published import RUNS
-from analysis.study import Study
 from coartic import Task
+from coartic.analysis.comparisons.paper import published_of
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.selection import chosen, has, missing, solved
+from coartic.analysis.methods import short_name
+from coartic.analysis.published import RUNS
+from coartic.analysis.study import Study
 
 MOST = len(style.PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""

@@ -8,25 +8,25 @@ from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
 
-from analysis.figures.bars import bars
-from analysis.figures.configurations import PAPER, paper_configurations
-from analysis.figures.context import context
-from analysis.figures.families import exploration_by_family, gaps_by_family
-from analysis.figures.frontier import frontier
-from analysis.figures.learning_curves import learning_curves
-from analysis.figures.plot import Plot
-from analysis.figures.postures import postures
-from analysis.figures.price import price
-from analysis.figures.profiles import profiles
-from analysis.figures.published import published
-from analysis.figures.ranking import ranking
-from analysis.figures.recruitment import recruitment
-from analysis.figures.selection import known_methods
-from analysis.figures.signature_matrix import signature_matrix
-from analysis.figures.tasks import tasks_of
-from analysis.generality.sample import one_by_one
-from analysis.study import Study
 from coartic import CoarticError
+from coartic.analysis.figures.bars import bars
+from coartic.analysis.figures.configurations import PAPER, paper_configurations
+from coartic.analysis.figures.context import context
+from coartic.analysis.figures.families import exploration_by_family, gaps_by_family
+from coartic.analysis.figures.frontier import frontier
+from coartic.analysis.figures.learning_curves import learning_curves
+from coartic.analysis.figures.plot import Plot
+from coartic.analysis.figures.postures import postures
+from coartic.analysis.figures.price import price
+from coartic.analysis.figures.profiles import profiles
+from coartic.analysis.figures.published import published
+from coartic.analysis.figures.ranking import ranking
+from coartic.analysis.figures.recruitment import recruitment
+from coartic.analysis.figures.selection import known_methods
+from coartic.analysis.figures.signature_matrix import signature_matrix
+from coartic.analysis.figures.tasks import tasks_of
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.study import Study
 from coartic.text import did_you_mean
 
 Section = Literal[

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 from numpy.typing import ArrayLike
 
-from analysis.figures.style import GREY, INK, PAPER, entry
 from coartic import Hand, Task
+from coartic.analysis.figures.style import GREY, INK, PAPER, entry
 from coartic.robot import Array
 
 MARKERS: dict[Hand, dict[str, Any]] = {

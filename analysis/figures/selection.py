@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.methods import LEARNER, METHODS
-from analysis.results.folder import CellRuns
-from analysis.study import Study
 from coartic import CoarticError
+from coartic.analysis.methods import LEARNER, METHODS
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.study import Study
 from coartic.text import did_you_mean
 
 CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in range(1, 5))

@@ -13,14 +13,14 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.selection import chosen, has, missing
-from analysis.methods import short_name
-from analysis.signatures.register import REGISTER
-from analysis.study import Study
-from analysis.words import slugs
 from coartic import Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.selection import chosen, has, missing
+from coartic.analysis.methods import short_name
+from coartic.analysis.signatures.register import REGISTER
+from coartic.analysis.study import Study
+from coartic.analysis.words import slugs
 
 SIGNATURES = {
     signature.name: signature.matrix for signature in REGISTER.values() if signature.matrix

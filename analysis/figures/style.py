@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
-from analysis.methods import METHODS, Color, Dash
-from analysis.statistics import estimates
 from coartic import Task
+from coartic.analysis.methods import METHODS, Color, Dash
+from coartic.analysis.statistics import estimates
 
 amount = EngFormatter(sep="")
 """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""

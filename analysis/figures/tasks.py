@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures import style
-from analysis.figures.plot import Plot, worded
-from analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from analysis.study import Study
 from coartic import Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
+from coartic.analysis.study import Study
 
 
 def tasks_of(study: Study, *, methods: Sequence[str] | None = None) -> Plot:

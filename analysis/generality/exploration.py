@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
-from analysis.statistics.estimates import LEVEL, SEED, Inference
-from analysis.statistics.hypotheses import bootstrap_test
-from analysis.statistics.instances import Scores, other_tasks, value
+from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.statistics.estimates import LEVEL, SEED, Inference
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.instances import Scores, other_tasks, value
 from coartic.robot import Array
 
 BUDGETS = (1_000, 10_000, 100_000)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.generality.sample import INITIAL, Sample
-from analysis.statistics.instances import Components, Paired, components, paired
+from coartic.analysis.generality.sample import INITIAL, Sample
+from coartic.analysis.statistics.instances import Components, Paired, components, paired
 
 DIFFERENCE = 0.01
 """Of the best known reward, between two methods."""

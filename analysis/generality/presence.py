@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
-from analysis.signatures.other_arm import preshaping
-from analysis.signatures.subtasks import isolated_agreement, served
-from analysis.signatures.trajectories import Trajectories, best_sequences, trajectories_of
-from analysis.statistics import spread
-from analysis.statistics.estimates import SEED, Inference
-from analysis.statistics.instances import other_tasks
 from coartic import Trajectory
+from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
+from coartic.analysis.signatures.other_arm import preshaping
+from coartic.analysis.signatures.subtasks import isolated_agreement, served
+from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, trajectories_of
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.statistics.instances import other_tasks
 from coartic.robot import Array
 
 SIGNS = {

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
-from analysis.signatures.trajectories import best_sequences
-from analysis.statistics.estimates import SEED
-from analysis.statistics.instances import Effect, regression
 from coartic import Task
+from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
+from coartic.analysis.signatures.trajectories import best_sequences
+from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.statistics.instances import Effect, regression
 
 PROPERTIES = {
     "distance": "mean distance from goal to goal, as a share of the reach",

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.methods import LEARNER
-from analysis.results.optima import locks_base
-from analysis.statistics.across_tasks import gap_share
-from analysis.statistics.instances import Runs, Scores
 from coartic import Task
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.results.optima import locks_base
+from coartic.analysis.statistics.across_tasks import gap_share
+from coartic.analysis.statistics.instances import Runs, Scores
 from coartic.record import SEARCH
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""

@@ -9,8 +9,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures import style
-from analysis.figures.plot import Plot
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Plot
 from coartic.text import counted
 
 _COLORS = {
@@ -29,7 +29,8 @@ _LEAST = 2  # specifications that make a curve
 def verdicts(table: pd.DataFrame) -> Plot:
     """The verdict of each claim under each set of readings, and its shares over members.
 
-    ``table`` is that of :func:`~analysis.reconstruction.specifications.judged_specifications`.
+    ``table`` is that of
+    :func:`~coartic.analysis.reconstruction.specifications.judged_specifications`.
     """
     plain = table[table.member == ""]
     sets = sorted(dict.fromkeys(plain.readings), key=lambda words: (words != "", words))
@@ -82,7 +83,8 @@ def _shared(table: pd.DataFrame, claim: str) -> str:
 def specification_curve(table: pd.DataFrame) -> Plot:
     """The effect of each claim, sorted over specifications, and the choices below.
 
-    ``table`` is that of :func:`~analysis.reconstruction.specifications.judged_specifications`;
+    ``table`` is that of
+    :func:`~coartic.analysis.reconstruction.specifications.judged_specifications`;
     claims without a test have no effect, and no panel.
     """
     data = table[table.effect.notna()]

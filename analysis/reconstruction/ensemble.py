@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reconstruction.constraints import Tried
+from coartic.analysis.reconstruction.constraints import Tried
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
-from analysis import printed
-from analysis.reconstruction.likelihood import Likelihood, likelihoods, of_gain, together
-from analysis.reconstruction.scoring import Figure, Learned, learned
-from analysis.reconstruction.targets import conditions_of, tests_of
 from coartic import CONDITIONS, Task, builtin_tasks, corrective_trial, load_task
+from coartic.analysis import printed
+from coartic.analysis.reconstruction.likelihood import Likelihood, likelihoods, of_gain, together
+from coartic.analysis.reconstruction.scoring import Figure, Learned, learned
+from coartic.analysis.reconstruction.targets import conditions_of, tests_of
 from coartic.readings import (
     ChosenReading,
     condition_under,

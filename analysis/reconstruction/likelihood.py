@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from analysis.reconstruction.scoring import Figure, Learned
+from coartic.analysis.reconstruction.scoring import Figure, Learned
 
 DRAWS = 2_000
 """Samples of runs from which the distribution of mean and SD is estimated."""

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import pandas as pd
 
-from analysis.reconstruction.constraints import RewardIs, sequences_of, try_sequences
-from analysis.reconstruction.scoring import Compared, Figure, Learned, compared, learned
-from analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
-from analysis.statistics import equivalence
 from coartic import CONDITIONS, CoarticError, load_task
+from coartic.analysis.reconstruction.constraints import RewardIs, sequences_of, try_sequences
+from coartic.analysis.reconstruction.scoring import Compared, Figure, Learned, compared, learned
+from coartic.analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
+from coartic.analysis.statistics import equivalence
 from coartic.members import task_of
 from coartic.readings import condition_under, load_readings, model_under, task_under
 

@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.reconstruction.ensemble import features, spread_out
-from analysis.reconstruction.layout import layouts
-from analysis.reconstruction.scoring import Figure
-from analysis.reconstruction.search import Search
-from analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
-from analysis.reconstruction.waves import (
+from coartic import CoarticError, load_task
+from coartic.analysis.reconstruction.ensemble import features, spread_out
+from coartic.analysis.reconstruction.layout import layouts
+from coartic.analysis.reconstruction.scoring import Figure
+from coartic.analysis.reconstruction.search import Search
+from coartic.analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
+from coartic.analysis.reconstruction.waves import (
     ENSEMBLE,
     LAST,
     PLAN,
@@ -26,7 +27,6 @@ from analysis.reconstruction.waves import (
     described,
     scored,
 )
-from coartic import CoarticError, load_task
 from coartic.readings import load_readings, task_under
 from coartic.text import did_you_mean
 

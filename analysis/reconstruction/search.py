@@ -14,15 +14,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reconstruction.constraints import (
+from coartic import MotionModel, Task, hand_sequences
+from coartic.analysis.reconstruction.constraints import (
     Constraint,
     RewardIs,
     Tried,
     sequences_of,
     try_sequences,
 )
-from analysis.reconstruction.layout import Layout
-from coartic import MotionModel, Task, hand_sequences
+from coartic.analysis.reconstruction.layout import Layout
 from coartic.readings import ChosenReading, model_under
 
 Array = NDArray[np.float64]

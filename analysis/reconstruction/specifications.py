@@ -17,13 +17,13 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
-from analysis.claims.catalogue import CLAIMS, judge
-from analysis.claims.register import Claim, Judged
-from analysis.claims.rules import of_task
-from analysis.reconstruction.constraints import sequences_of, try_sequences
-from analysis.reconstruction.reconstruct import search_for
-from analysis.results.folder import Results
-from analysis.study import Study
+from coartic.analysis.claims.catalogue import CLAIMS, judge
+from coartic.analysis.claims.register import Claim, Judged
+from coartic.analysis.claims.rules import of_task
+from coartic.analysis.reconstruction.constraints import sequences_of, try_sequences
+from coartic.analysis.reconstruction.reconstruct import search_for
+from coartic.analysis.results.folder import Results
+from coartic.analysis.study import Study
 from coartic.members import task_of, with_members
 from coartic.readings import condition_under, load_readings
 from coartic.tables import variant_of

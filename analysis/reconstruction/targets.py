@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from analysis import printed
-from analysis.published import RUNS
-from analysis.reconstruction.constraints import Above, BaseMoves, Constraint, RewardIs
-from analysis.reconstruction.scoring import Figure, Order, Test
 from coartic import Task, hand_sequences
+from coartic.analysis import printed
+from coartic.analysis.published import RUNS
+from coartic.analysis.reconstruction.constraints import Above, BaseMoves, Constraint, RewardIs
+from coartic.analysis.reconstruction.scoring import Figure, Order, Test
 
 _Cell = tuple[str | None, str | None]  # condition and hands
 

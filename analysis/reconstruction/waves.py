@@ -16,7 +16,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reconstruction.scoring import (
+from coartic import CONDITIONS
+from coartic.analysis.reconstruction.scoring import (
     Compared,
     Learned,
     Test,
@@ -25,8 +26,7 @@ from analysis.reconstruction.scoring import (
     distance_error,
     learned,
 )
-from analysis.reconstruction.search import Search
-from coartic import CONDITIONS
+from coartic.analysis.reconstruction.search import Search
 from coartic.readings import condition_under
 
 Array = NDArray[np.float64]

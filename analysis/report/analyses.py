@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from analysis.report.formats.markdown import markdown
-from analysis.report.pages.claims import claims_document
-from analysis.report.pages.comparisons import comparisons_document
-from analysis.report.pages.frontier import frontier_document
-from analysis.report.pages.signatures import signatures_document
-from analysis.study import Study
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pages.claims import claims_document
+from coartic.analysis.report.pages.comparisons import comparisons_document
+from coartic.analysis.report.pages.frontier import frontier_document
+from coartic.analysis.report.pages.signatures import signatures_document
+from coartic.analysis.study import Study
 
 
 def analyse(study: Study) -> dict[str, bytes]:

@@ -11,23 +11,23 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.claims.register import Judged
-from analysis.comparisons.methods import INFORMED
-from analysis.comparisons.overall import variant
-from analysis.comparisons.paper import paper_rows
-from analysis.comparisons.reached import ALL_TASKS
-from analysis.figures.postures import contexts
-from analysis.figures.price import main_methods
-from analysis.figures.ranking import learner, standings
-from analysis.markup import escaped
-from analysis.methods import LEARNER, spoken_name
-from analysis.report.document import Block, Bullets, Section, Strip, Verdict
-from analysis.report.summary import best_condition, unlike_printed
-from analysis.report.text import tone_of
-from analysis.statistics.equivalence import MARGIN
-from analysis.statistics.estimates import LEVEL
-from analysis.study import Study
-from analysis.words import typographic
+from coartic.analysis.claims.register import Judged
+from coartic.analysis.comparisons.methods import INFORMED
+from coartic.analysis.comparisons.overall import variant
+from coartic.analysis.comparisons.paper import paper_rows
+from coartic.analysis.comparisons.reached import ALL_TASKS
+from coartic.analysis.figures.postures import contexts
+from coartic.analysis.figures.price import main_methods
+from coartic.analysis.figures.ranking import learner, standings
+from coartic.analysis.markup import escaped
+from coartic.analysis.methods import LEARNER, spoken_name
+from coartic.analysis.report.document import Block, Bullets, Section, Strip, Verdict
+from coartic.analysis.report.summary import best_condition, unlike_printed
+from coartic.analysis.report.text import tone_of
+from coartic.analysis.statistics.equivalence import MARGIN
+from coartic.analysis.statistics.estimates import LEVEL
+from coartic.analysis.study import Study
+from coartic.analysis.words import typographic
 from coartic.method import Information
 
 _SAID: dict[str, dict[str, str]] = tomllib.loads(

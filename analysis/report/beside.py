@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from analysis.comparisons.versions import VersionComparison
-from analysis.markup import escaped
-from analysis.report.answers import cells_found, claims_found, price, strips, winners
-from analysis.report.document import Block, Bullets, DataTable, Document, Section, Strip
-from analysis.report.pages.versions import versions_document
-from analysis.study import Study
+from coartic.analysis.comparisons.versions import VersionComparison
+from coartic.analysis.markup import escaped
+from coartic.analysis.report.answers import cells_found, claims_found, price, strips, winners
+from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Section, Strip
+from coartic.analysis.report.pages.versions import versions_document
+from coartic.analysis.study import Study
 
 
 def beside(document: Document, first: Study, second: Study, found: VersionComparison) -> Document:

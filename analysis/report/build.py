@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.figures import Figures, Plot
-from analysis.figures.plot import FILES, rendered, svg_text
-from analysis.figures.register import Section as FigureSection
-from analysis.generality.sample import one_by_one
-from analysis.markup import escaped, words
-from analysis.report.answers import (
+from coartic import CoarticError
+from coartic.analysis.figures import Figures, Plot
+from coartic.analysis.figures.plot import FILES, rendered, svg_text
+from coartic.analysis.figures.register import Section as FigureSection
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.markup import escaped, words
+from coartic.analysis.report.answers import (
     answers,
     cells_found,
     claims_found,
@@ -25,8 +26,8 @@ from analysis.report.answers import (
     price,
     winners,
 )
-from analysis.report.charts import charts
-from analysis.report.document import (
+from coartic.analysis.report.charts import charts
+from coartic.analysis.report.document import (
     Block,
     Bullets,
     DataTable,
@@ -36,34 +37,33 @@ from analysis.report.document import (
     Prose,
     Section,
 )
-from analysis.report.formats.csv import table_csv
-from analysis.report.glossary import glossary
-from analysis.report.headlines import headline_numbers
-from analysis.report.limitations import limitations
-from analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
-from analysis.report.pages.claims import claim_section, claims_table
-from analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
-from analysis.report.pages.families import families_section
-from analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
-from analysis.report.player import player_json
-from analysis.report.summary import (
+from coartic.analysis.report.formats.csv import table_csv
+from coartic.analysis.report.glossary import glossary
+from coartic.analysis.report.headlines import headline_numbers
+from coartic.analysis.report.limitations import limitations
+from coartic.analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
+from coartic.analysis.report.pages.claims import claim_section, claims_table
+from coartic.analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
+from coartic.analysis.report.pages.families import families_section
+from coartic.analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
+from coartic.analysis.report.player import player_json
+from coartic.analysis.report.summary import (
     tasks_table,
     verdicts,
     version_text,
     without_variants,
 )
-from analysis.report.tables.common import table_ids
-from analysis.report.tables.contexts import contexts_table, slopes_tables
-from analysis.report.tables.main import main_methods, main_verdicts
-from analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
-from analysis.report.tables.paper import beside_paper
-from analysis.report.tables.signatures import signatures_tables
-from analysis.report.trace_file import FILE, trace_json
-from analysis.report.write import check_report_folder, write_report
-from analysis.results.folder import Results
-from analysis.signatures.register import REGISTER
-from analysis.study import Study
-from coartic import CoarticError
+from coartic.analysis.report.tables.common import table_ids
+from coartic.analysis.report.tables.contexts import contexts_table, slopes_tables
+from coartic.analysis.report.tables.main import main_methods, main_verdicts
+from coartic.analysis.report.tables.methods import methods_table, overall_table, reading_of_methods
+from coartic.analysis.report.tables.paper import beside_paper
+from coartic.analysis.report.tables.signatures import signatures_tables
+from coartic.analysis.report.trace_file import FILE, trace_json
+from coartic.analysis.report.write import check_report_folder, write_report
+from coartic.analysis.results.folder import Results
+from coartic.analysis.signatures.register import REGISTER
+from coartic.analysis.study import Study
 from coartic.text import counted
 
 MOST_TASKS = 8

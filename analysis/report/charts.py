@@ -13,15 +13,15 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from analysis.comparisons.methods import INFORMED, UNTOLD, informed
-from analysis.comparisons.progress import SPENDS
-from analysis.comparisons.reached import ALL_TASKS
-from analysis.figures import style
-from analysis.figures.frontier import NAMES
-from analysis.figures.price import look_alike, main_methods
-from analysis.figures.ranking import COLORS, GROUPS, Standing, learner
-from analysis.methods import family_of, short_name, spoken_name
-from analysis.study import Study
+from coartic.analysis.comparisons.methods import INFORMED, UNTOLD, informed
+from coartic.analysis.comparisons.progress import SPENDS
+from coartic.analysis.comparisons.reached import ALL_TASKS
+from coartic.analysis.figures import style
+from coartic.analysis.figures.frontier import NAMES
+from coartic.analysis.figures.price import look_alike, main_methods
+from coartic.analysis.figures.ranking import COLORS, GROUPS, Standing, learner
+from coartic.analysis.methods import family_of, short_name, spoken_name
+from coartic.analysis.study import Study
 from coartic.text import json_text
 
 _ANY = "all"

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from analysis.markup import code, escaped, words
-from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
-from analysis.report.limitations import limitations
-from analysis.report.summary import version_text
-from analysis.report.tables.common import table_ids
-from analysis.report.tables.methods import methods_table, reading_of_methods
-from analysis.report.tables.paper import beside_paper
-from analysis.study import Study
+from coartic.analysis.markup import code, escaped, words
+from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
+from coartic.analysis.report.limitations import limitations
+from coartic.analysis.report.summary import version_text
+from coartic.analysis.report.tables.common import table_ids
+from coartic.analysis.report.tables.methods import methods_table, reading_of_methods
+from coartic.analysis.report.tables.paper import beside_paper
+from coartic.analysis.study import Study
 from coartic.tables import Plan
 from coartic.text import counted
 

@@ -1,12 +1,13 @@
 """What a report consists of: sections of prose, tables, figures and a player.
 
-A document holds content and raw values, no presentation: :mod:`analysis.report.formats.html`,
+A document holds content and raw values, no presentation:
+:mod:`coartic.analysis.report.formats.html`,
 ``markdown`` and ``latex`` decide how it looks, and CSV files hold the raw values. Every
 number of a table names the cells (task, label) it was computed from, and the document
 knows the run ids of every cell, so each number leads to its runs.
 
-Strings of prose, items, captions and notes have inline markup (:mod:`analysis.markup`). Titles,
-headers and values are plain text.
+Strings of prose, items, captions and notes have inline markup (:mod:`coartic.analysis.markup`).
+Titles, headers and values are plain text.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import ClassVar, Literal
 
 from pydantic import ConfigDict
 
-from analysis.results.optima import OtherArm
+from coartic.analysis.results.optima import OtherArm
 
 RestsOn = Literal["runs", "optimum", "paper", "derived", "ours", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, what the paper prints,
@@ -228,7 +229,7 @@ class PlayerBlock:
     caption: str
     """In inline markup."""
     data: str
-    """JSON as :func:`analysis.report.player.player_json` makes it."""
+    """JSON as :func:`coartic.analysis.report.player.player_json` makes it."""
 
 
 Block = Prose | Bullets | DataTable | FigureBlock | PlayerBlock | Strip

@@ -16,23 +16,23 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import TypeAdapter
 
-from analysis.comparisons.methods import solve_times
-from analysis.methods import LEARNER
-from analysis.published import published_cell, published_initial
-from analysis.report.document import CellKey
-from analysis.report.numbers import ORIGINS, PREFIX, Names, Number, macro_names, words
-from analysis.results.folder import CellRuns
-from analysis.signatures.register import PER_DIMENSION, REGISTER
-from analysis.signatures.rows import SignatureRow
-from analysis.statistics.estimates import (
+from coartic.analysis.comparisons.methods import solve_times
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import published_cell, published_initial
+from coartic.analysis.report.document import CellKey
+from coartic.analysis.report.numbers import ORIGINS, PREFIX, Names, Number, macro_names, words
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.signatures.register import PER_DIMENSION, REGISTER
+from coartic.analysis.signatures.rows import SignatureRow
+from coartic.analysis.statistics.estimates import (
     SEED,
     Inference,
     difference_of_means,
     mean,
     probability_of_improvement,
 )
-from analysis.statistics.spread import sd
-from analysis.study import Study
+from coartic.analysis.statistics.spread import sd
+from coartic.analysis.study import Study
 
 _INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
 """Exploration condition under which the paper speaks of a task's initial solution."""

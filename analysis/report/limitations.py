@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from analysis.generality.sample import one_by_one
-from analysis.markup import code, escaped
-from analysis.methods import LEARNER
-from analysis.published import RUNS, TRIALS
-from analysis.report.document import CellKey
-from analysis.report.summary import unlike_printed
-from analysis.statistics.estimates import FEWEST
-from analysis.statistics.power import POWER, smallest_difference
-from analysis.statistics.spread import sd
-from analysis.study import Study
-from analysis.words import typographic
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.markup import code, escaped
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import RUNS, TRIALS
+from coartic.analysis.report.document import CellKey
+from coartic.analysis.report.summary import unlike_printed
+from coartic.analysis.statistics.estimates import FEWEST
+from coartic.analysis.statistics.power import POWER, smallest_difference
+from coartic.analysis.statistics.spread import sd
+from coartic.analysis.study import Study
+from coartic.analysis.words import typographic
 from coartic.exploration import CONDITIONS
 from coartic.text import counted
 

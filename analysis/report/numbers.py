@@ -13,14 +13,14 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from analysis.methods import LEARNER
-from analysis.report.document import CellKey, RestsOn
-from analysis.report.formats.templates import LATEX, template
-from analysis.results.optima import SHIPPED
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.report.document import CellKey, RestsOn
+from coartic.analysis.report.formats.templates import LATEX, template
+from coartic.analysis.results.optima import SHIPPED
 from coartic.text import one_line
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 PREFIX = "coartic"
 ORIGINS: dict[RestsOn, str] = {

@@ -15,11 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.figures.robot import numbered_below
-from analysis.methods import LEARNER, spoken_name
-from analysis.report.document import CellKey
-from analysis.signatures.trajectories import Trajectories
-from analysis.study import Study
 from coartic import (
     MotionModel,
     Robot,
@@ -29,6 +24,11 @@ from coartic import (
     initial_hands,
     trajectory,
 )
+from coartic.analysis.figures.robot import numbered_below
+from coartic.analysis.methods import LEARNER, spoken_name
+from coartic.analysis.report.document import CellKey
+from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.study import Study
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS
 from coartic.text import json_text

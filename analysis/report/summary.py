@@ -8,17 +8,17 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.claims.register import Judged, Verdict
-from analysis.comparisons.overall import variant
-from analysis.comparisons.paper import paper_rows
-from analysis.generality.sample import one_by_one
-from analysis.methods import LEARNER
-from analysis.published import published_cell
-from analysis.report.document import Bullets, DataTable
-from analysis.report.tables.common import estimate_as_printed, marked, mean_of
-from analysis.report.tables.layout import LAYOUTS
-from analysis.study import Study
-from analysis.words import typographic
+from coartic.analysis.claims.register import Judged, Verdict
+from coartic.analysis.comparisons.overall import variant
+from coartic.analysis.comparisons.paper import paper_rows
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.published import published_cell
+from coartic.analysis.report.document import Bullets, DataTable
+from coartic.analysis.report.tables.common import estimate_as_printed, marked, mean_of
+from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.study import Study
+from coartic.analysis.words import typographic
 from coartic.record import Environment
 from coartic.text import counted
 

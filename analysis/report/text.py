@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from analysis.report.document import Column, DataTable, Estimate, Row, Strip, Tone, Value
-from analysis.words import NO_SPREAD, NONE, true_minus, typographic
+from coartic.analysis.report.document import Column, DataTable, Estimate, Row, Strip, Tone, Value
+from coartic.analysis.words import NO_SPREAD, NONE, true_minus, typographic
 
 METHOD_COLUMNS = frozenset({"method", "first", "second"})
 """Names of columns that hold methods with their variants, shown by their short names."""

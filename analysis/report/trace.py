@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-from analysis.markup import words
-from analysis.report.document import CellKey, DataTable
-from analysis.report.formats.templates import on_one_line, template
-from analysis.report.numbers import ORIGINS
-from analysis.report.tables.layout import LAYOUTS
-from analysis.report.text import heads, texts
-from analysis.report.trace_file import FILE, Source, TraceFile, read_trace
 from coartic import CoarticError
+from coartic.analysis.markup import words
+from coartic.analysis.report.document import CellKey, DataTable
+from coartic.analysis.report.formats.templates import on_one_line, template
+from coartic.analysis.report.numbers import ORIGINS
+from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.report.text import heads, texts
+from coartic.analysis.report.trace_file import FILE, Source, TraceFile, read_trace
 from coartic.stored import content_hash
 from coartic.text import counted, did_you_mean, shell_line
 

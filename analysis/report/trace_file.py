@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from analysis.report.document import CellKey, DataTable, Document
-from analysis.report.numbers import Number
-from analysis.results.optima import Optimum
 from coartic import CoarticError, builtin_tasks
+from coartic.analysis.report.document import CellKey, DataTable, Document
+from coartic.analysis.report.numbers import Number
+from coartic.analysis.results.optima import Optimum
 from coartic.record import Environment
 from coartic.stored import content_hash
 from coartic.tables import Plan
 from coartic.text import json_text, shell_line
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 FILE = "trace.json"
 

@@ -6,13 +6,13 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from analysis.report.document import Document
-from analysis.report.formats.csv import runs_csv, table_csv
-from analysis.report.formats.html import html
-from analysis.report.formats.latex import latex_inputs, latex_table
-from analysis.report.formats.markdown import markdown
-from analysis.report.pdf import pdf
 from coartic import CoarticError
+from coartic.analysis.report.document import Document
+from coartic.analysis.report.formats.csv import runs_csv, table_csv
+from coartic.analysis.report.formats.html import html
+from coartic.analysis.report.formats.latex import latex_inputs, latex_table
+from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.pdf import pdf
 from coartic.files import REPORT, check_folder, publish
 
 

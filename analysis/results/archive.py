@@ -21,8 +21,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from analysis.results.folder import load_results
 from coartic import CoarticError
+from coartic.analysis.results.folder import load_results
 from coartic.files import folder_named, write_outputs
 
 FORMAT = 1
@@ -62,7 +62,7 @@ def pack(folder: Path, path: Path, *, replace: bool = False) -> str:
 
     The same folder gives the same file. Raises CoarticError where the folder is not a finished
     results folder that agrees with itself
-    (:func:`~analysis.results.folder.load_results`), or the file cannot be written.
+    (:func:`~coartic.analysis.results.folder.load_results`), or the file cannot be written.
     """
     load_results(folder)
     names = sorted(

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
-from analysis.results.laws import check_tables, read_manifest
 from coartic import CoarticError, Task, parse_task
+from coartic.analysis.results.laws import check_tables, read_manifest
 from coartic.robot import Array
 from coartic.tables import Manifest, label_of
 
@@ -105,8 +105,8 @@ def load_results(folder: Path) -> Results:
     """Read a results folder. Every command that reads one passes here.
 
     Stored solutions are executed again, and tables made again from the records (see
-    :mod:`analysis.results.laws`). Raises CoarticError where the folder is not a results folder,
-    is not finished, or does not agree with itself.
+    :mod:`coartic.analysis.results.laws`). Raises CoarticError where the folder is not a results
+    folder, is not finished, or does not agree with itself.
     """
     if not folder.exists():
         raise CoarticError(

@@ -1,7 +1,8 @@
 """The optimum of each task: the best reward known, what is proven about it, and by which runs.
 
 ``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids
-and the solutions; ``python -m analysis.results.optima FOLDER`` makes it from the results folder of
+and the solutions; ``python -m coartic.analysis.results.optima FOLDER`` makes it from the results
+folder of
 that suite. Searches for the optimum in a results folder of the user's own count as well, so a
 table for the user's own task has gaps as soon as the task's optimum is among its runs.
 """
@@ -20,16 +21,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import pandas as pd
 from pydantic import BaseModel, ConfigDict
 
-from analysis.results.folder import Results, load_results
-from analysis.results.laws import BASE
 from coartic import PAPER, CoarticError, Task
+from coartic.analysis.results.folder import Results, load_results
+from coartic.analysis.results.laws import BASE
 from coartic.files import write_atomically
 from coartic.record import SEARCH
 from coartic.tables import label_of
 from coartic.text import one_line
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 DATA = Path(__file__).with_name("optima.json")
 SHIPPED = f"shipped data (analysis/results/{DATA.name})"
@@ -242,10 +243,10 @@ def _shipped() -> dict[tuple[str, str], Entry]:
 
 
 def main() -> None:
-    """``python -m analysis.results.optima FOLDER``: renew entries of ``optima.json``."""
+    """``python -m coartic.analysis.results.optima FOLDER``: renew entries of ``optima.json``."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(
-            "usage: python -m analysis.results.optima RESULTS_FOLDER\n"
+            "usage: python -m coartic.analysis.results.optima RESULTS_FOLDER\n"
             f"Renews in {DATA} what the folder's optimum runs cover; the rest stays."
         )
     try:

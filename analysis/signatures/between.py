@@ -11,14 +11,19 @@ from itertools import chain, product
 
 import numpy as np
 
-from analysis.signatures.context import context_dependence, distance, lead_time, permutation_p
-from analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
-from analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
-from analysis.signatures.trajectories import Trajectories, last_ticks, postures
-from analysis.statistics import spread
-from analysis.statistics.estimates import SEED
 from coartic import Hand, Trajectory
+from coartic.analysis.signatures.context import (
+    context_dependence,
+    distance,
+    lead_time,
+    permutation_p,
+)
+from coartic.analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
+from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
+from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
+from coartic.analysis.signatures.trajectories import Trajectories, last_ticks, postures
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import SEED
 from coartic.robot import HANDS, Array
 
 Runs = tuple[Trajectory, ...]

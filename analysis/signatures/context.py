@@ -15,10 +15,10 @@ from itertools import combinations, takewhile
 
 import numpy as np
 
-from analysis.results.optima import KEPT
-from analysis.signatures.permutation import RESAMPLES, divisions, p_values
-from analysis.statistics.spread import mean
 from coartic import Task
+from coartic.analysis.results.optima import KEPT
+from coartic.analysis.signatures.permutation import RESAMPLES, divisions, p_values
+from coartic.analysis.statistics.spread import mean
 from coartic.robot import Array
 
 

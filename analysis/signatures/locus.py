@@ -19,11 +19,11 @@ import numpy as np
 from scipy import stats
 from scipy.cluster.hierarchy import DisjointSet
 
-from analysis.results.optima import KEPT
-from analysis.signatures.permutation import orders, p_values
-from analysis.statistics.intervals import Interval, student
-from analysis.statistics.spread import mean
 from coartic import Task
+from coartic.analysis.results.optima import KEPT
+from coartic.analysis.signatures.permutation import orders, p_values
+from coartic.analysis.statistics.intervals import Interval, student
+from coartic.analysis.statistics.spread import mean
 from coartic.robot import Array
 
 LEAST = 3

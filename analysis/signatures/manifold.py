@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
-from analysis.statistics.intervals import Interval, student
-from analysis.statistics.spread import mean, sd
 from coartic import Hand, Task
+from coartic.analysis.statistics.intervals import Interval, student
+from coartic.analysis.statistics.spread import mean, sd
 from coartic.robot import Array
 
 _PROJECTED = 1e-24

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.signatures.subtasks import postures_before
 from coartic import Execution, Hand, Trajectory
+from coartic.analysis.signatures.subtasks import postures_before
 from coartic.robot import BASE_DOF, HANDS, Array
 
 

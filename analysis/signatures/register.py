@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from pydantic import TypeAdapter
 
-from analysis.generality.sample import one_by_one
-from analysis.signatures.between import Contexts, Members
-from analysis.signatures.context import context_pairs
-from analysis.signatures.locus import LEAST, families, variants
-from analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
-from analysis.signatures.trajectories import Trajectories, trajectories_of
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.signatures.between import Contexts, Members
+from coartic.analysis.signatures.context import context_pairs
+from coartic.analysis.signatures.locus import LEAST, families, variants
+from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
+from coartic.analysis.signatures.trajectories import Trajectories, trajectories_of
 from coartic.robot import HANDS
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 PER_DIMENSION = ", per root of dimension"
 """Of a unit."""
@@ -60,7 +60,7 @@ def signature_rows(study: Study) -> list[SignatureRow]:
     alone = one_by_one(study)
     if len(alone) == len(study.tasks):
         trajectories = study.trajectories
-    else:  # many instances of families, which have fewer: analysis.generality.presence
+    else:  # many instances of families, which have fewer: coartic.analysis.generality.presence
         trajectories = {key: trajectories_of(study, key) for key in study.cells if key[0] in alone}
     groups = families(study.tasks)
     joined = variants(groups)

@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ImportString
 
-from analysis.references import Key
-from analysis.statistics.intervals import Interval
+from coartic.analysis.references import Key
+from coartic.analysis.statistics.intervals import Interval
 from coartic.tables import label_of
 
 NO_RUN = "no run has a solution"
@@ -99,7 +99,7 @@ of tasks), then the signatures that it measures, in the order of the register.""
 Shown = Literal[
     "main-signatures", "hands", "other-arm", "travel", "synergy", "variance", "contexts", "slopes"
 ]
-"""Tables that show signatures (:mod:`analysis.report.tables`)."""
+"""Tables that show signatures (:mod:`coartic.analysis.report.tables`)."""
 
 
 class Signature(BaseModel):

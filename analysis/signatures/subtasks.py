@@ -8,9 +8,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.statistics.estimates import RESAMPLES
-from analysis.statistics.hypotheses import bootstrap_test
 from coartic import Execution, Hand, Task, Trajectory, correct, move
+from coartic.analysis.statistics.estimates import RESAMPLES
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.robot import Array
 
 ROUNDING = 1
@@ -94,7 +94,7 @@ def sacrifice_p(changes: ArrayLike, *, seed: int, resamples: int = RESAMPLES) ->
 
     No sacrifice: the mean first subtask takes longer by no more than :data:`ROUNDING`, or the
     mean whole takes no less. The larger p of two one-tailed tests
-    (:func:`~analysis.statistics.hypotheses.bootstrap_test`), as both have to reject
+    (:func:`~coartic.analysis.statistics.hypotheses.bootstrap_test`), as both have to reject
     (intersection-union test, Berger 1982). NaN below two runs, and where either does not
     differ between runs.
     """

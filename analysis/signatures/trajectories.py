@@ -13,7 +13,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.signatures.subtasks import change_from
 from coartic import (
     PAPER,
     Execution,
@@ -25,12 +24,13 @@ from coartic import (
     initial_hands,
     trajectory,
 )
+from coartic.analysis.signatures.subtasks import change_from
 from coartic.errors import NotApplicableError
 from coartic.robot import Array
 from coartic.rows import movements_from
 
 if TYPE_CHECKING:
-    from analysis.study import Study
+    from coartic.analysis.study import Study
 
 
 @dataclass(frozen=True)

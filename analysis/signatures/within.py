@@ -13,15 +13,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.signatures.manifold import jacobian_of, synergy
-from analysis.signatures.other_arm import (
+from coartic.analysis.signatures.manifold import jacobian_of, synergy
+from coartic.analysis.signatures.other_arm import (
     preshaping,
     readiness,
     readiness_from_base,
     travel,
 )
-from analysis.signatures.paths import reversals_of, smoothness, turning_angles
-from analysis.signatures.rows import (
+from coartic.analysis.signatures.paths import reversals_of, smoothness, turning_angles
+from coartic.analysis.signatures.rows import (
     NO_INITIAL,
     NO_RUN,
     ONE_HAND,
@@ -32,10 +32,15 @@ from analysis.signatures.rows import (
     SignatureRow,
     without,
 )
-from analysis.signatures.subtasks import excess, isolated_agreement, sacrifice_p, sacrifices
-from analysis.signatures.trajectories import Trajectories, entropy, postures
-from analysis.statistics import intervals
-from analysis.statistics.estimates import SEED
+from coartic.analysis.signatures.subtasks import (
+    excess,
+    isolated_agreement,
+    sacrifice_p,
+    sacrifices,
+)
+from coartic.analysis.signatures.trajectories import Trajectories, entropy, postures
+from coartic.analysis.statistics import intervals
+from coartic.analysis.statistics.estimates import SEED
 from coartic.robot import Array
 
 

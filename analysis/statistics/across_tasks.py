@@ -18,8 +18,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.statistics import spread
-from analysis.statistics.estimates import (
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import (
     RESAMPLES,
     TAILS,
     Inference,

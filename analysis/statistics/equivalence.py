@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
-from analysis.statistics.estimates import (
+from coartic.analysis.statistics.estimates import (
     CONFIDENCE,
     FEWEST,
     NO_SPREAD,
@@ -26,9 +26,9 @@ from analysis.statistics.estimates import (
     sample,
     samples_of,
 )
-from analysis.statistics.hypotheses import standard_error, studentised_null
-from analysis.statistics.intervals import student, wilson
-from analysis.statistics.spread import mean, variance
+from coartic.analysis.statistics.hypotheses import standard_error, studentised_null
+from coartic.analysis.statistics.intervals import student, wilson
+from coartic.analysis.statistics.spread import mean, variance
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""

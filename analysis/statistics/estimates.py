@@ -5,7 +5,8 @@ with a plain number, the number is taken as known without error: the reward of a
 deterministic method, say. Every function that resamples takes a seed and gives the same
 result for the same seed; the seed belongs to the resampling, not to the runs.
 
-``analysis.calibration.error_rates`` measures how well the nominal rates hold for data like ours.
+``coartic.analysis.calibration.error_rates`` measures how well the nominal rates hold for data
+like ours.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14;
 N. Cliff (1993), Psychological Bulletin 114; R. Agarwal et al. (2021), NeurIPS 34 (interquartile
@@ -25,7 +26,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import optimize, special, stats
 
-from analysis.statistics import spread
+from coartic.analysis.statistics import spread
 from coartic.robot import Array
 
 CONFIDENCE = 0.95

@@ -1,6 +1,6 @@
 """Tests of means, shares and pairs, and Holm's correction for many of them.
 
-Samples, numbers taken as known, and seeds: as in :mod:`analysis.statistics.estimates`.
+Samples, numbers taken as known, and seeds: as in :mod:`coartic.analysis.statistics.estimates`.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapters 15 and
 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.statistics import spread
-from analysis.statistics.estimates import (
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import (
     RESAMPLES,
     Inference,
     differences,

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.statistics import spread
-from analysis.statistics.estimates import FEWEST, LEVEL, NO_SPREAD, TAILS, Inference
-from analysis.statistics.power import POWER
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import FEWEST, LEVEL, NO_SPREAD, TAILS, Inference
+from coartic.analysis.statistics.power import POWER
 from coartic.robot import Array
 
 RESAMPLES = 1_999
@@ -169,8 +169,8 @@ class Paired:
     def needed(self, difference: float, runs: int, level: float = LEVEL) -> int:
         """Instances, three at least, with which a true mean difference is found.
 
-        With a power of :data:`~analysis.statistics.power.POWER` by a two-tailed t-test of the
-        paired differences at ``level``. Raises ValueError for a difference of 0.
+        With a power of :data:`~coartic.analysis.statistics.power.POWER` by a two-tailed t-test of
+        the paired differences at ``level``. Raises ValueError for a difference of 0.
         """
         if difference == 0:
             raise ValueError("no number of instances finds a difference of 0")

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special, stats
 
-from analysis.statistics import spread
-from analysis.statistics.estimates import CONFIDENCE, SEED, TAILS
+from coartic.analysis.statistics import spread
+from coartic.analysis.statistics.estimates import CONFIDENCE, SEED, TAILS
 from coartic.robot import Array
 
 RESAMPLES = 2_000

@@ -13,7 +13,7 @@ from bisect import bisect_left
 
 from scipy import optimize, special, stats
 
-from analysis.statistics.estimates import LEVEL
+from coartic.analysis.statistics.estimates import LEVEL
 
 POWER = 0.8
 

@@ -6,13 +6,11 @@ it is called, so that help and completion are there at once.
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import os
 import signal
 import sys
 import warnings
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -71,7 +69,6 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         _check_arguments()
-        _check_packages()
         try:
             app(prog_name="coartic")
         except SystemExit:
@@ -95,16 +92,3 @@ def _check_arguments() -> None:
     for argument in sys.argv[1:]:
         if any("\ud800" <= c <= "\udfff" for c in argument):
             raise CoarticError(f"argument {argument!r} is not text in this system's encoding")
-
-
-def _check_packages() -> None:
-    """Other modules of these names, in the current folder say, would be taken for ours."""
-    home = Path(coartic.__file__).parent.parent
-    for name in ("analysis", "baselines", "benchmarks"):
-        found = importlib.util.find_spec(name)
-        origin = Path(found.origin) if found is not None and found.origin else None
-        if origin is None or origin.parent.parent != home:
-            raise CoarticError(
-                f"module {name!r} is taken from {origin or 'nowhere'} instead of coartic's "
-                f"installation in {home}; run the command from another folder"
-            )

@@ -16,7 +16,7 @@ from coartic.text import did_you_mean
 
 
 def _suites() -> Iterable[str]:
-    import benchmarks
+    from coartic import benchmarks
 
     folder = Path(benchmarks.__file__).parent / "suites"
     return sorted(path.stem for path in folder.glob("*.toml"))
@@ -35,7 +35,7 @@ def _conditions() -> Iterable[str]:
 
 
 def _methods() -> Iterable[str]:
-    from benchmarks.registry import CLASSES
+    from coartic.benchmarks.registry import CLASSES
 
     return CLASSES
 

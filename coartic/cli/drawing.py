@@ -14,8 +14,8 @@ from coartic.errors import CoarticError
 from coartic.text import one_line
 
 if TYPE_CHECKING:
-    from analysis.figures.animation import Panel
     from coartic import MotionModel, Task
+    from coartic.analysis.figures.animation import Panel
 
 GROUP = "Draw"
 
@@ -27,9 +27,9 @@ def draw(
     replace: given.Replace = False,
 ) -> None:
     """Draw start configuration and goals of tasks; FAMILY/v1/i000..i003 are several."""
-    from analysis.figures.plot import FORMATS, picture
-    from analysis.figures.tasks import tasks_plot
     from coartic import builtin_tasks, load_task
+    from coartic.analysis.figures.plot import FORMATS, picture
+    from coartic.analysis.figures.tasks import tasks_plot
     from coartic.families import named_by
     from coartic.files import check_outputs, write_outputs
 
@@ -64,8 +64,8 @@ def animate(
     replace: given.Replace = False,
 ) -> None:
     """Show a run's solution tick by tick, alone or beside another one."""
-    from analysis.figures.animation import Panel, animate, check_output
-    from benchmarks.reproduce import find_record, trajectory_of
+    from coartic.analysis.figures.animation import Panel, animate, check_output
+    from coartic.benchmarks.reproduce import find_record, trajectory_of
 
     check_output(out, replace=replace)
     if initial and other is not None:
@@ -86,8 +86,8 @@ def animate(
 
 
 def _initial_panel(task: Task, model: MotionModel) -> Panel:
-    from analysis.figures.animation import Panel
     from coartic import corrective_trial, initial_hands, trajectory
+    from coartic.analysis.figures.animation import Panel
 
     movements = corrective_trial(task, initial_hands(task, model=model), model=model).movements
     return Panel(f"{task.name}: initial solution", trajectory(task, movements, model=model))

@@ -92,8 +92,8 @@ def _show_rejections(chosen: list[Family], stream: str, count: int) -> None:
 
 
 def _write(family: Family, stream: str, count: int, out: Path) -> None:
-    from analysis.figures.plot import picture
-    from analysis.figures.tasks import tasks_plot
+    from coartic.analysis.figures.plot import picture
+    from coartic.analysis.figures.tasks import tasks_plot
     from coartic.families import drawn, task_hash, task_text
     from coartic.files import publish
 

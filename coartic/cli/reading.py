@@ -22,8 +22,8 @@ GROUP = "Read"
 def analyse(folder: given.ResultsFolder) -> None:
     """Signatures, claims, methods compared, and the reward-compute frontier of a folder."""
     if_interrupted(f"nothing is written in {folder}")  # also not while this is imported
-    from analysis.report.analyses import analyse as pages_of
-    from analysis.study import load
+    from coartic.analysis.report.analyses import analyse as pages_of
+    from coartic.analysis.study import load
     from coartic.files import publish
 
     study = load(folder)
@@ -77,13 +77,13 @@ def report(
     if out is None:
         out = folder.with_suffix("") / "report" if archived else folder / "report"
     if_interrupted(f"nothing is written in {out}")  # also not while this is imported
-    from analysis.comparisons.versions import compare_versions
-    from analysis.figures.plot import FILES
-    from analysis.report.beside import beside
-    from analysis.report.build import build, write
-    from analysis.report.write import check_report_folder
-    from analysis.results.archive import opened
-    from analysis.study import load
+    from coartic.analysis.comparisons.versions import compare_versions
+    from coartic.analysis.figures.plot import FILES
+    from coartic.analysis.report.beside import beside
+    from coartic.analysis.report.build import build, write
+    from coartic.analysis.report.write import check_report_folder
+    from coartic.analysis.results.archive import opened
+    from coartic.analysis.study import load
 
     started = time.monotonic()
     endings = endings_in(formats, FILES)
@@ -117,7 +117,7 @@ def pack(
 
     It holds tables and records alone, and nothing that runs when it is opened.
     """
-    from analysis.results.archive import pack as packed
+    from coartic.analysis.results.archive import pack as packed
 
     path = folder.with_suffix(".zip") if out is None else out
     if path.suffix.lower() != ".zip":
@@ -131,8 +131,8 @@ def pack(
 
 def verify(folder: given.Results) -> None:
     """Check a results folder or an archive: checksums, tables, every solution executed again."""
-    from analysis.results.archive import opened
-    from analysis.results.folder import load_results
+    from coartic.analysis.results.archive import opened
+    from coartic.analysis.results.folder import load_results
 
     with opened(folder) as found:
         results = load_results(found)
@@ -154,8 +154,8 @@ def trace(
     ] = Path("results"),
 ) -> None:
     """Say which runs, code and command are behind a number of a report."""
-    from analysis.report.trace import find_report, trace_text
-    from analysis.report.trace import trace as find
+    from coartic.analysis.report.trace import find_report, trace_text
+    from coartic.analysis.report.trace import trace as find
 
     where = [part for part in (row, column) if part is not None]
     say(*trace_text(find(find_report(folder), name, where)).split("\n"))
@@ -175,10 +175,10 @@ def compare(
     replace: given.Replace = False,
 ) -> None:
     """Compare two results folders cell by cell: versions, machines, parameters."""
-    from analysis.comparisons.versions import compare_versions, load_pair
-    from analysis.report.formats.markdown import markdown
-    from analysis.report.pages.versions import versions_document
-    from analysis.results.archive import opened
+    from coartic.analysis.comparisons.versions import compare_versions, load_pair
+    from coartic.analysis.report.formats.markdown import markdown
+    from coartic.analysis.report.pages.versions import versions_document
+    from coartic.analysis.results.archive import opened
     from coartic.files import check_outputs, write_outputs
 
     for path, option, ending in ((out, "--out", ".md"), (csv, "--csv", ".csv")):
@@ -210,9 +210,9 @@ def cite(
     ] = False,
 ) -> None:
     """Print what to cite: the software, the paper, and the methods of a results folder."""
-    from analysis.citations import MethodSource, bibliography
-    from analysis.results.folder import load_results
-    from benchmarks.registry import CLASSES
+    from coartic.analysis.citations import MethodSource, bibliography
+    from coartic.analysis.results.folder import load_results
+    from coartic.benchmarks.registry import CLASSES
     from coartic.record import BUILT_IN
 
     if style != "bibtex":

@@ -48,7 +48,7 @@ def readings(
             )
         _list_readings()
         return
-    from analysis.reconstruction.judge import combinations, judge_all, judged_table
+    from coartic.analysis.reconstruction.judge import combinations, judge_all, judged_table
 
     check_numbers(jobs, None)
     folder = _folder(judge, "readings", ["readings.csv"], "--judge")
@@ -98,8 +98,8 @@ def reconstruct(
     jobs: given.Jobs = -1,
 ) -> None:
     """Search for goals that give what is printed, and make an ensemble of them."""
-    from analysis.reconstruction.reconstruct import Effort, search_for
-    from analysis.reconstruction.reconstruct import reconstruct as perform
+    from coartic.analysis.reconstruction.reconstruct import Effort, search_for
+    from coartic.analysis.reconstruction.reconstruct import reconstruct as perform
 
     check_numbers(jobs, None)
     names = [f"{task}-members.csv", f"{task}-tried.csv"]
@@ -122,7 +122,7 @@ def printed(
     jobs: given.Jobs = -1,
 ) -> None:
     """Show what the paper prints of tasks, line by line, beside fresh runs."""
-    from analysis.reconstruction.lines import lines
+    from coartic.analysis.reconstruction.lines import lines
 
     check_numbers(jobs, None)
     folder = None if out is None else _folder(out, "printed", ["printed.csv"])
@@ -146,10 +146,10 @@ def robustness(
     jobs: given.Jobs = -1,
 ) -> None:
     """Judge the paper's claims under each reading and with the goals of each member."""
-    from analysis import load
-    from analysis.figures.plot import rendered
-    from analysis.reconstruction.curve import specification_curve, verdicts
-    from analysis.reconstruction.specifications import judged_specifications, shares
+    from coartic.analysis import load
+    from coartic.analysis.figures.plot import rendered
+    from coartic.analysis.reconstruction.curve import specification_curve, verdicts
+    from coartic.analysis.reconstruction.specifications import judged_specifications, shares
 
     check_numbers(jobs, None)
     tables = ("specifications.csv", "shares.csv")

@@ -17,10 +17,10 @@ from coartic.files import folder_named
 from coartic.text import counted, json_text
 
 if TYPE_CHECKING:
-    from analysis.report.document import Document
-    from benchmarks.executors import Executor
-    from benchmarks.registry import Entry
     from coartic import Task
+    from coartic.analysis.report.document import Document
+    from coartic.benchmarks.executors import Executor
+    from coartic.benchmarks.registry import Entry
 
 GROUP = "Run"
 
@@ -47,9 +47,9 @@ def run(
 
     Interrupted by whatever, the same command goes on where it stopped.
     """
-    from benchmarks.run import Selection, plan_suite
-    from benchmarks.specification import Limits
-    from benchmarks.suites import load_suite
+    from coartic.benchmarks.run import Selection, plan_suite
+    from coartic.benchmarks.specification import Limits
+    from coartic.benchmarks.suites import load_suite
 
     check_numbers(jobs, time_limit)
     chosen, out = load_suite(suite), folder_named(folder, "--out")
@@ -71,8 +71,8 @@ def run(
 
 
 def _executor(jobs: int, scheduler: str | None, display: Display) -> Executor:
-    from benchmarks.cluster import Dask
-    from benchmarks.executors import Local
+    from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.executors import Local
 
     return Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
 
@@ -87,10 +87,10 @@ class _Comparison:
     def pages(self, folder: Path) -> dict[str, bytes]:
         """What is written beside the tables."""
         self._display.end_runs()
-        from analysis import Study
-        from analysis.report.comparison import comparison_document
-        from analysis.report.formats.markdown import markdown
-        from analysis.results.folder import made_here
+        from coartic.analysis import Study
+        from coartic.analysis.report.comparison import comparison_document
+        from coartic.analysis.report.formats.markdown import markdown
+        from coartic.analysis.results.folder import made_here
 
         study = Study(made_here(folder))
         self._made, self._page = comparison_document(study), folder / "comparison.md"
@@ -101,7 +101,7 @@ class _Comparison:
 
     def show(self) -> None:
         """Print what fits the terminal; nothing where nothing was made anew."""
-        from analysis.report.comparison import notes_of
+        from coartic.analysis.report.comparison import notes_of
 
         if self._made is None:
             return
@@ -111,9 +111,9 @@ class _Comparison:
 
 def list_(method_file: given.MethodFiles = None) -> None:
     """List tasks, methods and suites."""
-    from benchmarks.registry import registry
-    from benchmarks.suites import suites
     from coartic import builtin_tasks, load_task
+    from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.suites import suites
 
     known = [load_task(name) for name in builtin_tasks()]
     show_table(
@@ -165,7 +165,7 @@ def _method_row(entry: Entry, known: list[Task]) -> tuple[str, ...]:
 
 def show(run_id: given.RunId, folder: given.Records = Path("results")) -> None:
     """Show everything about one run, with the command that reproduces it."""
-    from benchmarks.reproduce import command_for, find_record
+    from coartic.benchmarks.reproduce import command_for, find_record
 
     store, record = find_record(run_id, folder)
     shown = record.model_dump(mode="json")
@@ -182,9 +182,9 @@ def reproduce(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Perform one run again and say whether the result is identical."""
-    from benchmarks.registry import registry
-    from benchmarks.reproduce import differences, find_record, perform_once, spec_of
-    from benchmarks.specification import Limits
+    from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.reproduce import differences, find_record, perform_once, spec_of
+    from coartic.benchmarks.specification import Limits
 
     _, record = find_record(run_id, folder)
     limits = Limits(record.timing.time_limit_s, None)
@@ -206,8 +206,8 @@ def check(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Check a method or a task file against the laws of the benchmark."""
-    from benchmarks.conformance import check_method, check_task_file
-    from benchmarks.registry import registry, unknown
+    from coartic.benchmarks.conformance import check_method, check_task_file
+    from coartic.benchmarks.registry import registry, unknown
 
     known = registry(method_file or [])
     if subject.endswith(".toml"):

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
-    from analysis.report.document import DataTable
-    from benchmarks.harness import Progress
-    from benchmarks.specification import RunSpec
+    from coartic.analysis.report.document import DataTable
+    from coartic.benchmarks.harness import Progress
+    from coartic.benchmarks.specification import RunSpec
 
 PLAIN_WIDTH = 200  # columns where the output is not a terminal, and COLUMNS is not set
 READABLE = 24  # characters that a column of text needs
@@ -84,7 +84,7 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
 
 def show_data(tables: Iterable[DataTable], where: str) -> None:
     """Print tables of values, as many columns of each as fit; ``where`` the others are."""
-    from analysis.report.formats.terminal import terminal_table
+    from coartic.analysis.report.formats.terminal import terminal_table
 
     out = console()
     for table in tables:

@@ -810,8 +810,9 @@ def _make_cases() -> list[Case]:
     window = {"MPLBACKEND": "nonsense"}
     nope = COMMANDS["draw an unknown task"]
     case("surroundings", "MPLBACKEND", *nope, env=window, shell="")
-    case("surroundings", "module of our name", ("list",), "is taken from", shell="",
-         files={"analysis.py": "x = 1\n"})  # fmt: skip
+    for name in ("analysis", "baselines", "benchmarks"):  # a user's own; ours are within coartic
+        case("surroundings", f"module {name}", ("list",), "Tasks", code=0,
+             files={f"{name}.py": "raise ImportError\n"})  # fmt: skip
     full = "No space left on device"
     case("surroundings", "output is full", ("cite",), full, shell="> /dev/full", code=1)
     case("surroundings", "output is closed", ("--version",), "", shell=">&-", code=0)
@@ -848,21 +849,30 @@ def attack(root: Path, cases: Sequence[str] = (), *, words: bool = True) -> list
 # What follows runs in the surroundings of the checkout that is attacked.
 
 _COMMANDS_IMPORT = (
-    *("coartic.cli", "benchmarks.suites", "benchmarks.harness", "benchmarks.executors"),
-    *("benchmarks.tables", "benchmarks.reproduce", "benchmarks.conformance"),
     *(
-        "analysis.comparisons.paper",
-        "analysis.comparisons.methods",
-        "analysis.results.folder",
-        "analysis.figures.tasks",
+        "coartic.cli",
+        "coartic.benchmarks.suites",
+        "coartic.benchmarks.harness",
+        "coartic.benchmarks.executors",
     ),
     *(
-        "analysis.claims",
-        "analysis.citations",
-        "analysis.figures.animation",
-        "analysis.comparisons.versions",
+        "coartic.benchmarks.tables",
+        "coartic.benchmarks.reproduce",
+        "coartic.benchmarks.conformance",
     ),
-    *("analysis.study", "analysis.report.build", "analysis.report.trace"),
+    *(
+        "coartic.analysis.comparisons.paper",
+        "coartic.analysis.comparisons.methods",
+        "coartic.analysis.results.folder",
+        "coartic.analysis.figures.tasks",
+    ),
+    *(
+        "coartic.analysis.claims",
+        "coartic.analysis.citations",
+        "coartic.analysis.figures.animation",
+        "coartic.analysis.comparisons.versions",
+    ),
+    *("coartic.analysis.study", "coartic.analysis.report.build", "coartic.analysis.report.trace"),
 )
 
 

@@ -305,7 +305,7 @@ attack(
     "score/encode",
     "replaces the store's writer of records",
     """
-    import benchmarks.store as store
+    import coartic.benchmarks.store as store
     encode = store.encode
     def forged(record, *a, **k):
         if isinstance(record, dict) and record.get("score"):
@@ -638,7 +638,7 @@ attack(
     "neighbour/import-registry",
     "replaces a built-in method in the registry while it is imported",
     before="""
-    import benchmarks.registry as methods
+    import coartic.benchmarks.registry as methods
     from coartic.dual_process import DUAL_PROCESS
     def worse(self, session):
         return honest(session)
@@ -779,7 +779,7 @@ attack(
     "takes modules away from everyone who comes after it",
     """
     found = honest(session)
-    for name in ("baselines.random_search", "coartic.learner", "json", "numpy"):
+    for name in ("coartic.baselines.random_search", "coartic.learner", "json", "numpy"):
         sys.modules[name] = None
     return found
     """,
@@ -1391,8 +1391,8 @@ attack(
     "end/foreign",
     "raises the harness's own error for other code",
     """
-    import benchmarks.worker
-    for module in (sys.modules["__main__"], benchmarks.worker):
+    import coartic.benchmarks.worker
+    for module in (sys.modules["__main__"], coartic.benchmarks.worker):
         error = getattr(module, "ForeignCodeError", None)
         if error is not None:
             raise error("hostile")

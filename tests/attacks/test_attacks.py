@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
-import benchmarks.executors
-from analysis.results.folder import load_results
-from analysis.results.laws import read_manifest
-from benchmarks.store import Store
-from benchmarks.tables import write_tables
+import coartic.benchmarks.executors
 from coartic import PAPER, CoarticError
+from coartic.analysis.results.folder import load_results
+from coartic.analysis.results.laws import read_manifest
+from coartic.benchmarks.store import Store
+from coartic.benchmarks.tables import write_tables
 from coartic.scores import solved
 from tests.support.suites import InProcess
 
@@ -58,7 +58,7 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("attacks")
     (folder / "small.toml").write_text(SUITE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(benchmarks.executors, "Local", InProcess)
+        patch.setattr(coartic.benchmarks.executors, "Local", InProcess)
         code, said = in_process(["run", folder / "small.toml", "--out", folder / "whole"])
     assert code == 0, said
     return folder / "whole"

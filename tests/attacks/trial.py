@@ -18,10 +18,10 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks import sandbox
-from benchmarks.run import run_suite
-from benchmarks.specification import RunSpec, Setting
 from coartic import execute, load_task
+from coartic.benchmarks import sandbox
+from coartic.benchmarks.run import run_suite
+from coartic.benchmarks.specification import RunSpec, Setting
 from coartic.rows import movements_from
 from tests.support.suites import InProcess
 

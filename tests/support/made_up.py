@@ -4,10 +4,10 @@ from functools import cached_property
 
 import pandas as pd
 
-from analysis.results.folder import Results
-from analysis.results.optima import Optimum
-from analysis.study import Study
 from coartic import load_task
+from coartic.analysis.results.folder import Results
+from coartic.analysis.results.optima import Optimum
+from coartic.analysis.study import Study
 from coartic.record import Commit, Environment
 from coartic.tables import Manifest, Plan, PlanLimits, PlannedCell
 

@@ -7,10 +7,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-import analysis.report.build
-from analysis.figures import register
-from analysis.report.build import build, write
-from analysis.report.formats.latex import PACKAGES
+import coartic.analysis.report.build
+from coartic.analysis.figures import register
+from coartic.analysis.report.build import build, write
+from coartic.analysis.report.formats.latex import PACKAGES
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
 
@@ -31,9 +31,9 @@ LATEX = r"""\documentclass{article}
 def undrawn():
     """Reports whose figures are empty: drawing takes long, and has tests of its own."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(analysis.report.build, "svg_text", lambda plot: SVG)
+        patch.setattr(coartic.analysis.report.build, "svg_text", lambda plot: SVG)
         patch.setattr(
-            analysis.report.build,
+            coartic.analysis.report.build,
             "rendered",
             lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
         )

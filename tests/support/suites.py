@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.results.folder import load_results
-from analysis.results.laws import read_manifest
-from benchmarks.declaration import MethodFileError, brief
-from benchmarks.harness import perform_missing
-from benchmarks.registry import registry
-from benchmarks.run import plan_cells
-from benchmarks.sandbox import failure
-from benchmarks.specification import Limits
-from benchmarks.suites import Cell, cell_plans, load_suite, select_cells
-from benchmarks.worker import answer, perform
 from coartic import CoarticError, load_task
+from coartic.analysis.results.folder import load_results
+from coartic.analysis.results.laws import read_manifest
+from coartic.benchmarks.declaration import MethodFileError, brief
+from coartic.benchmarks.harness import perform_missing
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.run import plan_cells
+from coartic.benchmarks.sandbox import failure
+from coartic.benchmarks.specification import Limits
+from coartic.benchmarks.suites import Cell, cell_plans, load_suite, select_cells
+from coartic.benchmarks.worker import answer, perform
 from coartic.tables import TIMINGS
 
 ROOT = Path(__file__).parents[2]
@@ -25,7 +25,8 @@ KNOWN = registry()
 
 
 def run_specs(cells, **options):
-    """Every run of every cell, in order, as :func:`benchmarks.suites.cell_plans` has them."""
+    """Every run of every cell, in order, as :func:`coartic.benchmarks.suites.cell_plans` has
+    them."""
     return [(plan.cell, spec) for plan in cell_plans(cells, **options) for spec in plan.specs()]
 
 
@@ -33,7 +34,8 @@ BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 
 
 def ask_here(foreign, **question):
-    """As :mod:`benchmarks.registry` asks a method that is not built in, without a process."""
+    """As :mod:`coartic.benchmarks.registry` asks a method that is not built in, without a
+    process."""
     try:
         return answer({**question, "foreign": foreign.model_dump(mode="json")})
     except Exception as error:

@@ -7,8 +7,8 @@ import io
 import math
 from collections.abc import Iterable
 
-from analysis.report.document import CellKey, DataTable, Document, Value
-from analysis.report.text import parts
+from coartic.analysis.report.document import CellKey, DataTable, Document, Value
+from coartic.analysis.report.text import parts
 
 _ENDINGS = {"value": ("",), "sd": ("_sd",), "interval": ("_low", "_high")}
 

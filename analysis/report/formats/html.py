@@ -14,12 +14,19 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup, escape
 
-from analysis.markup import inline
-from analysis.methods import LEARNER, short_name
-from analysis.report.document import CellKey, DataTable, Document, FigureBlock, PlayerBlock, Row
-from analysis.report.formats.templates import on_one_line, template
-from analysis.report.text import METHOD_COLUMNS, Part, by_column, tallied, tone_of
-from analysis.words import NONE, true_minus
+from coartic.analysis.markup import inline
+from coartic.analysis.methods import LEARNER, short_name
+from coartic.analysis.report.document import (
+    CellKey,
+    DataTable,
+    Document,
+    FigureBlock,
+    PlayerBlock,
+    Row,
+)
+from coartic.analysis.report.formats.templates import on_one_line, template
+from coartic.analysis.report.text import METHOD_COLUMNS, Part, by_column, tallied, tone_of
+from coartic.analysis.words import NONE, true_minus
 from coartic.text import one_line
 
 _MAGNIFIED = 1.35
@@ -66,7 +73,7 @@ def html(document: Document) -> str:
 
 
 def _resource(name: str) -> str:
-    return (files("analysis.report") / name).read_text(encoding="utf-8")
+    return (files("coartic.analysis.report") / name).read_text(encoding="utf-8")
 
 
 def small_print(own: list[Part]) -> str:

@@ -15,13 +15,13 @@ import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
-from analysis.markup import inline
-from analysis.methods import short_name
-from analysis.report.document import DataTable, Document, Value
-from analysis.report.formats.templates import LATEX, template
-from analysis.report.tables.main import MAIN
-from analysis.report.text import METHOD_COLUMNS, Part, parts
-from analysis.words import NO_SPREAD, NONE
+from coartic.analysis.markup import inline
+from coartic.analysis.methods import short_name
+from coartic.analysis.report.document import DataTable, Document, Value
+from coartic.analysis.report.formats.templates import LATEX, template
+from coartic.analysis.report.tables.main import MAIN
+from coartic.analysis.report.text import METHOD_COLUMNS, Part, parts
+from coartic.analysis.words import NO_SPREAD, NONE
 from coartic.text import one_line
 
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

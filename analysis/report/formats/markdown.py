@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from analysis.markup import markdown as inline_markdown
-from analysis.markup import markdown_text
-from analysis.report.document import Document, Row, Strip
-from analysis.report.formats.templates import template
-from analysis.report.text import Part, parts, tallied
+from coartic.analysis.markup import markdown as inline_markdown
+from coartic.analysis.markup import markdown_text
+from coartic.analysis.report.document import Document, Row, Strip
+from coartic.analysis.report.formats.templates import template
+from coartic.analysis.report.text import Part, parts, tallied
 from coartic.text import one_line
 
 

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
-from analysis.report.document import Block
+from coartic.analysis.report.document import Block
 from coartic.text import one_line
 
 LATEX = {
@@ -27,7 +27,7 @@ def template(name: str, *filters: Callable[..., Any], **settings: Any) -> Templa
     ``settings`` are further ones of jinja2.Environment.
     """
     environment = Environment(
-        loader=PackageLoader("analysis.report", "formats"),
+        loader=PackageLoader("coartic.analysis.report", "formats"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -6,9 +6,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from analysis.markup import words
-from analysis.report.document import DataTable
-from analysis.report.text import by_column, texts
+from coartic.analysis.markup import words
+from coartic.analysis.report.document import DataTable
+from coartic.analysis.report.text import by_column, texts
 from coartic.text import one_line
 
 _PADDING = 4  # characters about a column

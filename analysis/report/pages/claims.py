@@ -7,14 +7,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from analysis.claims.catalogue import family_sizes
-from analysis.claims.register import CHOSEN, FITTED, RULES, Judged
-from analysis.markup import code, escaped
-from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
-from analysis.report.summary import verdicts
-from analysis.report.tables.layout import LAYOUTS, with_legends
-from analysis.study import Study
-from analysis.words import NONE, slugs
+from coartic.analysis.claims.catalogue import family_sizes
+from coartic.analysis.claims.register import CHOSEN, FITTED, RULES, Judged
+from coartic.analysis.markup import code, escaped
+from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
+from coartic.analysis.report.summary import verdicts
+from coartic.analysis.report.tables.layout import LAYOUTS, with_legends
+from coartic.analysis.study import Study
+from coartic.analysis.words import NONE, slugs
 
 
 def claims_table(study: Study) -> DataTable | None:

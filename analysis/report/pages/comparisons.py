@@ -9,16 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.comparisons.pairs import PairRow
-from analysis.comparisons.targets import SHARES
-from analysis.markup import code, escaped
-from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
-from analysis.report.tables.common import marked, table_ids
-from analysis.report.tables.layout import LAYOUTS, Layout
-from analysis.report.tables.methods import overall_table
-from analysis.statistics.estimates import LEVEL, RESAMPLES
-from analysis.study import Study
-from analysis.words import typographic
+from coartic.analysis.comparisons.pairs import PairRow
+from coartic.analysis.comparisons.targets import SHARES
+from coartic.analysis.markup import code, escaped
+from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
+from coartic.analysis.report.tables.common import marked, table_ids
+from coartic.analysis.report.tables.layout import LAYOUTS, Layout
+from coartic.analysis.report.tables.methods import overall_table
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
+from coartic.analysis.study import Study
+from coartic.analysis.words import typographic
 from coartic.record import SEARCH
 
 _OTHERS = {"conditions": "other conditions", "method": "methods", "variant": "its variants"}

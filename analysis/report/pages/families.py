@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from analysis.generality.exploration import EC2, EC3, EC4, Contrast
-from analysis.generality.precision import DIFFERENCE, RUNS, needed
-from analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
-from analysis.markup import escaped
-from analysis.methods import short_name
-from analysis.report.document import Block, Bullets, Section
-from analysis.report.tables.families import (
+from coartic.analysis.generality.exploration import EC2, EC3, EC4, Contrast
+from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed
+from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
+from coartic.analysis.markup import escaped
+from coartic.analysis.methods import short_name
+from coartic.analysis.report.document import Block, Bullets, Section
+from coartic.analysis.report.tables.families import (
     family_tables,
     learner_gaps,
     over,
 )
-from analysis.statistics.estimates import Inference
-from analysis.study import Study
-from analysis.words import NARROW_SPACE, true_minus, typographic
+from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.study import Study
+from coartic.analysis.words import NARROW_SPACE, true_minus, typographic
 from coartic.text import counted
 
 TITLE = "Beyond the paper's tasks"

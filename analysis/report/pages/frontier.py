@@ -10,12 +10,12 @@ from functools import partial
 
 import pandas as pd
 
-from analysis.comparisons.areas import Area
-from analysis.comparisons.pareto import TIME_TOLERANCE
-from analysis.comparisons.progress import LABELS, SPENDS
-from analysis.comparisons.targets import Target
-from analysis.markup import escaped
-from analysis.report.document import (
+from coartic.analysis.comparisons.areas import Area
+from coartic.analysis.comparisons.pareto import TIME_TOLERANCE
+from coartic.analysis.comparisons.progress import LABELS, SPENDS
+from coartic.analysis.comparisons.targets import Target
+from coartic.analysis.markup import escaped
+from coartic.analysis.report.document import (
     Block,
     Bullets,
     Column,
@@ -27,11 +27,11 @@ from analysis.report.document import (
     Section,
     Value,
 )
-from analysis.report.tables.common import marked, table_ids
-from analysis.report.tables.layout import LAYOUTS, finite, with_interval
-from analysis.results.optima import OtherArm
-from analysis.study import Study
-from analysis.words import typographic
+from coartic.analysis.report.tables.common import marked, table_ids
+from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from coartic.analysis.results.optima import OtherArm
+from coartic.analysis.study import Study
+from coartic.analysis.words import typographic
 from coartic.record import SEARCH
 
 TARGET_SPENDS = ("trials", "forward_kinematics")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from analysis.report.document import Block, Document, Prose, Section
-from analysis.report.tables.common import marked, table_ids
-from analysis.report.tables.contexts import contexts_table, slopes_tables
-from analysis.report.tables.layout import LAYOUTS
-from analysis.report.tables.signatures import definitions_table, signatures_tables
-from analysis.signatures.rows import NO_RUN
-from analysis.study import Study
+from coartic.analysis.report.document import Block, Document, Prose, Section
+from coartic.analysis.report.tables.common import marked, table_ids
+from coartic.analysis.report.tables.contexts import contexts_table, slopes_tables
+from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.report.tables.signatures import definitions_table, signatures_tables
+from coartic.analysis.signatures.rows import NO_RUN
+from coartic.analysis.study import Study
 
 
 def signatures_document(study: Study) -> Document:

@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from analysis.comparisons.versions import SPENT, VersionComparison, VersionRow
-from analysis.markup import code, escaped
-from analysis.report.document import Block, Bullets, DataTable, Document, Prose, Row, Section
-from analysis.report.tables.layout import LAYOUTS, finite
-from analysis.statistics.equivalence import MARGIN
-from analysis.statistics.estimates import FEWEST
+from coartic.analysis.comparisons.versions import SPENT, VersionComparison, VersionRow
+from coartic.analysis.markup import code, escaped
+from coartic.analysis.report.document import (
+    Block,
+    Bullets,
+    DataTable,
+    Document,
+    Prose,
+    Row,
+    Section,
+)
+from coartic.analysis.report.tables.layout import LAYOUTS, finite
+from coartic.analysis.statistics.equivalence import MARGIN
+from coartic.analysis.statistics.estimates import FEWEST
 
 _CELLS = LAYOUTS["cells"]
 

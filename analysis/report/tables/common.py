@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.published import Summary
-from analysis.report.document import Estimate
-from analysis.report.tables.layout import finite
-from analysis.statistics.estimates import SEED, mean
-from analysis.statistics.spread import sd
-from analysis.study import Study
-from analysis.words import slugs
+from coartic.analysis.published import Summary
+from coartic.analysis.report.document import Estimate
+from coartic.analysis.report.tables.layout import finite
+from coartic.analysis.statistics.estimates import SEED, mean
+from coartic.analysis.statistics.spread import sd
+from coartic.analysis.study import Study
+from coartic.analysis.words import slugs
 
 
 def table_ids(study: Study) -> dict[str, str]:

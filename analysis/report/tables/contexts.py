@@ -8,11 +8,11 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 
-from analysis.markup import escaped
-from analysis.report.document import CellKey, Column, DataTable, Row, Value
-from analysis.report.tables.common import table_ids
-from analysis.report.tables.layout import LAYOUTS
-from analysis.report.tables.signatures import (
+from coartic.analysis.markup import escaped
+from coartic.analysis.report.document import CellKey, Column, DataTable, Row, Value
+from coartic.analysis.report.tables.common import table_ids
+from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.report.tables.signatures import (
     cells_of,
     columns_of,
     holm_adjusted,
@@ -21,10 +21,10 @@ from analysis.report.tables.signatures import (
     labels_of,
     reasons_for,
 )
-from analysis.signatures.locus import families
-from analysis.signatures.register import CONTEXTS, FAMILIES, REGISTER
-from analysis.signatures.rows import Place, SignatureRow
-from analysis.study import Study
+from coartic.analysis.signatures.locus import families
+from coartic.analysis.signatures.register import CONTEXTS, FAMILIES, REGISTER
+from coartic.analysis.signatures.rows import Place, SignatureRow
+from coartic.analysis.study import Study
 from coartic.text import counted
 
 MOST_CONTEXTS = 120

@@ -7,19 +7,19 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from analysis.generality.exploration import budgets
-from analysis.generality.precision import DIFFERENCE, RUNS, needed, variance_shares
-from analysis.generality.presence import SIGNS, THERE, presence, recruitment
-from analysis.generality.properties import OUTCOMES, PROPERTIES, what_pays
-from analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
-from analysis.markup import escaped
-from analysis.methods import short_name
-from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
-from analysis.report.tables.layout import LAYOUTS, with_interval
-from analysis.statistics.estimates import SEED, Inference
-from analysis.statistics.instances import Runs, Scores, other_tasks
-from analysis.study import Study
-from analysis.words import slugs
+from coartic.analysis.generality.exploration import budgets
+from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed, variance_shares
+from coartic.analysis.generality.presence import SIGNS, THERE, presence, recruitment
+from coartic.analysis.generality.properties import OUTCOMES, PROPERTIES, what_pays
+from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.markup import escaped
+from coartic.analysis.methods import short_name
+from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
+from coartic.analysis.report.tables.layout import LAYOUTS, with_interval
+from coartic.analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.statistics.instances import Runs, Scores, other_tasks
+from coartic.analysis.study import Study
+from coartic.analysis.words import slugs
 from coartic.record import SEARCH
 from coartic.text import counted
 

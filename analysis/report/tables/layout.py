@@ -11,8 +11,8 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
-from analysis.comparisons.methods import TOLD
-from analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
+from coartic.analysis.comparisons.methods import TOLD
+from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
 
 _LETTERS = {"told", "told_more", "told_less"}  # columns with letters of information
 _MARKS = {

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import pandas as pd
 
-from analysis.comparisons.methods import median
-from analysis.comparisons.reached import ALL_TASKS
-from analysis.figures.ranking import GROUPS, learner, standings
-from analysis.report.document import Column, DataTable, Row, Value
-from analysis.report.tables.layout import LAYOUTS, finite, with_interval
-from analysis.study import Study
-from analysis.words import slugs
+from coartic.analysis.comparisons.methods import median
+from coartic.analysis.comparisons.reached import ALL_TASKS
+from coartic.analysis.figures.ranking import GROUPS, learner, standings
+from coartic.analysis.report.document import Column, DataTable, Row, Value
+from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from coartic.analysis.study import Study
+from coartic.analysis.words import slugs
 
 MAIN = ("main-methods", "published-and-ours", "main-verdicts")
 """Ids of the tables for a paper, in their order; all others are its supplement."""

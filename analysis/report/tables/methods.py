@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from analysis.comparisons.methods import TOLD, MethodRow
-from analysis.markup import escaped
-from analysis.report.document import DataTable, Row
-from analysis.report.tables.common import marked, mean_of, table_ids
-from analysis.report.tables.layout import LAYOUTS
-from analysis.study import Study
-from analysis.words import true_minus
+from coartic.analysis.comparisons.methods import TOLD, MethodRow
+from coartic.analysis.markup import escaped
+from coartic.analysis.report.document import DataTable, Row
+from coartic.analysis.report.tables.common import marked, mean_of, table_ids
+from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.study import Study
+from coartic.analysis.words import true_minus
 from coartic.method import Information
 from coartic.record import SEARCH
 from coartic.text import counted

@@ -6,20 +6,20 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
-from analysis.published import (
+from coartic.analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
+from coartic.analysis.published import (
     RUNS,
     TRIALS,
     Summary,
     published_exhaustive,
     published_initial,
 )
-from analysis.report.document import DataTable, RestsOn, Row, Value
-from analysis.report.tables.common import counts, estimate_as_printed, marked, mean_of
-from analysis.report.tables.layout import LAYOUTS, Layout, with_interval
-from analysis.statistics.equivalence import MARGIN
-from analysis.study import Study
-from analysis.words import typographic
+from coartic.analysis.report.document import DataTable, RestsOn, Row, Value
+from coartic.analysis.report.tables.common import counts, estimate_as_printed, marked, mean_of
+from coartic.analysis.report.tables.layout import LAYOUTS, Layout, with_interval
+from coartic.analysis.statistics.equivalence import MARGIN
+from coartic.analysis.study import Study
+from coartic.analysis.words import typographic
 
 _CELLS, _SEQUENCES = LAYOUTS["published-and-ours"], LAYOUTS["by-hand-sequence"]
 

@@ -1,7 +1,7 @@
 """Signatures of coarticulation on one task.
 
 Which signature a table shows, and under which heading, is said by the register
-(:mod:`analysis.signatures.register`).
+(:mod:`coartic.analysis.signatures.register`).
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Literal, NamedTuple
 
-from analysis.markup import escaped
-from analysis.report.document import Column, DataTable, Row, Value
-from analysis.report.tables.common import counts, table_ids
-from analysis.report.tables.layout import LAYOUTS, with_interval
-from analysis.signatures.register import REGISTER
-from analysis.signatures.rows import Signature, SignatureRow
-from analysis.statistics.hypotheses import holm
-from analysis.study import Study
+from coartic.analysis.markup import escaped
+from coartic.analysis.report.document import Column, DataTable, Row, Value
+from coartic.analysis.report.tables.common import counts, table_ids
+from coartic.analysis.report.tables.layout import LAYOUTS, with_interval
+from coartic.analysis.signatures.register import REGISTER
+from coartic.analysis.signatures.rows import Signature, SignatureRow
+from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.study import Study
 
 _MAIN, _FURTHER = "main-signatures", "further-goals"
 """Tables of the same signatures: at the first goal or none, and at the others."""
