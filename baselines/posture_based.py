@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import PostureGraph
+from coartic.baselines.posture_graph import cheapest_chains
 from coartic.compiled import entry, inner
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.robot import BASE_DOF, Array, Hand, chain, lever
@@ -148,14 +148,10 @@ class PostureBased(Method):
         if len(session.hands) ** session.goals_count <= most:
             return itertools.product(sorted(session.hands), repeat=session.goals_count)
         task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
-        graph = PostureGraph.sampled(task, _BEAM_POSTURES, session.rng)
-        session.spend(
-            forward_kinematics=graph.spent.forward_kinematics, jacobians=graph.spent.jacobians
+        found = cheapest_chains(
+            session, task, session.rng, nodes=_BEAM_POSTURES, graphs=1, chains=1, most=most
         )
-        missing = graph.why_none()
-        if missing:
-            raise MethodError("infeasible", missing)
-        return [chain.hands for chain in graph.chains(most=most)]
+        return [chain.hands for chain in found]
 
 
 class OneGoal(PostureBased):

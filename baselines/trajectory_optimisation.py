@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import PostureGraph, spread_out
+from coartic.baselines.posture_graph import cheapest_chains, spread_out
 from coartic.baselines.trajectory_problem import (
     Cost,
     Instance,
@@ -48,8 +48,10 @@ class TrajectoryParameters(Parameters):
     nodes: Annotated[int, Field(ge=10, le=1000)] = 150
     """Postures per goal and hand in a graph."""
     graphs: Annotated[int, Field(ge=1)] = 3
-    """Independent graphs, one or two starts from each. With one, the best path was missed on
-    3 of 23 small random tasks."""
+    """Independent graphs, one or two starts for a hand sequence from each. With one, the best
+    path was missed on 3 of 23 small random tasks."""
+    chains: Annotated[int, Field(ge=1)] = 30
+    """Chains of all hand sequences, from as many further graphs as that takes."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first. With
     equal times jerk has many local minima, and on the two-armed tasks with the other arm
@@ -78,7 +80,7 @@ class TrajectoryOptimisation(Method):
     cost: ClassVar[Cost]
     stochastic = False
     Parameters = TrajectoryParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "hands": "given"}
+    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "hands": "given"}
 
     def why_not(self, task: Task) -> str | None:
         """A sequence that does not fit the task."""
@@ -161,19 +163,20 @@ class TrajectoryOptimisation(Method):
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(parameters.sampling_seed)
         starts: dict[tuple[Hand, ...], list[Array]] = {}
-        for _ in range(parameters.graphs):
-            graph = PostureGraph.sampled(task, parameters.nodes, rng)
-            session.spend(
-                forward_kinematics=graph.spent.forward_kinematics, jacobians=graph.spent.jacobians
-            )
-            missing = graph.why_none(only)
-            if missing:
-                raise MethodError("infeasible", missing)
-            for chain in graph.chains(only, parameters.most_sequences):
-                known = starts.setdefault(chain.hands, [])
-                known.append(chain.configurations)
-                if parameters.other_arm == "free" and len(task.hands) > 1:
-                    known.append(spread_out(task, chain))
+        for chain in cheapest_chains(
+            session,
+            task,
+            rng,
+            nodes=parameters.nodes,
+            graphs=parameters.graphs,
+            chains=parameters.chains,
+            most=parameters.most_sequences,
+            only=only,
+        ):
+            known = starts.setdefault(chain.hands, [])
+            known.append(chain.configurations)
+            if parameters.other_arm == "free" and len(task.hands) > 1:
+                known.append(spread_out(task, chain))
         for known in starts.values():
             first = known[0]
             for _ in range(parameters.noisy_starts):

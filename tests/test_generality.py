@@ -308,7 +308,7 @@ BLOCKS = (
     'methods = ["dual-process/EC2", "dual-process/EC3", "dual-process/EC4", '
     '"corrective-alone/given"]',
     'tasks = ["two-armed/v1/i003"]\nmethods = ["optimum/dynamic-programming"]\n'
-    "parameters = { nodes = 10, graphs = 1 }",
+    "parameters = { nodes = 10, graphs = 1, chains = 1 }",
 )
 
 

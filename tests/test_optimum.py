@@ -87,9 +87,9 @@ def test_a_wholly_locked_base_is_infeasible():
 @pytest.mark.parametrize(
     ("method", "parameters"),
     [
-        (DynamicProgramming, {"graphs": 1, "nodes": 60}),
+        (DynamicProgramming, {"graphs": 1, "chains": 1, "nodes": 60}),
         (Multistart, {"starts": 5}),
-        (BranchAndBound, {"graphs": 1, "nodes": 60}),
+        (BranchAndBound, {"graphs": 1, "chains": 1, "nodes": 60}),
     ],
 )
 def test_searches_find_what_is_shipped(method, parameters):
@@ -116,7 +116,7 @@ def test_out_of_reach_is_infeasible(method):
 def test_a_hand_that_is_there_already_saves_a_tick():
     """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
     task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")
-    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1))
+    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1, chains=1))
     session = Session(task, 0, method.told, trusted=True)
     execution = execute(task, method.solve(session).solution)
     assert execution.hands == "RL"
@@ -127,7 +127,7 @@ def test_a_hand_that_is_there_already_saves_a_tick():
 def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     task = load_task("ascending")
     session = Session(task, 0, DynamicProgramming.told, trusted=True)
-    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1))
+    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1, chains=1))
     execution = execute(task, method.solve(session).solution)
     runs = pd.DataFrame(
         [

@@ -64,7 +64,8 @@ def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
     if hand not in task.hands:
         return
     spent = Spent()
-    samples = sample_postures(task, 1, hand, 80, np.random.default_rng(5), spent)
+    starts = np.tile(task.q0, (80, 1))
+    samples = sample_postures(task, 1, hand, starts, np.random.default_rng(5), spent)
     assert len(samples) > 60
     assert spent.forward_kinematics > spent.jacobians > 0
     miss = task.robot.forward_kinematics(samples, hand) - task.goals[1]

@@ -227,7 +227,7 @@ def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, nam
     task = load_task(name)
     session = Session(task, 0, method.told, trusted=True)
     hands = {"ascending": "given", "two-armed-2": "RLRR"}[name]
-    parameters = method.Parameters(other_arm=other_arm, nodes=40, graphs=1, hands=hands)
+    parameters = method.Parameters(other_arm=other_arm, nodes=40, graphs=1, chains=1, hands=hands)
     result = method(parameters).solve(session)
     execution = execute(task, result.solution)
     assert execution.hands == {"given": "RRR"}.get(hands, hands)
@@ -287,15 +287,17 @@ def test_the_rest_of_a_piece_lies_ahead_whether_arrival_costs_a_tick(tick):
 
 
 def test_of_too_many_hand_sequences_a_beam_is_planned():
-    """As many as are asked for, one of which is the best of all; all where there are no more."""
+    """As many as are asked for, as if all were; all where there are no more."""
     task = load_task("two-armed-1")
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}
     for most in (3, 16, 64):
-        parameters = method.Parameters(nodes=40, graphs=1, noisy_starts=0, most_sequences=most)
+        parameters = method.Parameters(
+            nodes=40, graphs=1, chains=1, noisy_starts=0, most_sequences=most
+        )
         result = method(parameters).solve(Session(task, 0, method.told, trusted=True))
         costs[most] = result.details["costs"]
     assert len(costs[3]) == 3
     assert len(costs[16]) == 16
     assert costs[64] == costs[16]
-    assert min(costs[3], key=costs[3].get) == min(costs[16], key=costs[16].get) == "LRLR"
+    assert costs[3].items() <= costs[16].items()
