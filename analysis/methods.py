@@ -102,4 +102,7 @@ def short_name(label: str) -> str:
     name = METHODS[method].short if method in METHODS else method
     for key, words in _PARAMETERS.items():
         variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
-    return f"{name} ({variant.replace('_', ' ')})" if variant else name
+    if not variant:
+        return name
+    begun = f"{name[:-1]}, " if name.endswith(")") else f"{name} ("
+    return f"{begun}{variant.replace('_', ' ')})"

@@ -1,6 +1,6 @@
 """Suites, the runner, and the records it keeps. Imports ``coartic`` and ``baselines``.
 
-``benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.run`).
+``coartic.benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.run`).
 """
 
 from typing import TYPE_CHECKING, Any

@@ -275,7 +275,7 @@ class _TaskChecks:
     @property
     def task(self) -> Task:
         if isinstance(self.loaded, TaskError):
-            raise _BrokenError("the file cannot be read, so this cannot be checked")
+            raise _BrokenError("not checked, as the file is not valid")
         return self.loaded
 
     def valid(self) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +95,11 @@ class RunReport:
             id_ for cell in cells for id_ in self.manifest.run_ids(cell)
         )
 
+    @cached_property
+    def others(self) -> int:
+        """Runs in the folder that were not asked for: of another suite, or of more of this one."""
+        return len(Packs(self.folder)) - len(self.records)
+
     @property
     def crashed(self) -> int:
         """Runs that crashed, now or before."""
@@ -104,6 +110,16 @@ class RunReport:
         return (
             f"{counted(progress.total, 'run')}: {progress.present} were there, {progress.done} "
             f"done in {self.wall_s:.1f} s; {progress.failed} failed. Results in {self.folder}"
+            f"{self._without}"
+        )
+
+    @property
+    def _without(self) -> str:
+        if not self.others:
+            return ""
+        return (
+            f" (without {counted(self.others, 'run')} that the folder also keeps: tables are of "
+            "what one command asks for, so name all in one)"
         )
 
 

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -259,6 +260,9 @@ def select_cells(
 ) -> list[Cell]:
     """The cells of a suite, plus those of the user's own tasks, narrowed by name.
 
+    A name of ``tasks`` that ends with ``.toml`` is a task file; ``optimum/*`` among ``methods``
+    stands for all that begin so.
+
     A method of ``methods`` that the suite does not have runs on all of the suite's
     tasks that it applies to. A task from a file runs under every applicable method of
     ``methods``, or of all methods of the suite where none are named; so does an instance of a
@@ -268,9 +272,12 @@ def select_cells(
     does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
     by one name, and where nothing is left to run.
     """
-    methods = [_full_name(name, known) for name in methods]
-    tasks = list(itertools.chain(*map(named_by, tasks)))
-    own = _own_tasks(task_files)
+    methods = [method for name in methods for method in _full_names(name, known)]
+    files = [Path(name) for name in tasks if name.endswith(".toml")]
+    named = [name for name in tasks if not name.endswith(".toml")]
+    own = _own_tasks(files)
+    tasks = [*itertools.chain(*map(named_by, named)), *own]
+    own = _own_tasks([*task_files, *files])
     there = {name for block in suite.cells for name in block.tasks_among(own)}
     own |= {
         name: load_task(name)
@@ -301,12 +308,16 @@ def select_cells(
     return chosen
 
 
-def _full_name(name: str, known: Registry) -> str:
-    """The id of a method; a condition of the learner goes by its own name as well."""
+def _full_names(name: str, known: Registry) -> list[str]:
+    """The id of a method; a condition of the learner goes by its own name as well.
+
+    ``optimum/*`` names all that begin so.
+    """
     name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
-    if name not in known:
+    found = [method for method in known if fnmatchcase(method, name)] if "*" in name else [name]
+    if not found or found[0] not in known:
         raise unknown("method", name, known)
-    return name
+    return found
 
 
 def _own_tasks(paths: Iterable[Path]) -> dict[str, Task]:

@@ -491,7 +491,7 @@ def test_short_names_and_looks_tell_methods_apart():
     learner = "dual-process/EC4"
     assert looks(["mine", learner])[learner] == looks([learner])[learner]
     assert short_name("dual-process/EC4 noise_sd=0.02") == "EC4 (σ 0.02)"
-    assert short_name("cma-es/every other_arm=still") == "CMA-ES, every (other arm still)"
+    assert short_name("cma-es/every other_arm=still") == "CMA-ES (every, other arm still)"
     assert short_name("cma-es/bold epsilon=0.1") == "cma-es/bold (ε 0.1)"  # nobody of ours
 
 

@@ -131,12 +131,13 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     change(
         "benchmarks/registry.py",
         "import coartic.baselines.optimum\n",
-        "import baselines.nearest_hand\nimport coartic.baselines.optimum\n",
+        "import coartic.baselines.nearest_hand\nimport coartic.baselines.optimum\n",
     )
     change(
         "benchmarks/registry.py",
         "    *coartic.baselines.optimum.METHODS,\n",
-        "    baselines.nearest_hand.NearestHand,\n    *coartic.baselines.optimum.METHODS,\n",
+        "    coartic.baselines.nearest_hand.NearestHand,\n"
+        "    *coartic.baselines.optimum.METHODS,\n",
     )
     append("analysis/methods.toml", LOOK)
     # A signature: a function, a row.

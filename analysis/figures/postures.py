@@ -24,6 +24,7 @@ from coartic.robot import Array
 from coartic.task import hands_of
 
 _COLORS = (style.BLUE, style.VERMILLION)
+_LETTERS = 9  # points: beside others on the first screen it is small
 _RUNS: Any = {"linewidth": 0.4, "alpha": 0.25, "zorder": 1}
 
 
@@ -100,7 +101,7 @@ def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     found = contexts(study, methods)
     if found is None:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
-    figure = Figure(figsize=(style.ONE, 1.85), layout="constrained")
+    figure = Figure(figsize=(style.ONE, 1.6), layout="constrained")
     _draw(figure.subplots(), found)
     first, second = found.tasks
     facts: dict[str, Any] = {
@@ -146,7 +147,7 @@ def _draw(axes: Axes, found: Contexts) -> None:
         up = following[1] >= shared[1]
         axes.annotate(
             f"then goal {found.goal + 1}\n({task.label.lower()})", following, (5, 0),
-            textcoords="offset points", color=color, va="center", ha="left",
+            textcoords="offset points", color=color, va="center", ha="left", fontsize=_LETTERS,
         )  # fmt: skip
         _base(axes, task, mean, color, above=up)
     axes.add_patch(
@@ -154,7 +155,7 @@ def _draw(axes: Axes, found: Contexts) -> None:
     )
     axes.annotate(
         f"goal {found.goal},\nthe same", shared, (7, 0), textcoords="offset points",
-        va="center", weight="bold",
+        va="center", weight="bold", fontsize=_LETTERS,
     )  # fmt: skip
 
 
@@ -163,8 +164,8 @@ def _base(axes: Axes, task: Task, q: Array, color: str, *, above: bool) -> None:
     outline = task.robot.base_outline(q)
     place = outline.mean(axis=0)[0], outline[:, 1].max() if above else outline[:, 1].min()
     axes.annotate(
-        task.label.lower(), place, (0, 3 if above else -3), textcoords="offset points",
-        color=color, ha="center", va="bottom" if above else "top",
+        f"base,\n{task.label.lower()}", place, (0, 3 if above else -3), textcoords="offset points",
+        color=color, ha="center", va="bottom" if above else "top", fontsize=_LETTERS,
     )  # fmt: skip
 
 

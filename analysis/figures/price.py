@@ -1,4 +1,4 @@
-"""At what price: shares of targets reached within a budget, over runs and tasks."""
+"""At what price: shares of levels of reward reached within a budget, over runs and tasks."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def main_methods(data: pd.DataFrame) -> list[str]:
 
 @style.styled
 def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
-    """Share of pairs of run and target reached, against trials and kinematics.
+    """Share of pairs of run and level of reward reached, against trials and kinematics.
 
     Raises CoarticError where no task has a known optimum beyond its initial solution.
     """
@@ -57,7 +57,7 @@ def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     panels = figure.subplots(1, len(spends), squeeze=False, sharey=True).ravel()
     for axes, spend in zip(panels, spends, strict=True):
         _panel(axes, shown[shown.spend == spend], labels, NAMES[spend])
-    panels[0].set_ylabel("targets reached (%)")
+    panels[0].set_ylabel("levels of reward reached (%)")
     style.letters(panels)
     looks = {label: style.looks([look_alike(label)])[look_alike(label)] for label in labels}
     handles = [style.entry(short_name(label), **look.line) for label, look in looks.items()]

@@ -15,15 +15,15 @@ from coartic.analysis.comparisons.overall import variant
 from coartic.analysis.comparisons.reached import ALL_TASKS
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, spoken, worded
+from coartic.analysis.figures.price import look_alike
 from coartic.analysis.figures.selection import missing
 from coartic.analysis.methods import LEARNER, family_of, short_name
 from coartic.analysis.statistics.estimates import SEED, mean
 from coartic.analysis.study import Study
 from coartic.record import SEARCH
 
-GROUPS = (*INFORMED.values(), UNTOLD)
-"""What methods know of the reward, the most first."""
-COLORS = dict(zip(GROUPS, (style.BLUE, style.VERMILLION, style.GREY), strict=True))
+GROUPS = (*reversed(INFORMED.values()), UNTOLD)
+"""What methods know of the reward: those that learn, those that compute it, those that do not."""
 
 
 class Standing(NamedTuple):
@@ -123,14 +123,16 @@ def ranking(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
 
 
 def _panel(axes: Axes, told: str, own: pd.DataFrame) -> None:
-    axes.set_title(told, color=COLORS[told])
+    axes.set_title(told)
     for place, values in enumerate(own.itertuples(index=False, name=None)):
         row = Standing(*values)
-        mark: Any = {"color": COLORS[told], "clip_on": False, "markersize": 3.5}
+        alike = look_alike(row.method)
+        color = style.looks([alike])[alike].color
+        mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
         end = row.gap
         if not math.isnan(row.low):
             end = max(row.gap, row.high)
-            axes.plot([row.low, row.high], [-place, -place], color=COLORS[told], linewidth=1.4)
+            axes.plot([row.low, row.high], [-place, -place], color=color, linewidth=1.4)
         axes.plot(row.gap, -place, "D" if learner(row.method) else "o", **mark)
         of: Any = {"textcoords": "offset points", "va": "center"}
         axes.annotate(f"{row.gap:.1f}", (end, -place), (5, 0), **of)

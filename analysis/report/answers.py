@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from coartic.analysis.claims.register import Judged
-from coartic.analysis.comparisons.methods import INFORMED
+from coartic.analysis.comparisons.methods import INFORMED, UNTOLD
 from coartic.analysis.comparisons.overall import variant
 from coartic.analysis.comparisons.paper import paper_rows
 from coartic.analysis.comparisons.reached import ALL_TASKS
@@ -21,7 +21,8 @@ from coartic.analysis.figures.price import main_methods
 from coartic.analysis.figures.ranking import learner, standings
 from coartic.analysis.markup import escaped
 from coartic.analysis.methods import LEARNER, spoken_name
-from coartic.analysis.report.document import Block, Bullets, Section, Strip, Verdict
+from coartic.analysis.published import published_cells
+from coartic.analysis.report.document import Block, Bullets, Prose, Section, Strip, Verdict
 from coartic.analysis.report.summary import best_condition, unlike_printed
 from coartic.analysis.report.text import tone_of
 from coartic.analysis.statistics.equivalence import MARGIN
@@ -56,7 +57,8 @@ def answers(study: Study, pictures: Mapping[str, Block], player: Block | None) -
         _card("price", price(study), _some(pictures.get("price"))),
     )
     cards = tuple(card for card in found if card is not None)
-    return Section("answers", "In short", (), cards, cards=True)
+    about = (Prose((_SAID["about"]["learner"],)),) if most_learned(study) is not None else ()
+    return Section("answers", "In short", about, cards, cards=True)
 
 
 def _card(name: str, finding: str, blocks: Sequence[Block]) -> Section | None:
@@ -79,6 +81,8 @@ def coarticulation(study: Study) -> str:
     if found is None:
         return _played(study)
     first, second = found.tasks
+    most = most_learned(study)
+    task = None if most is None else escaped(study.tasks[most].label)
     facts = {
         "goal": found.goal,
         "method": escaped(spoken_name(found.method)),
@@ -89,6 +93,7 @@ def coarticulation(study: Study) -> str:
         "hands": f"{found.hands_apart:.2f}",
         "spreads": "" if math.isnan(found.spreads) else f"; {found.spreads:.1f} SD of the runs",
         "p": "" if math.isnan(found.p) else f", p {_p(found.p)}",
+        "played": "" if task is None else _said("coarticulation", "played", task=task),
     }
     differs = found.apart > 0 and not found.p >= LEVEL
     return _said("coarticulation", "seen" if differs else "same", **facts)
@@ -108,7 +113,37 @@ def _played(study: Study) -> str:
         method=escaped(spoken_name(label)),
         learned=typographic(f"{good.reward.mean():.0f}"),
         initial=typographic(f"{good.initial_reward.mean():.0f}"),
+        given_up=given_up(study),
     )
+
+
+def given_up(study: Study) -> str:
+    """Whether the learner is slower to the first goal and faster to the last, by the task it
+    improves most on; empty where that was not measured."""
+    task = most_learned(study)
+    found = study.signatures
+    found = found[(found.task == task) & found.value.notna()]
+    label = None if task is None else best_condition(study, task)
+    of = found[found.label == label].drop_duplicates("signature").set_index("signature")
+    names = [f"{part} against the same hands" for part in ("first subtask", "total")]
+    if task is None or not set(names) <= set(of.index):
+        return ""
+    first, whole = (of.loc[name] for name in names)
+    known = not math.isnan(first.low)
+    sacrificed = (first.low if known else first.value) > 0 and whole.value < 0
+    return _said(
+        "coarticulation",
+        "given_up" if sacrificed else "not_given_up",
+        task=escaped(study.tasks[task].label),
+        method=escaped(spoken_name(str(label))),
+        first=_change(first.value),
+        interval=_interval(first) if known else "",
+        whole=_change(whole.value),
+    )
+
+
+def _change(ticks: float) -> str:
+    return typographic(f"{ticks:+.1f}")
 
 
 def most_learned(study: Study) -> str | None:
@@ -126,47 +161,65 @@ def most_learned(study: Study) -> str | None:
 
 def reproduced(study: Study) -> str:
     """The paper's learned rewards and claims, counted by verdict."""
-    return " ".join(filter(None, (cells_found(study), claims_found(study))))
+    if not of_the_paper(study):
+        return ""
+    said = claims_found(study), cells_found(study), _fitted(study)
+    return " ".join([_how(study), *filter(None, said)]) if any(said[:2]) else ""
+
+
+def of_the_paper(study: Study) -> bool:
+    """Whether any run is on a task of the paper."""
+    return any(task in study.tasks for task, _ in published_cells())
 
 
 def cells_found(study: Study) -> str:
-    """The paper's learned rewards by verdict, after the answer in a word."""
-    cells = Counter(row.verdict for row in paper_rows(study) if row.verdict is not None)
+    """The paper's learned rewards by verdict."""
+    cells = _cells(study)
     if not cells:
         return ""
-    claims = Counter(entry.verdict for entry in study.judged if entry.claim.place)
     facts = {name: _counted(cells, name) for name in ("equivalent", "undecided", "different")}
-    margin = f"{100 * MARGIN:.0f} %"
-    how = _how(cells, claims)
-    return _said("paper", "cells", how=how, cells=cells.total(), margin=margin, **facts)
+    return _said("paper", "cells", cells=cells.total(), margin=f"{100 * MARGIN:.0f} %", **facts)
 
 
 def claims_found(study: Study) -> str:
     """The paper's claims by verdict; empty where none is decided."""
-    judged = [entry for entry in study.judged if entry.claim.place]
-    found = Counter(entry.verdict for entry in judged)
+    found = _claims(study)
     if not found["supported"] + found["not supported"]:
         return ""
-    facts = {
+    facts = {"open": _counted(found, "cannot tell"), "measured": _counted(found, "measured")}
+    return _said("paper", "claims", claims=found.total(), **_decided(found), **facts)
+
+
+def _fitted(study: Study) -> str:
+    """What is left without the tasks whose goals are not printed."""
+    if not any(entry.claim.fitted for entry in study.judged):
+        return ""
+    return _said("paper", "fitted", **_decided(_claims(study, fitted=False)))
+
+
+def _cells(study: Study) -> Counter[Any]:
+    return Counter(row.verdict for row in paper_rows(study) if row.verdict is not None)
+
+
+def _claims(study: Study, *, fitted: bool = True) -> Counter[Any]:
+    """The paper's claims by verdict, with or without those on reconstructed tasks."""
+    judged = (entry for entry in study.judged if entry.claim.place)
+    return Counter(entry.verdict for entry in judged if fitted or not entry.claim.fitted)
+
+
+def _decided(found: Counter[Any]) -> dict[str, str]:
+    return {
         "supported": _counted(found, "supported"),
         "refuted": _counted(found, "not supported"),
-        "open": _counted(found, "cannot tell"),
-        "measured": _counted(found, "measured"),
     }
-    fitted = any(entry.claim.fitted for entry in judged)
-    text = _said("paper", "claims", claims=found.total(), **facts)
-    return text + _SAID["paper"]["fitted"] * fitted
 
 
-def _how(cells: Counter[Any], claims: Counter[Any]) -> str:
+def _how(study: Study) -> str:
     """The answer in a word or two, by what is found and what is refuted."""
+    cells, claims = _cells(study), _claims(study)
     if not cells["different"] + claims["not supported"]:
-        whole = not cells["undecided"] + claims["cannot tell"]
-        return "**Yes.**" if whole else "**Yes, as far as can be told.**"
-    if cells["equivalent"] + claims["supported"] == 0:
-        return "**No.**"
-    more = claims["supported"] > claims["not supported"] and not cells["different"]
-    return "**Largely.**" if more else "**In part.**"
+        return _SAID["paper"]["open" if cells["undecided"] + claims["cannot tell"] else "yes"]
+    return _SAID["paper"]["part" if cells["equivalent"] + claims["supported"] else "no"]
 
 
 def _counted(found: Counter[Any], verdict: str) -> str:
@@ -204,8 +257,10 @@ def strips(study: Study) -> list[Block]:
     if squares and any(square.tone in ("good", "bad") for square in squares):
         found.append(Strip("strip-claims", "Claims", squares, counted=True))
     if found:
-        found.append(Bullets(tuple(_refuted(judged, study))))
-    return [block for block in found if not isinstance(block, Bullets) or block.items]
+        refuted = tuple(_refuted(judged, study))
+        if refuted:
+            found += [Prose((_SAID["paper"]["refuted"],)), Bullets(refuted)]
+    return found
 
 
 def _unbroken(text: str) -> str:
@@ -220,10 +275,10 @@ def _refuted(judged: Iterable[Judged], study: Study) -> Iterable[str]:
     """Cells that differ and claims that do not hold, by name."""
     for words in unlike_printed(study):
         yield f"Different: {escaped(words)}."
-    for entry in judged:
-        if entry.verdict == "not supported":
-            statement = escaped(entry.claim.statement.rstrip(".")) + " †" * entry.claim.fitted
-            yield f"Not supported: [{statement}](#claim-{entry.claim.id})."
+    refuted = [entry for entry in judged if entry.verdict == "not supported"]
+    for entry in sorted(refuted, key=lambda entry: entry.claim.fitted):
+        statement = escaped(entry.claim.statement.rstrip(".")) + " †" * entry.claim.fitted
+        yield f"[{statement}](#claim-{entry.claim.id})."
 
 
 def winners(study: Study) -> str:
@@ -233,7 +288,6 @@ def winners(study: Study) -> str:
         return ""
     shown = found[found.task == found.task.iloc[0]].reset_index(drop=True)
     by_trial = shown[shown.told == INFORMED[Information.REWARD_BY_TRIAL]].reset_index(drop=True)
-    by_formula = shown[shown.told == INFORMED[Information.REWARD_FORMULA]]
     said = ""
     if len(by_trial):
         best, sure = by_trial.iloc[0], _sure(by_trial)
@@ -243,24 +297,24 @@ def winners(study: Study) -> str:
             best=escaped(spoken_name(best.method)),
             leads="is ahead" if sure.startswith(", not") else "wins",
             gap=f"{best.gap:.1f}",
-            interval=_interval(best),
+            interval=_interval(best, about=_SAID["methods"]["about"]),
             sure=sure,
             learner=_place_of_learner(by_trial),
         )
-    if len(by_formula):
-        best = by_formula.iloc[0]
-        said += _said(
-            "methods",
-            "informed",
-            best=escaped(spoken_name(best.method)),
-            gap=f"{best.gap:.1f}",
-            proven=_proven(study),
-        )
+    others = {"informed": INFORMED[Information.REWARD_FORMULA], "untold": UNTOLD}
+    for sentence, told in others.items():
+        own = shown[shown.told == told]
+        if len(own):
+            best = own.iloc[0]
+            facts = {"best": escaped(spoken_name(best.method)), "gap": f"{best.gap:.1f}"}
+            said += _said("methods", sentence, proven=_proven(study), **facts)
     return said
 
 
-def _interval(row: Any) -> str:
-    return "" if math.isnan(row.low) else rf" \[{row.low:.1f}, {row.high:.1f}]"
+def _interval(row: Any, about: str = "") -> str:
+    if math.isnan(row.low):
+        return ""
+    return _said("methods", "interval", low=f"{row.low:.1f}", high=f"{row.high:.1f}", about=about)
 
 
 def _sure(rows: pd.DataFrame) -> str:
@@ -297,11 +351,11 @@ def _proven(study: Study) -> str:
     proven = sum(best.proven for best in known)
     if proven == len(known):
         return ", which is proven"
-    return f" (proven on {proven} of {len(known)} tasks, elsewhere the best known)"
+    return f" (proven on {proven} of {len(known)} tasks)"
 
 
 def price(study: Study) -> str:
-    """What the learner spends for half of the targets, beside the best of its kind and a plan."""
+    """What half of the levels cost the learner, beside the best of its kind and a plan."""
     found = study.reached
     if not len(found):
         return ""
@@ -317,16 +371,19 @@ def price(study: Study) -> str:
     rival = max(learners, key=lambda m: last[m], default=None)
     if rival is None:
         alone = _said("price", "alone", learner=f"{100 * last[own]:.0f} %")
-        return alone + _plan(shown, labels, own)
+        return alone + _plan(shown, labels, own, None)
     halves = [_half(trials[trials.method == m]) for m in (own, rival)]
     name = escaped(spoken_name(rival))
-    if None in halves:
+    if halves[0] is None or halves[1] is None:
         facts = {"learner": f"{100 * last[own]:.0f} %", "less": f"{100 * last[rival]:.0f} %"}
         said = _said("price", "never", rival=name, **facts)
     else:
-        amounts = [f"{_amount(half)} trials" for half in halves if half is not None]
-        said = _said("price", "half", learner=amounts[0], rival=name, less=amounts[1])
-    return said + _plan(shown, labels, own)
+        amounts = [f"{_amount(half)} trials" for half in (halves[0], halves[1])]
+        times = halves[0] / halves[1]
+        fewer = _said("price", "fewer", times=_amount(times)) if times >= 2 else ""
+        facts = {"learner": amounts[0], "less": amounts[1], "fewer": fewer}
+        said = _said("price", "half", rival=name, **facts)
+    return said + _plan(shown, labels, own, rival)
 
 
 def _learns(trials: pd.DataFrame, method: str) -> bool:
@@ -335,8 +392,8 @@ def _learns(trials: pd.DataFrame, method: str) -> bool:
     return bool(len(share) and share.iloc[-1] > share.iloc[0])
 
 
-def _plan(shown: pd.DataFrame, labels: Iterable[str], own: str) -> str:
-    """What makes no trials and reaches half of the targets with the least kinematics."""
+def _plan(shown: pd.DataFrame, labels: Iterable[str], own: str, rival: str | None) -> str:
+    """What makes no trials and reaches half of the levels with the least kinematics."""
     trials = shown[shown.spend == "trials"].groupby("method").budget
     none = shown[(shown.spend == "trials") & (shown.budget == 0) & (shown.share >= 0.5)].method
     known = shown[(shown.spend == "forward_kinematics") & shown.method.isin(set(none))]
@@ -346,9 +403,15 @@ def _plan(shown: pd.DataFrame, labels: Iterable[str], own: str) -> str:
         return ""
     best = min(cheap, key=lambda m: cheap[m])
     name = spoken_name(best)
-    kinematics = shown[(shown.spend == "forward_kinematics") & (shown.method == own)]
-    half = _half(kinematics)
-    beside = "" if half is None else _said("price", "beside", spent=_amount(half))
+    kinematics = shown[shown.spend == "forward_kinematics"]
+    half, other = (_half(kinematics[kinematics.method == m]) for m in (own, rival))
+    beside = ""
+    if half is not None:
+        spent = "" if other is None else _amount(other)
+        also = spent and _said(
+            "price", "rival", name=escaped(spoken_name(str(rival))), spent=spent
+        )
+        beside = _said("price", "beside", spent=_amount(half), rival=also)
     name = escaped(name[0].upper() + name[1:])
     return _said("price", "plans", name=name, spent=_amount(cheap[best]), beside=beside)
 
@@ -421,7 +484,7 @@ def context_found(study: Study) -> str:
     both = pd.concat(parts, axis=1, keys=["equivalent", "other"]).dropna()
     both = both[[not variant(str(label)) for label in both.index.get_level_values("label")]]
     if not len(both):
-        return ""
+        return given_up(study)
     larger = int((both.equivalent > both.other).sum())
     return _said("findings", "context", equivalent=larger, count=len(both))
 

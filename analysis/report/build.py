@@ -22,6 +22,7 @@ from coartic.analysis.report.answers import (
     context_found,
     hands_found,
     limits_found,
+    of_the_paper,
     pace_found,
     price,
     winners,
@@ -64,6 +65,7 @@ from coartic.analysis.report.write import check_report_folder, write_report
 from coartic.analysis.results.folder import Results
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.study import Study
+from coartic.task import address_of
 from coartic.text import counted
 
 MOST_TASKS = 8
@@ -143,7 +145,11 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
             "tasks-drawn", "Tasks", drawn("tasks-drawn"), [tasks_table(study)], _facts(study)
         ),
         _section("paper", "Paper", drawn("paper"), beside_paper(study), cells_found(study)),
-        _claims(study, {} if figures is None else figures.like_the_paper),
+        *(
+            [_claims(study, {} if figures is None else figures.like_the_paper)]
+            if of_the_paper(study) or any(map(address_of, study.tasks))
+            else []
+        ),
         _section("movements", "Movements", drawn("movements"), (), hands_found(study)),
         _section("learning", "Learning", drawn("learning"), (), pace_found(study)),
         _methods(study, drawn("methods")),

@@ -7,7 +7,7 @@ page (``html.py``). Text and axes have the page's ink, so that light and dark ne
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import altair as alt
@@ -19,8 +19,8 @@ from coartic.analysis.comparisons.reached import ALL_TASKS
 from coartic.analysis.figures import style
 from coartic.analysis.figures.frontier import NAMES
 from coartic.analysis.figures.price import look_alike, main_methods
-from coartic.analysis.figures.ranking import COLORS, GROUPS, Standing, learner
-from coartic.analysis.methods import family_of, short_name, spoken_name
+from coartic.analysis.figures.ranking import GROUPS, Standing, learner
+from coartic.analysis.methods import family_of, spoken_name
 from coartic.analysis.study import Study
 from coartic.text import json_text
 
@@ -28,7 +28,6 @@ _ANY = "all"
 _ROW, _TALL = 11, 200  # pixels: of a row, of the curves
 _APART = 7.0  # per cent of the axis between names at its end
 _INK = "currentColor"
-_SHORT = json_text(dict(zip(GROUPS, ("as a formula", "after each trial", "nothing"), strict=True)))
 _CONFIG: Any = {
     "background": "transparent",
     "font": "system-ui, -apple-system, Segoe UI, Roboto, Liberation Sans, sans-serif",
@@ -66,38 +65,35 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
         {
             **{"task": row.task, "name": spoken_name(row.method), "id": row.method},
             **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
-            **{
-                "brief": _brief(row.method),
-                "told": row.told,
-                "family": row.family,
-                "runs": row.runs,
-            },
+            **{"told": row.told, "family": row.family, "runs": row.runs},
             **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
             **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
         }
         for row in map(Standing._make, data.itertuples(index=False, name=None))
     ]
+    groups = data[["task", "told", "family"]].drop_duplicates().itertuples(index=False)
+    values += [  # a row above each group, with its name
+        {
+            **row._asdict(),
+            "name": row.told,
+            "heading": True,
+            "place": 1000 * GROUPS.index(row.told) - 1,
+        }
+        for row in groups
+    ]
     chosen = _choices(tasks, data.told, data.family)
-    base = _filtered(_chart(values), chosen)
+    every = _filtered(_chart(values), chosen)
+    base = every.transform_filter("!datum.heading")
     order = alt.EncodingSortField("place", op="min", order="ascending")
     bold: Any = {
         "condition": {"test": "indexof(datum.label, 'learner') === 0", "value": "bold"},
         "value": "normal",
     }
-    axis = alt.Axis(grid=False, ticks=False, labelFontWeight=bold)
+    shown = f"indexof({json_text(list(GROUPS))}, datum.label) < 0 ? datum.label : ''"
+    axis = alt.Axis(grid=False, ticks=False, labelFontWeight=bold, labelExpr=shown)
     y: Any = alt.Y("name:N", sort=order, title=None, axis=axis)
-    told: Any = alt.Color(
-        "told:N",
-        scale=alt.Scale(domain=list(GROUPS), range=list(COLORS.values())),
-        legend=alt.Legend(
-            orient="top",
-            title="told of the reward:",
-            titleOrient="left",
-            offset=2,
-            symbolSize=50,
-            labelExpr=f"({_SHORT})[datum.label]",
-        ),
-    )
+    labels = list(dict.fromkeys(map(str, data.method)))
+    color = _colors(labels, style.looks([look_alike(label) for label in labels]))
     tips = [
         alt.Tooltip("name:N", title="method"),
         alt.Tooltip("gap:Q", title="gap to the optimum (%)", format=".2f"),
@@ -105,9 +101,9 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
         *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
     ]
     x: Any = alt.X("gap:Q", scale=alt.Scale(padding=24), title="gap to the optimum (%)")
-    lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=told)
+    lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=color)
     marks = base.mark_point(filled=True, size=45, opacity=1).encode(
-        x=x, y=y, color=told, tooltip=tips,
+        x=x, y=y, color=color, tooltip=tips,
         shape=alt.Shape("learner:N", legend=None,
                         scale=alt.Scale(domain=[False, True], range=["circle", "diamond"])),
     )  # fmt: skip
@@ -116,8 +112,14 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
         align="left", dx=7, color=_INK, fontSize=10.5
     )
     text = text.encode(x=alt.X("end:Q"), y=y, text=alt.Text("gap:Q", format=".1f"))
+    heading = every.transform_filter("datum.heading")
+    heading = heading.transform_aggregate(methods="count()", groupby=["name", "told", "place"])
+    heading = heading.mark_text(
+        align="left", x=4, color=_INK, fontSize=10.5, fontWeight="bold", limit=0
+    )
+    heading = heading.encode(y=y, text=alt.Text("told:N"))
     zero = _chart([{"x": 0}]).mark_rule(strokeDash=[2, 3], color=_INK)
-    parts = alt.layer(zero.encode(x=alt.X("x:Q")), lines, marks, text)
+    parts = alt.layer(zero.encode(x=alt.X("x:Q")), lines, marks, text, heading)
     told_first = [told for told in GROUPS if (data.told == told).any()]
     return _finished(
         parts.properties(width="container", height=alt.Step(_ROW)),
@@ -126,13 +128,13 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
 
 
 def price_chart(study: Study, data: pd.DataFrame) -> Any:
-    """Targets reached within a budget; by task, family, what a method is told, and spend."""
+    """Levels of reward reached within a budget; by task, family, what is told, and spend."""
     told_of = _told(study)
     tasks = list(dict.fromkeys(map(str, data.task)))
     if ALL_TASKS in tasks:
         tasks.remove(ALL_TASKS)
         tasks.insert(0, ALL_TASKS)
-    main = set(main_methods(data))
+    main = _main(data)
     labels = list(dict.fromkeys(map(str, data.method)))
     looks = style.looks([look_alike(label) for label in labels])
     positive = data[data.budget > 0].groupby("spend").budget
@@ -146,11 +148,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
             {
                 **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
                 **{"told": told_of[str(method)], "family": family_of(str(method))},
-                **{
-                    "brief": _brief(str(method)),
-                    "main": method in main,
-                    "runs": int(own.runs.iloc[0]),
-                },
+                **{"main": method in main, "runs": int(own.runs.iloc[0])},
                 "end": _number(most),
                 "budget": [_number(max(b, least / 2)) for b in own.budget],
                 "share": [_number(100 * share) for share in own.share],
@@ -183,13 +181,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
         "format(datum.high, '.0f')  + ' %' : 'none: too few runs'"
     )
     names = [spoken_name(label) for label in labels]
-    color: Any = alt.Color(
-        "name:N",
-        scale=alt.Scale(
-            domain=names, range=[_paint(looks[look_alike(label)].color) for label in labels]
-        ),
-        legend=None,
-    )
+    color = _colors(labels, looks)
     dash: Any = alt.StrokeDash(
         "name:N",
         scale=alt.Scale(
@@ -200,10 +192,12 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     x: Any = alt.X(
         "budget:Q",
         scale=alt.Scale(type="log", nice=False),
-        title="spent (left edge: nothing)",
+        title=None,
         axis=alt.Axis(format="~s", tickCount=6, grid=False),
     )
-    y: Any = alt.Y("share:Q", title="targets reached (%)", scale=alt.Scale(domain=[0, 100]))
+    y: Any = alt.Y(
+        "share:Q", title="levels of reward reached (%)", scale=alt.Scale(domain=[0, 100])
+    )
     band = base.mark_area(interpolate="step-after").encode(
         x=x, y=alt.Y("low:Q"), y2="high:Q", color=color,
         opacity=alt.condition(near, alt.value(0.35), alt.value(0.12)),
@@ -215,7 +209,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     tips = [
         alt.Tooltip("name:N", title="method"),
         alt.Tooltip("budget:Q", title="spent", format=".3~s"),
-        alt.Tooltip("share:Q", title="targets reached (%)", format=".0f"),
+        alt.Tooltip("share:Q", title="levels of reward reached (%)", format=".0f"),
         alt.Tooltip("interval:N", title="95 % interval"),
         *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
     ]
@@ -227,10 +221,37 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
         .mark_text(align="left", dx=4, fontSize=10.5)
         .encode(x=alt.X("end:Q"), y=alt.Y("label:Q"), text="name:N", color=color)
     )
-    layers = alt.layer(band, line, points, last)
+    half = _chart([{"y": 50}]).mark_rule(strokeDash=[2, 3], color=_INK, opacity=0.6)
+    named = json_text(NAMES)
+    title = _chart([{}]).transform_calculate(
+        words=f"({named})[spend] + ' (logarithmic; left edge: none)'"
+    )
+    title = title.mark_text(
+        x=alt.expr("width / 2"), y=_TALL + 30, color=_INK, fontSize=11, limit=0
+    )
+    layers = alt.layer(
+        half.encode(y=alt.Y("y:Q")), band, line, points, last, title.encode(text="words:N")
+    )
     return _finished(
         layers.properties(width="container", height=_TALL), *chosen, every
-    ).properties(description="Share of targets reached within a budget, by method.")
+    ).properties(description="Share of levels of reward reached within a budget, by method.")
+
+
+def _main(data: pd.DataFrame) -> set[str]:
+    """Of each family the method that reaches most in all its trials; of more there is no room."""
+    ends = data[(data.spend == SPENDS[0]) & data.method.isin(main_methods(data))]
+    ends = ends.groupby("method", sort=False).share.last()
+    best: dict[str, str] = {}
+    for method in map(str, ends.sort_values(ascending=False, kind="stable").index):
+        best.setdefault(family_of(method), method)
+    return set(best.values())
+
+
+def _colors(labels: Sequence[str], looks: Mapping[str, Any]) -> Any:
+    """A colour a method, by its spoken name."""
+    paints = [_paint(looks[look_alike(label)].color) for label in labels]
+    scale = alt.Scale(domain=[spoken_name(label) for label in labels], range=paints)
+    return alt.Color("name:N", scale=scale, legend=None)
 
 
 def _placed(values: list[dict[str, Any]]) -> None:
@@ -270,11 +291,6 @@ def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
         else:
             chart = chart.transform_filter(f"{name} === 'all' || datum.{name} === {name}")
     return chart
-
-
-def _brief(label: str) -> str:
-    """The name of a method where there is little room."""
-    return spoken_name(label) if learner(label) else short_name(label)
 
 
 def _chart(values: list[dict[str, Any]]) -> Any:

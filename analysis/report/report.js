@@ -32,32 +32,18 @@
   };
   window.addEventListener("hashchange", reveal);
 
-  /* What is folded is printed as well, but for the lists of runs. */
-  let folded = [];
-  window.addEventListener("beforeprint", () => {
-    folded = [...document.querySelectorAll("main details:not([open])")].filter((at) => !at.closest(".runs"));
-    folded.forEach((at) => { at.open = true; });
-  });
-  window.addEventListener("afterprint", () => folded.forEach((at) => { at.open = false; }));
   if (window.location.hash) reveal();
 
   /* Charts in the place of the drawings of the same data. */
   document.querySelectorAll("figure .chart").forEach((place) => {
     const still = place.parentElement.querySelector(".still");
     const text = place.nextElementSibling.textContent;
-    let said = JSON.parse(text);
+    const said = JSON.parse(text);
     place.hidden = false;
     still.hidden = true;
-    if (place.clientWidth < 480) { // names and legends give way to what is drawn
-      const brief = new Map();
-      JSON.parse(text, (key, value) => {
-        if (value && value.brief) brief.set(value.name, value.brief);
-        return value;
-      });
-      said = JSON.parse(text, (key, value) => brief.get(value) ?? value);
-      Object.assign(said.config.axis, { labelLimit: 132 });
-      Object.assign(said.config.legend, { columns: 1 });
-      said.config.text = { limit: 118 };
+    if (place.clientWidth < 480) { // names give way to what is drawn
+      Object.assign(said.config.axis, { labelLimit: 165, labelFontSize: 10 });
+      said.config.text = { limit: 130 };
     }
     window.vegaEmbed(place, said, { renderer: "svg", actions: false, tooltip: { theme: "custom" } })
       .catch(() => { place.hidden = true; still.hidden = false; });
