@@ -215,7 +215,7 @@ def check(
     elif subject in known:
         laws = check_method(known[subject])
     else:
-        raise unknown("method or task file", subject, known)
+        raise CoarticError(f"{unknown('method', subject, known)} A task is checked by its file.")
     for law in laws:
         say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
     broken = sum(not law.passed for law in laws)

@@ -38,6 +38,7 @@ _LINE, _NARROW = 105, 70  # characters of small print that a line holds, and a n
 _MANY = 10  # columns from which on the print is smaller
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
+_WAITING = 30  # tables that float without text between them: LaTeX gives up at some fifty
 _NUMBER = re.compile(r"(?P<sign>-?)(?P<whole>\d+)(\.(?P<decimals>\d+))?")
 
 
@@ -49,7 +50,14 @@ def latex_inputs(document: Document) -> str:
     rest = [table for name, table in tables.items() if name not in main]
     if main and rest:
         parts.append("\\clearpage % the supplement, in the order of its numbers\n")
-    inputs = "".join([*parts, *map(_input, rest)])
+    waiting = 0
+    for table in rest:
+        waiting = 0 if is_long(table) else waiting + 1
+        if waiting > _WAITING:
+            parts.append("\\clearpage\n")
+            waiting = 1
+        parts.append(_input(table))
+    inputs = "".join(parts)
     return (
         f"% Needs \\usepackage{{{','.join(PACKAGES)}}}, \\usepackage[T1]{{fontenc}} and UTF-8;\n"
         f"% tables of more than {MOST_ROWS} rows are longtables, for one column of text.\n"
