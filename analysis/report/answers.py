@@ -128,16 +128,16 @@ def given_up(study: Study) -> str:
     names = [f"{part} against the same hands" for part in ("first subtask", "total")]
     if task is None or not set(names) <= set(of.index):
         return ""
-    first, whole = (of.loc[name] for name in names)
-    known = not math.isnan(first.low)
-    sacrificed = (first.low if known else first.value) > 0 and whole.value < 0
+    first: Any = of.loc[names[0]]
+    whole: Any = of.loc[names[1]]
+    least = first.value if math.isnan(first.low) else first.low
     return _said(
         "coarticulation",
-        "given_up" if sacrificed else "not_given_up",
+        "given_up" if least > 0 > whole.value else "not_given_up",
         task=escaped(study.tasks[task].label),
         method=escaped(spoken_name(str(label))),
         first=_change(first.value),
-        interval=_interval(first) if known else "",
+        interval=_interval(first),
         whole=_change(whole.value),
     )
 

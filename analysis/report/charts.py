@@ -71,15 +71,14 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
         }
         for row in map(Standing._make, data.itertuples(index=False, name=None))
     ]
-    groups = data[["task", "told", "family"]].drop_duplicates().itertuples(index=False)
+    rows = map(Standing._make, data.itertuples(index=False, name=None))
+    groups = dict.fromkeys((str(row.task), row.told, row.family) for row in rows)
     values += [  # a row above each group, with its name
         {
-            **row._asdict(),
-            "name": row.told,
-            "heading": True,
-            "place": 1000 * GROUPS.index(row.told) - 1,
+            **{"task": task, "told": told, "family": family, "name": told},
+            **{"heading": True, "place": 1000 * GROUPS.index(told) - 1},
         }
-        for row in groups
+        for task, told, family in groups
     ]
     chosen = _choices(tasks, data.told, data.family)
     every = _filtered(_chart(values), chosen)
@@ -239,10 +238,10 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
 
 def _main(data: pd.DataFrame) -> set[str]:
     """Of each family the method that reaches most in all its trials; of more there is no room."""
-    ends = data[(data.spend == SPENDS[0]) & data.method.isin(main_methods(data))]
-    ends = ends.groupby("method", sort=False).share.last()
+    shown = data[(data.spend == SPENDS[0]) & data.method.isin(main_methods(data))]
+    ends = dict(zip(map(str, shown.method), map(float, shown.share), strict=True))  # the last
     best: dict[str, str] = {}
-    for method in map(str, ends.sort_values(ascending=False, kind="stable").index):
+    for method in sorted(ends, key=lambda method: -ends[method]):
         best.setdefault(family_of(method), method)
     return set(best.values())
 
