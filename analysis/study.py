@@ -29,6 +29,7 @@ from coartic.analysis.comparisons.targets import targets
 from coartic.analysis.generality.exploration import Contrast, contrasts
 from coartic.analysis.generality.presence import Signs, signs
 from coartic.analysis.generality.sample import sample
+from coartic.analysis.generality.scaling import Growth, scaling
 from coartic.analysis.results.folder import CellKey, CellRuns, Results, load_results
 from coartic.analysis.results.optima import optima
 from coartic.analysis.signatures.register import signature_rows, signatures_table
@@ -103,6 +104,11 @@ class Study:
     def contrasts(self) -> list[Contrast]:
         """More exploration against less on instances of families; none without any."""
         return contrasts(self.instances) if self.instances else []
+
+    @cached_property
+    def growth(self) -> list[Growth]:
+        """How computing and gaps grow with goals and joints; none without instances."""
+        return scaling(self.instances) if self.instances else []
 
     @cached_property
     def signs(self) -> dict[CellKey, Signs]:

@@ -10,11 +10,13 @@ from coartic import load_task
 from coartic.analysis.claims import CLAIMS, Claim, Finding, judge
 from coartic.analysis.claims.catalogue import family_sizes
 from coartic.analysis.claims.power import over_instances
+from coartic.analysis.generality import sample
 from coartic.analysis.generality.exploration import EC2, EC3, EC4, budgets, contrasts
 from coartic.analysis.generality.precision import RUNS, needed, variance_shares
 from coartic.analysis.generality.presence import Signs, presence, recruitment
 from coartic.analysis.generality.properties import properties, what_pays
 from coartic.analysis.generality.sample import INITIAL, ONE_ARMED
+from coartic.analysis.generality.scaling import scaling, size
 from coartic.analysis.report.build import build
 from coartic.analysis.report.formats.markdown import markdown
 from coartic.analysis.results.folder import Results
@@ -188,6 +190,30 @@ def test_a_planted_property_pays(tmp_path):
     assert found["worth", "goals"].explained == pytest.approx(1)
 
 
+def test_planted_growth_is_found_apart_for_goals_and_joints(tmp_path):
+    """Evaluations grow as goals² and joints³; seconds not at all; gaps by 2 % for each goal."""
+    study = study_of(tmp_path, RISING)
+    sizes = [size(study.tasks[name]) for name in study.runs.task]
+    cost = np.array([10.0 * goals**2 * joints**3 for goals, joints in sizes])
+    study.runs["forward_kinematics"], study.runs["jacobians"] = 0.75 * cost, 0.25 * cost
+    study.runs["reward"] = [round(BEST * (1 + 0.02 * goals)) for goals, _ in sizes]
+    found = {(g.label, g.what): g for g in scaling(study.instances)}
+    evaluations, seconds = found[EC4, "kinematics"], found[EC4, "solve_s"]
+    assert (evaluations.goals.slope, evaluations.joints.slope) == (
+        pytest.approx(2), pytest.approx(3),
+    )  # fmt: skip
+    assert evaluations.goals.low == pytest.approx(2)
+    assert (evaluations.instances, evaluations.explained) == (20, pytest.approx(1))
+    assert seconds.goals.slope == pytest.approx(0)
+    gap = found[EC4, "gap"]
+    assert (gap.goals.slope, gap.joints.slope) == (pytest.approx(0.02), pytest.approx(0))
+
+
+def test_joints_are_those_that_move_one_hand():
+    assert size(load_task("ascending")) == (3, 6)
+    assert size(load_task("two-armed-1")) == (4, 5)
+
+
 def made_up_signs(study, hand=1.0, waiting=0.3):
     found = {}
     for name in study.tasks:
@@ -338,6 +364,15 @@ def test_a_small_folder_through_a_report(folder, undrawn):
     assert "## Beyond the paper" in page
     assert "claim-proficiency-rises-in-general" in {s.id for s in document.walk()}
     assert "claim-proficiency-rises" not in {s.id for s in document.walk()}
+
+
+def test_many_instances_alone_are_reported_together(folder, undrawn, monkeypatch):
+    monkeypatch.setattr(sample, "MOST_INSTANCES", 1)
+    study = Study(folder)
+    assert study.signatures.empty
+    document = build(study).document
+    assert any(table.id == "family-gaps" for table in document.tables())
+    assert not any(table.id.startswith("main-signatures") for table in document.tables())
 
 
 def test_a_folder_without_instances_has_no_such_section(tmp_path, undrawn):

@@ -139,6 +139,25 @@ def test_instances_that_show_a_difference():
         found.needed(0.0, 1)
 
 
+def test_intervals_of_slopes_are_those_of_fits_to_drawn_instances():
+    """Beside the obvious: instances drawn one by one, each draw fitted."""
+    rng = np.random.default_rng(3)
+    groups = np.repeat(["a", "b"], (10, 20))
+    table = rng.uniform(0, 1, (30, 2))
+    values = table @ [1.0, -2.0] + rng.exponential(0.3, 30)
+    effects, _ = regression(values, table, list(groups), seed=0)
+    design = np.column_stack([np.ones(30), table])
+    fits = []
+    for _ in range(4000):
+        drawn = np.concatenate(
+            [rng.choice(np.flatnonzero(groups == g), (groups == g).sum()) for g in "ab"]
+        )
+        fits.append(np.linalg.lstsq(design[drawn], values[drawn], rcond=None)[0])
+    for effect, own in zip(effects, np.transpose(fits)[1:], strict=True):
+        ends = np.quantile(own, (0.025, 0.975))
+        np.testing.assert_allclose((effect.low, effect.high), ends, atol=0.12 * own.std() * 2)
+
+
 def test_a_planted_property_is_found_and_another_is_not():
     rng = np.random.default_rng(8)
     groups = ["a"] * 60 + ["b"] * 60

@@ -107,6 +107,12 @@ class Sample:
             )
         )
 
+    @cached_property
+    def searches(self) -> tuple[str, ...]:
+        """Searches for the optimum of instances with their variants, in the plan's order."""
+        known = (label for name, label in self.study.cells if name in self.tasks)
+        return tuple(dict.fromkeys(label for label in known if label.startswith(SEARCH)))
+
     def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
         """Of each solved run (n,), as a share of the best known reward; None without any.
 

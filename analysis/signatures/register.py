@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from itertools import groupby
 from operator import attrgetter
@@ -112,8 +112,12 @@ def signatures_table(rows: Sequence[SignatureRow]) -> pd.DataFrame:
     then those of its :class:`~.rows.Place`. Signatures over runs are means with Student's
     interval, shares of runs have Wilson's.
     """
+    own = [field.name for part in (SignatureRow, Place) for field in fields(part)]
     frame = pd.DataFrame(
-        {**vars(row), "place": str(row.place), **vars(row.place), "label": row.label}
-        for row in rows
+        [
+            {**vars(row), "place": str(row.place), **vars(row.place), "label": row.label}
+            for row in rows
+        ],
+        columns=[*own, "label"],
     ).rename(columns={"place": "where"})
     return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))

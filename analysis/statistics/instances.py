@@ -234,10 +234,15 @@ def regression(
     explained = 1 - float(left @ left) / float(about @ about) if np.ptp(values) else math.nan
     rng = np.random.default_rng(seed)
     places = [np.flatnonzero(np.asarray(groups) == name) for name in dict.fromkeys(groups)]
-    drawn = np.empty((RESAMPLES, design.shape[1]))
-    for row in drawn:
-        which = np.concatenate([rng.choice(own, len(own)) for own in places])
-        row[:] = np.linalg.lstsq(design[which], values[which], rcond=None)[0]
+    counts = np.empty((RESAMPLES, len(values)))
+    for own in places:
+        counts[:, own] = rng.multinomial(len(own), np.full(len(own), 1 / len(own)), RESAMPLES)
+    # Normal equations of all draws; the pseudo-inverse is for draws in which nothing varies.
+    size = design.shape[1]
+    outer = (design[:, :, None] * design[:, None, :]).reshape(len(values), -1)
+    squares = (counts @ outer).reshape(-1, size, size)
+    products = (counts * values) @ design
+    drawn = np.einsum("rjk,rk->rj", np.linalg.pinv(squares, hermitian=True), products)
     low, high = np.quantile(drawn, TAILS, axis=0)
     known: NDArray[np.int64] = np.cumsum(varies)
     return [

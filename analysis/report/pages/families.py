@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from coartic.analysis.generality.exploration import EC2, EC3, EC4, Contrast
 from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed
-from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
+from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
 from coartic.analysis.markup import escaped
 from coartic.analysis.methods import short_name
 from coartic.analysis.report.document import Block, Bullets, Section
@@ -17,6 +17,7 @@ from coartic.analysis.report.tables.families import (
     over,
 )
 from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.instances import Effect
 from coartic.analysis.study import Study
 from coartic.analysis.words import NARROW_SPACE, true_minus, typographic
 from coartic.text import counted
@@ -71,6 +72,7 @@ def _sentences(study: Study, sample: Sample) -> Iterator[str]:
         (c.first, c.second): c for c in study.contrasts if (c.first, c.second) not in by_pair
     }
     yield from _exploration(study, by_pair)
+    yield from _grown(study)
     yield _known(sample)
     yield from _seen(sample)
 
@@ -100,6 +102,32 @@ def _exploration(study: Study, by_pair: dict[tuple[str, str], Contrast]) -> Iter
             f"{counted(found.instances, 'instance')}; "
             f"by family {' and '.join(parts) or 'told apart in none'}."
         )
+
+
+def _grown(study: Study) -> Iterator[str]:
+    """What a goal more costs every method without variants."""
+    rows = [g for g in study.growth if " " not in g.label and g.goals.low < g.goals.high]
+    gaps, powers = (
+        sorted((g for g in rows if g.what == what), key=lambda g: g.goals.slope)
+        for what in ("gap", "kinematics")
+    )
+    if gaps and powers:
+        yield escaped(
+            "A goal more goes with so many points more of gap: "
+            + ", ".join(
+                f"{short_name(g.label)} {_points(g.goals)}" for g in gaps if g.label != INITIAL
+            )
+            + ". Evaluations of kinematics grow with the number of goals to the power of "
+            + ", ".join(f"{g.goals.slope:.1f} ({short_name(g.label)})" for g in powers)
+            + "."
+        )
+
+
+def _points(found: Effect) -> str:
+    low, point, high = (
+        true_minus(f"{100 * value:.1f}") for value in (found.low, found.slope, found.high)
+    )
+    return f"{point} [{low}, {high}]"
 
 
 def _known(sample: Sample) -> str:

@@ -12,6 +12,7 @@ from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed, vari
 from coartic.analysis.generality.presence import SIGNS, THERE, presence, recruitment
 from coartic.analysis.generality.properties import OUTCOMES, PROPERTIES, what_pays
 from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.generality.scaling import GROWING
 from coartic.analysis.markup import escaped
 from coartic.analysis.methods import short_name
 from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
@@ -20,7 +21,6 @@ from coartic.analysis.statistics.estimates import SEED, Inference
 from coartic.analysis.statistics.instances import Runs, Scores, other_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.words import slugs
-from coartic.record import SEARCH
 from coartic.text import counted
 
 LEARNER = "learner"
@@ -47,6 +47,7 @@ def family_tables(study: Study) -> Iterator[DataTable]:
             _presence_table(study, sample),
             _hands_table(study, sample),
             _properties_table(sample),
+            _scaling_table(study, sample),
             _variance_table(sample),
             _precision_table(sample),
             _references_table(sample),
@@ -272,6 +273,27 @@ def _properties_table(sample: Sample) -> DataTable | None:
     return layout.table(rows, **OUTCOMES)
 
 
+def _scaling_table(study: Study, sample: Sample) -> DataTable | None:
+    layout, rows = LAYOUTS["family-scaling"], []
+    for found in study.growth:
+        scale, name = 100.0 if found.what == "gap" else 1.0, short_name(found.label)
+        goals, joints = (
+            with_interval(*(scale * v for v in (effect.slope, effect.low, effect.high)))
+            for effect in (found.goals, found.joints)
+        )
+        row = layout.row(
+            f"{found.what}, {found.label}",
+            found,
+            _cells(sample, (found.label,)),
+            method=name,
+            grows=GROWING[found.what],
+            goals=goals,
+            joints=joints,
+        )
+        rows.append(row)
+    return layout.table(rows)
+
+
 def _variance_table(sample: Sample) -> DataTable | None:
     layout, rows = LAYOUTS["family-variance"], []
     for found in variance_shares(sample):
@@ -314,13 +336,10 @@ def _references_table(sample: Sample) -> DataTable | None:
         over_ = [ticks for ticks in beaten if ticks > 0]
         short = family.partition("/")[0]
         splits = dict.fromkeys(str(sample.tasks[name].split) for name in names)
-        labels = dict.fromkeys(
-            label for name, label in sample.study.cells if label.startswith(SEARCH)
-        )
         row = layout.row(
             short,
             None,
-            _cells(sample, labels, families=[family]),
+            _cells(sample, sample.searches, families=[family]),
             family=short,
             split=", ".join(splits),
             instances=len(names),
