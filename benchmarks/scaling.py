@@ -3,12 +3,15 @@
     python -m coartic.benchmarks.scaling
 
 Development instances of the families, the median CPU time of three for each size, and the
-exponent of a power of the number of goals or joints, by least squares on logarithms.
+exponent of a power of the number of goals or joints, by least squares on logarithms. Beyond
+six goals planners stand twice: with the beam over hand sequences that they use there, and with
+every sequence; with both go the median ticks of what they found.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
 import statistics
 import time
@@ -16,15 +19,19 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from coartic import PAPER, Task, corrective_trial, load_task
+from coartic import PAPER, Task, corrective_trial, execute, load_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.optimum import DynamicProgramming
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.trajectory_optimisation import METHODS as PLANNERS
+from coartic.baselines.trajectory_optimisation import TrajectoryParameters
 from coartic.initial import initial_hands
 from coartic.method import Method, MethodError, Session
 
+EVERY = 256  # hand sequences of the eight goals that tasks have at most
+BEAM = TrajectoryParameters().most_sequences
 NODES = 300  # cone programmes of a proof that is measured
+WHOLE = ", every sequence"
 GOALS = (2, 3, 4, 5, 6, 7, 8)
 JOINTS = (8, 10, 12, 14, 16, 18)
 
@@ -50,17 +57,23 @@ def instances(count: int) -> Iterator[tuple[str, int, Task]]:
                 yield what, size, task
 
 
-def measured() -> dict[str, Callable[[Task], object]]:
-    """What is timed, by name."""
+def measured() -> dict[str, Callable[[Task], int | None]]:
+    """What is timed, by name: ticks of the movement that it finds, None for a bound."""
     (path, jerk) = (
         next(method for method in PLANNERS if method.name.endswith(cost))
         for cost in ("path-length", "jerk")
     )
-    return {
-        "posture-based/two-goals every": _solved(TwoGoals, hands="every"),
-        "trajectory-optimisation/path-length": _solved(path, graphs=1),
-        "trajectory-optimisation/jerk": _solved(jerk, graphs=1, noisy_starts=1),
-        "optimum/dynamic-programming": _solved(DynamicProgramming, graphs=1),
+    planners: dict[str, tuple[type[Method], dict[str, object]]] = {
+        TwoGoals.name: (TwoGoals, {"hands": "every"}),
+        path.name: (path, {"graphs": 1}),
+        jerk.name: (jerk, {"graphs": 1, "noisy_starts": 1}),
+    }
+    found: dict[str, Callable[[Task], int | None]] = {}
+    for name, (method, parameters) in planners.items():
+        found[name] = _solved(method, **parameters)
+        found[f"{name}{WHOLE}"] = _solved(method, most_sequences=EVERY, **parameters)
+    return found | {
+        DynamicProgramming.name: _solved(DynamicProgramming, graphs=1),
         f"proof, {NODES} cone programmes": _bounded,
     }
 
@@ -83,36 +96,48 @@ def main() -> None:
         if what == "joints" or size <= options.most
     ]
     for name, run in measured().items():
-        if options.only not in name:
-            continue
-        times: dict[tuple[str, int], list[float]] = {}
-        for what, size, task in tasks:
-            began = time.process_time()
-            try:
-                run(task)
-            except MethodError:
-                continue
-            times.setdefault((what, size), []).append(time.process_time() - began)
-        for what in ("goals", "joints"):
-            medians = {s: statistics.median(t) for (w, s), t in times.items() if w == what}
-            if len(medians) > 1:
-                power = exponent(list(medians), list(medians.values()))
-                shown = ", ".join(f"{size}: {median:.2f}" for size, median in medians.items())
-                print(f"{name}: {what} {shown} s; exponent {power:.1f}", flush=True)
+        if options.only in name:
+            _print(name, run, tasks)
 
 
-def _solved(method: type[Method], **parameters: object) -> Callable[[Task], object]:
-    def run(task: Task) -> object:
+def _print(
+    name: str, run: Callable[[Task], int | None], tasks: list[tuple[str, int, Task]]
+) -> None:
+    """A line of what varies: medians by size, and the exponent over all of them."""
+    made: dict[str, dict[int, list[tuple[float, int | None]]]] = {}
+    for what, size, task in tasks:
+        if name.endswith(WHOLE) and len(task.hands) ** len(task.goals) <= BEAM:
+            continue  # the same as with the beam
+        began = time.process_time()
+        with contextlib.suppress(MethodError):
+            ticks = run(task)
+            seconds = time.process_time() - began
+            made.setdefault(what, {}).setdefault(size, []).append((seconds, ticks))
+    for what, sizes in made.items():
+        medians, shown = {}, []
+        for size, own in sizes.items():
+            medians[size] = statistics.median(seconds for seconds, _ in own)
+            found = [ticks for _, ticks in own if ticks is not None]
+            shown.append(f"{size}: {medians[size]:.2f} s")
+            shown[-1] += f" ({statistics.median(found):.0f} ticks)" if found else ""
+        power = exponent(list(medians), list(medians.values())) if len(medians) > 2 else None
+        line = f"{name}: {what} {', '.join(shown)}"
+        print(line + (f"; exponent {power:.1f}" if power is not None else ""), flush=True)
+
+
+def _solved(method: type[Method], **parameters: object) -> Callable[[Task], int]:
+    def run(task: Task) -> int:
         made = method(method.Parameters(**parameters))
-        return made.solve(Session(task, 0, method.told, trusted=True))
+        found = made.solve(Session(task, 0, method.told, trusted=True))
+        return execute(task, found.solution).ticks
 
     return run
 
 
-def _bounded(task: Task) -> object:
+def _bounded(task: Task) -> None:
     """A proof that what the corrective process takes is least: never done, cut at the budget."""
     ticks = corrective_trial(task, initial_hands(task)).ticks
-    return certify(task, ticks, still=False, model=PAPER, most_nodes=NODES)
+    certify(task, ticks, still=False, model=PAPER, most_nodes=NODES)
 
 
 if __name__ == "__main__":

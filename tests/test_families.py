@@ -106,6 +106,14 @@ def test_the_shipped_families():
     assert bases == {"free", "rail", "locked"}
 
 
+def test_the_family_of_the_guide_is_one(tmp_path):
+    guide = (ROOT / "docs" / "howto" / "family.md").read_text(encoding="utf-8")
+    path = tmp_path / "six-links.v1.toml"
+    path.write_text(guide.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+    family = read_family(path)
+    assert (family.name, family.links, family.base) == ("six-links/v1", (6, 6), ("rail",))
+
+
 @pytest.mark.parametrize("name", RELEASED)
 def test_a_released_family_is_not_changed(name):
     text = json.dumps(families()[name].model_dump(mode="json"), sort_keys=True)

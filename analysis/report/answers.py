@@ -53,6 +53,7 @@ def answers(study: Study, pictures: Mapping[str, Block], player: Block | None) -
     found = (
         _card("coarticulation", coarticulation(study), _some(pictures.get("postures"), player)),
         _card("paper", reproduced(study), strips(study)),
+        _card("general", in_general(study), strips(study)),
         _card("methods", winners(study), _some(pictures.get("ranking"))),
         _card("price", price(study), _some(pictures.get("price"))),
     )
@@ -165,6 +166,12 @@ def reproduced(study: Study) -> str:
         return ""
     said = claims_found(study), cells_found(study), _fitted(study)
     return " ".join([_how(study), *filter(None, said)]) if any(said[:2]) else ""
+
+
+def in_general(study: Study) -> str:
+    """Of random tasks alone: the claims about them by verdict."""
+    alone = study.instances is not None and not of_the_paper(study)
+    return claims_found(study) if alone else ""
 
 
 def of_the_paper(study: Study) -> bool:
