@@ -23,6 +23,8 @@ from coartic.analysis.words import NARROW_SPACE, true_minus, typographic
 from coartic.text import counted
 
 TITLE = "Beyond the paper's tasks"
+_STEEP = 1.5
+"""Exponent above which a method is named; one of 1 is growth in proportion."""
 
 
 def families_section(study: Study, figures: Sequence[Block]) -> Section:
@@ -72,7 +74,7 @@ def _sentences(study: Study, sample: Sample) -> Iterator[str]:
         (c.first, c.second): c for c in study.contrasts if (c.first, c.second) not in by_pair
     }
     yield from _exploration(study, by_pair)
-    yield from _grown(study)
+    yield from _grown(study, sample)
     yield _known(sample)
     yield from _seen(sample)
 
@@ -104,28 +106,29 @@ def _exploration(study: Study, by_pair: dict[tuple[str, str], Contrast]) -> Iter
         )
 
 
-def _grown(study: Study) -> Iterator[str]:
-    """What a goal more costs every method without variants."""
-    rows = [g for g in study.growth if " " not in g.label and g.goals.low < g.goals.high]
+def _grown(study: Study, sample: Sample) -> Iterator[str]:
+    """What a goal more costs methods without variants, the learner under one condition alone."""
+    left_out = {INITIAL, EC2, EC3, *sample.searches}
+    rows = [g for g in study.growth if not (" " in g.label or g.label in left_out)]
     gaps, powers = (
         sorted((g for g in rows if g.what == what), key=lambda g: g.goals.slope)
         for what in ("gap", "kinematics")
     )
     if gaps and powers:
+        said = ", ".join(f"{short_name(g.label)} {_points(g.goals)}" for g in gaps)
+        steep = [g for g in powers if g.goals.slope > _STEEP]
+        flat = [g.goals.slope for g in powers if g not in steep]
+        like = [f"{min(flat):.1f} to {max(flat):.1f}"] * bool(flat)
+        like += [f"{g.goals.slope:.1f} ({short_name(g.label)})" for g in steep]
         yield escaped(
-            "A goal more goes with so many points more of gap: "
-            + ", ".join(
-                f"{short_name(g.label)} {_points(g.goals)}" for g in gaps if g.label != INITIAL
-            )
-            + ". Evaluations of kinematics grow with the number of goals to the power of "
-            + ", ".join(f"{g.goals.slope:.1f} ({short_name(g.label)})" for g in powers)
-            + "."
+            f"A goal more goes with so many points more of gap: {said}. Evaluations of kinematics "
+            f"grow with the number of goals to the power of {', '.join(like)}."
         )
 
 
 def _points(found: Effect) -> str:
     low, point, high = (
-        true_minus(f"{100 * value:.1f}") for value in (found.low, found.slope, found.high)
+        true_minus(f"{100 * value:z.1f}") for value in (found.low, found.slope, found.high)
     )
     return f"{point} [{low}, {high}]"
 
