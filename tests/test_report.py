@@ -507,6 +507,20 @@ LONG = DataTable(
 )
 
 
+WIDE = DataTable(
+    "wide",
+    "A table of several pages and many numbers, wider than the text of a book.",
+    (
+        Column("method", "method"),
+        *(Column(f"n{k}", f"after {k}", "number", digits=1) for k in range(3)),
+    ),
+    tuple(
+        Row(f"{k}", ("one-armed/v1/i000", *(Estimate(-1000.5, None, -1020.5, -99.5),) * 3))
+        for k in range(60)
+    ),
+)
+
+
 def test_tables_longer_than_a_page_are_continued():
     text = latex_table(LONG)
     assert r"\begin{longtable}{@{}>{\raggedright" in text
@@ -545,7 +559,7 @@ def write(folder, shown=None):
 def test_latex_compiles(tmp_path):
     needs_latex(*PACKAGES)
     several = replace(
-        document(), sections=(*document().sections, Section("pages", "Long", (LONG,)))
+        document(), sections=(*document().sections, Section("pages", "Long", (LONG, WIDE)))
     )
     write(tmp_path / "report", several)
     (tmp_path / "report" / "paper.tex").write_text(

@@ -35,6 +35,8 @@ MOST_ROWS = 38
 PACKAGES = ("booktabs", "siunitx", "graphicx", "tabularx", "longtable")
 """What the tables need."""
 _LINE, _NARROW = 105, 70  # characters of small print that a line holds, and a narrow one
+_WIDE, _SHORT_LINE = 82, 420  # characters from which on a longtable is too wide for so many pt
+_LEAST_SHARE = 0.3  # of the line, for columns of many words
 _MANY = 10  # columns from which on the print is smaller
 _WORD, _WORDS = 12, 45  # characters: up to one a column stays whole, as all do up to the other
 _COMMANDS = {"emphasis": "emph", "strong": "textbf", "code": "texttt"}
@@ -96,18 +98,30 @@ def latex_table(table: DataTable) -> str:
         gap="1.5pt" if len(shown) >= _MANY else "3pt",
         broken=broken,
         long=long,
+        wide=long and _width(shown, broken, table) > _WIDE,
+        narrow=_SHORT_LINE,
     )
 
 
 def _widths(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> dict[Part, str]:
     """Of columns of many words in a longtable: what the others leave, the more the longer."""
     used = sum(_longest(part, table) + 3 for part in shown if part not in broken)
-    share = min(max(0.85 - used / _NARROW, 0.3), 0.8)
+    share = min(max(0.85 - used / _NARROW, _LEAST_SHARE), 0.8)
     weights = {part: math.sqrt(_longest(part, table)) for part in broken}
     whole = sum(weights.values())
     return {
         part: f"p{{{share * weight / whole:.2f}\\linewidth}}" for part, weight in weights.items()
     }
+
+
+def _width(shown: Sequence[Part], broken: Sequence[Part], table: DataTable) -> float:
+    """Characters of a longtable's line, as far as is known before it is set."""
+    whole = (
+        max(_longest(part, table), min(7, max(map(len, part.header.split()), default=0))) + 2
+        for part in shown
+        if part not in broken
+    )
+    return sum(whole) + _LEAST_SHARE * _NARROW * bool(broken)
 
 
 def is_long(table: DataTable) -> bool:
