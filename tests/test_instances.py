@@ -145,15 +145,17 @@ def test_intervals_of_slopes_are_those_of_fits_to_drawn_instances():
     groups = np.repeat(["a", "b"], (10, 20))
     table = rng.uniform(0, 1, (30, 2))
     values = table @ [1.0, -2.0] + rng.exponential(0.3, 30)
+    table[groups == "b"] += 1.0  # what sets groups apart is no slope
+    values[groups == "b"] += 5.0
     effects, _ = regression(values, table, list(groups), seed=0)
-    design = np.column_stack([np.ones(30), table])
+    design = np.column_stack([groups == "a", groups == "b", table]).astype(float)
     fits = []
     for _ in range(4000):
         drawn = np.concatenate(
             [rng.choice(np.flatnonzero(groups == g), (groups == g).sum()) for g in "ab"]
         )
         fits.append(np.linalg.lstsq(design[drawn], values[drawn], rcond=None)[0])
-    for effect, own in zip(effects, np.transpose(fits)[1:], strict=True):
+    for effect, own in zip(effects, np.transpose(fits)[2:], strict=True):
         ends = np.quantile(own, (0.025, 0.975))
         np.testing.assert_allclose((effect.low, effect.high), ends, atol=0.12 * own.std() * 2)
 

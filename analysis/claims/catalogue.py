@@ -22,7 +22,7 @@ from coartic.analysis.claims import (  # noqa: F401  (their judges enter themsel
     two_armed,
 )
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.power import Chances, over_instances, powers
+from coartic.analysis.claims.power import Chances, powers, seen_over_instances
 from coartic.analysis.claims.register import Claim, Correction, Judged
 from coartic.analysis.claims.statements import JUDGED, STATEMENTS
 from coartic.analysis.statistics.hypotheses import holm
@@ -60,11 +60,6 @@ def judge(study: Study, claims: Iterable[Claim] | None = None) -> list[Judged]:
     runs = {key: len(cell.good) for key, cell in study.cells.items() if len(cell.good)}
     chances = powers(claims, runs)
     found = [_seen(claim, Data(study)) for claim in claims]
-    chances |= {
-        entry.claim.id: over_instances(entry.claim.effect, entry.samples, sizes["families"])
-        for entry in found
-        if entry.samples
-    }
     adjusted: dict[tuple[int, str], float] = {}
     for correction, size in sizes.items():
         own = [e for e in found if e.claim.tested and e.claim.correction == correction]
@@ -78,6 +73,9 @@ def judge(study: Study, claims: Iterable[Claim] | None = None) -> list[Judged]:
             adjusted_contrary_p=adjusted.get((id(entry), "contrary_p"), math.nan),
             power=chances.get(entry.claim.id, _UNKNOWN).supported,
             contrary_power=chances.get(entry.claim.id, _UNKNOWN).refuted,
+            visible=seen_over_instances(entry.samples, sizes["families"])
+            if entry.samples
+            else math.nan,
         )
         for entry in found
     ]

@@ -14,7 +14,7 @@ import numpy as np
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.evidence import all_hold, exceeds, shown
 from coartic.analysis.claims.register import Finding
-from coartic.analysis.claims.statements import MARGINS, STATEMENTS, decides
+from coartic.analysis.claims.statements import STATEMENTS, decides
 from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.signatures.subtasks import ROUNDING
@@ -76,10 +76,11 @@ def _reward(data: Data, name: str, side: str) -> float | None:
 
 
 def _gain(data: Data, name: str, pair: str) -> float | None:
+    """Of the first of a pair over the second, in per cent of the best known reward."""
     first, second = (_reward(data, name, side) for side in pair.split(" > "))
     if first is None or second is None:
         return None
-    return (first - second) / abs(_sample(data).references[name].best)
+    return 100 * (first - second) / abs(_sample(data).references[name].best)
 
 
 def _compared(data: Data, families: Sequence[str], compared: Sequence[str]) -> Finding:
@@ -89,13 +90,13 @@ def _compared(data: Data, families: Sequence[str], compared: Sequence[str]) -> F
             names = _judged(data, family)
             own = _over(data, family, [_gain(data, name, pair) for name in names])
             samples.append(own)
-            parts.append(f"{family} {pair}: {shown(100 * own)} % on {len(own)} instances")
+            parts.append(f"{family} {pair}: {shown(own)} % on {len(own)} instances")
     return _held(samples, parts)
 
 
 def _held(samples: Sequence[Array], parts: Sequence[str]) -> Finding:
     """Whether the mean of every sample is above 0."""
-    found = all_hold([exceeds(values, 0.0) for values in samples], parts)
+    found = all_hold([exceeds(values, 0.0, sure=True) for values in samples], parts)
     return replace(found, samples=tuple(samples))
 
 
@@ -104,17 +105,20 @@ for _name, _said in STATEMENTS.items():
         decides(_name, families=_said["families"], compared=_said["compared"])(_compared)
 
 
+def _mean_sign(data: Data, name: str, condition: str, sign: str) -> float | None:
+    """Of the runs of a condition on an instance."""
+    try:
+        data.learned(name, condition)
+    except MissingError:
+        return None
+    values = data.study.signs[name, LEARNER + condition].values.get(sign)
+    return None if values is None else float(spread.mean(values))
+
+
 def _signs(data: Data, family: str, sign: str) -> Iterator[float | None]:
     """Mean of a signature over the runs of the learner, of each instance."""
     for name in _judged(data, family):
-        condition = _learner(data, name)
-        try:
-            data.learned(name, condition)
-        except MissingError:
-            yield None
-            continue
-        values = data.study.signs[name, LEARNER + condition].values.get(sign)
-        yield None if values is None else float(spread.mean(values))
+        yield _mean_sign(data, name, _learner(data, name), sign)
 
 
 def _families(claim: str) -> Sequence[str]:
@@ -142,7 +146,19 @@ def _first_movement(data: Data) -> Finding:
 
 @decides("hand-coarticulation-in-general")
 def _hands(data: Data) -> Finding:
-    return _sign(data, "hand-coarticulation-in-general", "hand", MARGINS["majority"], " of runs")
+    """By learning, less what comes of taking the closest hand."""
+    samples, parts = [], []
+    for family in _families("hand-coarticulation-in-general"):
+        own = _over(data, family, [_more_hands(data, name) for name in _judged(data, family)])
+        samples.append(own)
+        parts.append(f"{family} {shown(own)} points on {len(own)} instances")
+    return _held(samples, parts)
+
+
+def _more_hands(data: Data, name: str) -> float | None:
+    """Share of goals hit with the slower hand under condition 4 less that under 2, in points."""
+    learned, closest = (_mean_sign(data, name, c, "hand") for c in ("EC4", "EC2"))
+    return None if learned is None or closest is None else 100 * (learned - closest)
 
 
 @decides("arm-coarticulation-in-general")

@@ -90,9 +90,8 @@ def _lines() -> Iterator[str]:
     yield ""
     yield (
         "Claims on families of random tasks are judged over instances, and their power depends on "
-        "how much instances differ: a folder states it for a true effect in each family of 1 % of "
-        "the best known reward, of a quarter of the runs more than half, of one tick, or of a "
-        "tenth of the way."
+        "how much instances differ: a folder states the true effect that is seen with "
+        f"{POWER:.0%}."
     )
     for section, claims in itertools.groupby(CLAIMS, lambda claim: claim.section):
         yield from ("", f"## {section}", "")

@@ -12,6 +12,7 @@ other side of its bound as the printed ones lie on theirs, and nothing else is c
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import optimize, special, stats
 
 from coartic.analysis.claims.register import Claim, Correction
 from coartic.analysis.claims.rules import (
@@ -96,18 +97,24 @@ def powers(claims: Iterable[Claim], runs: Sizes) -> dict[str, Chances]:
     return found
 
 
-def over_instances(effect: float, samples: Sequence[Array], family: int) -> Chances:
-    """Of a claim whose tests are of values of instances (n,), if the true means are the effect.
+def seen_over_instances(samples: Sequence[Array], family: int) -> float:
+    """Least true mean of all samples with which their claim has power :data:`POWER`.
 
-    By the SDs that the samples show, for t-tests at the level that Holm's correction leaves the
-    last of ``family`` claims, the tests being of different instances. Of the contrary: if all true
-    means are minus the effect.
+    Of values of instances (n,), less their bound, in their unit. By the SDs that the samples show,
+    for t-tests at the level that Holm's correction leaves the last of ``family`` claims, as if the
+    tests were of different instances: those of the same ones agree more often. Infinite where no
+    mean is enough, as with two instances without spread.
     """
-    level, sds = LEVEL / family, [sd(values) for values in samples]
-    both = list(zip(sds, map(len, samples), strict=True))
-    holds = [chance(effect, spread, n, level, tails=1) for spread, n in both]
-    fails = [chance(effect, spread, n, level / len(samples), tails=1) for spread, n in both]
-    return Chances(float(np.prod(holds)), 1 - float(np.prod([1 - found for found in fails])))
+    known = [(sd(values), len(values)) for values in samples]
+
+    def short_of(effect: float) -> float:
+        chances = [chance(effect, spread, n, LEVEL / family, tails=1) for spread, n in known]
+        return math.prod(chances) - POWER
+
+    most = 100 * max(spread for spread, _ in known)
+    if most == 0:
+        return 0.0
+    return float(optimize.brentq(short_of, 0.0, most)) if short_of(most) > 0 else math.inf
 
 
 def runs_needed(claims: Sequence[Claim]) -> dict[str, int | None]:

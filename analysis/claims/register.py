@@ -33,7 +33,9 @@ RULES = (
     "two-armed tasks were chosen to give is *measured* where it is so: no support. Each of the "
     "three corrections is over a family that the register fixes: its claims with a test on the "
     "paper's own seven cells, those that take other runs beside them, or those on families of "
-    "random tasks, whose tests are over instances. A claim that a folder "
+    "random tasks, whose tests are over instances. The contraries are corrected by themselves: "
+    "that some claim of a family is wrongly supported has a chance of 5 % at most, that some is "
+    "wrongly not supported another. A claim that a folder "
     "cannot test counts in its family all the same, with a p-value of 1, so that what is decided "
     "stays decided whatever is run beside. Where no rule could come out both ways, and where the "
     "paper compares nothing, things are *measured*, without a verdict."
@@ -69,8 +71,7 @@ class Finding:
     against: tuple[Inference, ...] | None = None
     """Tests of the contrary, any of which refutes it; None: the other tails of ``tests``."""
     samples: tuple[Array, ...] = ()
-    """What the tests are of, where its power is that of a stated effect: values of instances (n,)
-    less their bound."""
+    """What the tests are of, where they are of instances: their values (n,) less their bound."""
     table: DataTable | None = None
     """Numbers that are more than a sentence can hold; its id is ``evidence-`` and the claim's."""
 
@@ -94,8 +95,8 @@ class Claim:
     """Families of random tasks that it is about, with their versions."""
     compared: Sequence[str] = ()
     """Comparisons on each of their instances."""
-    effect: float = math.nan
-    """True effect for which its power is stated, in the unit of its tests."""
+    unit: str = ""
+    """Of what its tests of instances are of."""
     runs: Mapping[str, str] = field(default_factory=dict)
     """Condition and hands by task, of a rule that counts runs."""
     place: str = ""
@@ -140,10 +141,12 @@ class Judged(Finding):
     """:attr:`p`, adjusted over its family (Holm)."""
     adjusted_contrary_p: float = math.nan
     power: float = math.nan
-    """Chance of *supported* with so many runs if the paper's numbers are exactly right, or the
-    claim's effect is; NaN where there is neither."""
+    """Chance of *supported* with so many runs if the paper's numbers are exactly right;
+    NaN where it prints none."""
     contrary_power: float = math.nan
     """Chance of *not supported* if the contrary holds: :mod:`coartic.analysis.claims.power`."""
+    visible: float = math.nan
+    """True effect in every family with which so many instances support it with power 80 %."""
 
     @property
     def p(self) -> float:

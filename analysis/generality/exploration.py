@@ -36,7 +36,9 @@ class Contrast(NamedTuple):
     """Empty over all of them, each counting alike."""
     instances: int
     difference: Inference
-    hands: float
+    median: float
+    """Over instances of the difference on each."""
+    hands: Inference
     """Part of it that the hand sequences make: as if each run got the best that is known with
     its hands. The rest is what joints make of them."""
     better: int
@@ -76,29 +78,31 @@ def _contrast(
     sample: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]
 ) -> Contrast:
     scores = gains(sample, first, second, names)
-    values = [value(runs) for own in scores.values() for runs in own]
-    hands = [
-        float(np.mean([_by_hands(sample, n, first) - _by_hands(sample, n, second) for n in own]))
-        for own in names.values()
-    ]
+    # Equal means of different runs may differ in the last bit.
+    values = np.array([value(runs) for own in scores.values() for runs in own]).round(12)
+    hands = {
+        family: [(_by_hands(sample, n, first), _by_hands(sample, n, second)) for n in own]
+        for family, own in names.items()
+    }
     return Contrast(
         first,
         second,
         next(iter(names)) if len(names) == 1 else "",
         len(values),
         other_tasks(scores, seed=SEED),
-        sum(hands) / len(hands),
-        sum(v > 0 for v in values),
-        sum(v < 0 for v in values),
+        float(np.median(values)),
+        other_tasks(hands, seed=SEED),
+        int((values > 0).sum()),
+        int((values < 0).sum()),
         sum(_apart(*runs) for own in scores.values() for runs in own),
     )
 
 
-def _by_hands(sample: Sample, name: str, label: str) -> float:
-    """Mean over runs of the best known reward with their hands, as a share of the best known."""
+def _by_hands(sample: Sample, name: str, label: str) -> Array:
+    """Best known reward with the hands of each run (n,), as a share of the best known."""
     known, best = sample.by_hands[name], sample.references[name].best
     hands = sample.study.cells[name, label].good.hands
-    return float(np.mean([known[str(own)] for own in hands])) / abs(best) + 1
+    return np.array([known[str(own)] for own in hands]) / abs(best)
 
 
 def _apart(first: Array, second: Array) -> bool:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coartic.analysis.generality.sample import INITIAL, Sample
+from coartic.analysis.generality.sample import CONDITIONS, INITIAL, Sample
 from coartic.analysis.statistics.instances import Components, Paired, components, paired
 
 DIFFERENCE = 0.01
@@ -20,17 +20,23 @@ class Shares(NamedTuple):
     """Variance components of the gaps of a family's methods."""
 
     family: str
+    of: str
+    """Which methods."""
     methods: int
     instances: int
     components: Components
 
 
 def variance_shares(sample: Sample) -> list[Shares]:
-    """In each family with two methods, of those without variants that solved all they share."""
+    """In each family with two methods, of those without variants that solved all they share.
+
+    But for the initial solution, which is far behind all; then of the paper's conditions alone.
+    """
+    learned = [label for label in sample.labels if " " not in label and label != INITIAL]
+    parts = {"all methods": learned, "EC2 to EC4": [n for n in learned if n in CONDITIONS]}
     found = []
-    for family in sample.families:
+    for family, (of, labels) in itertools.product(sample.families, parts.items()):
         # Methods that failed an instance would leave it out for all others.
-        labels = [label for label in sample.labels if " " not in label]
         sizes = {
             label: len(sample.gaps(label, families=[family]).get(family, ())) for label in labels
         }
@@ -40,7 +46,7 @@ def variance_shares(sample: Sample) -> list[Shares]:
         own = sample.gaps(*kept, families=[family]).get(family, []) if kept else []
         if len(kept) > 1 and len(own) > 1:
             scores = {label: [runs[k] for runs in own] for k, label in enumerate(kept)}
-            found.append(Shares(family, len(kept), len(own), components(scores)))
+            found.append(Shares(family, of, len(kept), len(own), components(scores)))
     return found
 
 

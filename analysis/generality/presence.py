@@ -20,8 +20,8 @@ from coartic.analysis.statistics.instances import other_tasks
 from coartic.robot import Array
 
 SIGNS = {
-    "hand": "share of runs in which a goal that others follow is hit with a hand that is not the "
-    "quicker one for it alone",
+    "hand": "share of the goals that others follow which are hit with a hand that is not the "
+    "quicker one for them alone",
     "arm": "ticks by which learned postures leave the next goal nearer, mean over goals",
     "other arm": "share of its way to its next goal that the waiting arm's hand makes while it "
     "waits, mean over goals",
@@ -75,7 +75,8 @@ def _values(cell: Trajectories) -> dict[str, Array]:
 def _of_run(cell: Trajectories, run: Trajectory) -> tuple[float, float, float]:
     """Hand, arm and other arm of :data:`SIGNS`; NaN for what the run does not have."""
     two = len(cell.task.hands) > 1
-    hand = float(not all(isolated_agreement(run)[:-1])) if two else math.nan
+    quicker = isolated_agreement(run)[:-1]
+    hand = 1.0 - sum(quicker) / len(quicker) if two and quicker else math.nan
     gains = served(run)[:, 1]
     arm = float(gains.mean()) if np.isfinite(gains).all() else math.nan
     waiting = math.nan
@@ -98,9 +99,9 @@ class Presence(NamedTuple):
     """Instances whose mean is beyond :data:`THERE`."""
 
 
-THERE = {"hand": 0.5, "arm": 1.0, "other arm": 0.1, "first": 1.0, "whole": 1.0}
-"""From where on a signature is there: most runs; more than a tick, which rounding can make; a
-tenth of the way."""
+THERE = {"hand": 0.1, "arm": 1.0, "other arm": 0.1, "first": 1.0, "whole": 1.0}
+"""From where on a signature is there: a tenth of the goals, or of the way; more than a tick, which
+rounding can make."""
 
 
 def presence(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Presence]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,6 @@ PROPERTIES = {
     "goals": "number of goals",
     "redundancy": "joints of an arm beyond two",
     "base": "directions in which the base moves (free 2, on a rail 1, locked 0)",
-    "hands": "hands that the task has",
 }
 """Of a task, by name."""
 OUTCOMES = {
@@ -40,7 +40,7 @@ class Property(NamedTuple):
     """Least and most that there is of it in the sample."""
     instances: int
     explained: float
-    """R² of the whole regression."""
+    """R² of the whole regression, within families."""
 
 
 def properties(task: Task) -> dict[str, float]:
@@ -56,7 +56,6 @@ def properties(task: Task) -> dict[str, float]:
         "goals": float(len(task.goals)),
         "redundancy": float(links - 2),
         "base": float(2 - len(task.locked_base)),
-        "hands": float(len(task.hands)),
     }
 
 
@@ -93,7 +92,7 @@ def what_pays(sample: Sample) -> list[Property]:
             continue
         for place, (name, effect) in enumerate(zip(PROPERTIES, effects, strict=True)):
             least, most = float(table[:, place].min()), float(table[:, place].max())
-            if least < most:
+            if not math.isnan(effect.slope):
                 row = Property(outcome, name, effect, least, most, len(names), explained)
                 found.append(row)
     return found

@@ -88,7 +88,7 @@ class Sample:
                 found[name] = Reference(
                     max(known),
                     optimum.bound if optimum else None,
-                    optimum.reward if optimum else None,
+                    optimum.searched if optimum else None,
                 )
         return found
 

@@ -32,7 +32,7 @@ class Growth(NamedTuple):
     """The same of :func:`size`'s joints."""
     instances: int
     explained: float
-    """R² of the whole regression."""
+    """R² of the regression, within families."""
 
 
 def size(task: Task) -> tuple[int, int]:
@@ -45,9 +45,8 @@ def scaling(sample: Sample) -> list[Growth]:
 
     Of searches for the optimum the costs alone.
 
-    Costs as a product of powers, by least squares on logarithms; gaps as a sum. Beside goals and
-    joints stands whether the task has two hands: no growth is seen between families that differ
-    in that alone. What was given a budget of trials grows as a trial does.
+    Costs as a product of powers, by least squares on logarithms; gaps as a sum. Within families:
+    what sets them apart is no growth. What was given a budget of trials grows as a trial does.
     """
     found = []
     for what in GROWING:
@@ -67,12 +66,9 @@ def _growth(sample: Sample, label: str, what: str) -> Growth | None:
         return None
     if what != "gap":
         values, sizes = np.log(values), np.log(sizes)
-    hands = [len(sample.tasks[name].hands) for name in names]
     groups = [str(sample.tasks[name].family) for name in names]
     try:
-        (goals, joints, _), explained = regression(
-            values, np.column_stack([sizes, hands]), groups, seed=SEED
-        )
+        (goals, joints), explained = regression(values, sizes, groups, seed=SEED)
     except ValueError:  # too few
         return None
     return Growth(label, what, goals, joints, len(names), explained)

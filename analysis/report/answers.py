@@ -25,6 +25,7 @@ from coartic.analysis.published import published_cells
 from coartic.analysis.report.document import Block, Bullets, Prose, Section, Strip, Verdict
 from coartic.analysis.report.summary import best_condition, unlike_printed
 from coartic.analysis.report.text import tone_of
+from coartic.analysis.results.optima import Optimum
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study
@@ -194,7 +195,8 @@ def claims_found(study: Study) -> str:
     if not found["supported"] + found["not supported"]:
         return ""
     facts = {"open": _counted(found, "cannot tell"), "measured": _counted(found, "measured")}
-    return _said("paper", "claims", claims=found.total(), **_decided(found), **facts)
+    own = "paper" if study.instances is None or of_the_paper(study) else "general"
+    return _said(own, "claims", claims=found.total(), **_decided(found), **facts)
 
 
 def _fitted(study: Study) -> str:
@@ -304,6 +306,7 @@ def winners(study: Study) -> str:
             best=escaped(spoken_name(best.method)),
             leads="is ahead" if sure.startswith(", not") else "wins",
             gap=f"{best.gap:.1f}",
+            known="optimum" if _mostly_proven(study) else "best known reward",
             interval=_interval(best, about=_SAID["methods"]["about"]),
             sure=sure,
             learner=_place_of_learner(by_trial),
@@ -353,8 +356,18 @@ def _place_of_learner(rows: pd.DataFrame) -> str:
     )
 
 
+def _known(study: Study) -> list[Optimum]:
+    return [best for (_, arm), best in study.optima.items() if arm == "free"]
+
+
+def _mostly_proven(study: Study) -> bool:
+    """Whether the best known is the optimum on most tasks."""
+    known = _known(study)
+    return 2 * sum(best.proven for best in known) > len(known)
+
+
 def _proven(study: Study) -> str:
-    known = [best for (_, arm), best in study.optima.items() if arm == "free"]
+    known = _known(study)
     proven = sum(best.proven for best in known)
     if proven == len(known):
         return ", which is proven"

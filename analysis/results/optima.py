@@ -93,6 +93,11 @@ class Optimum:
         return self.bound == self.reward
 
     @property
+    def searched(self) -> int:
+        """The best reward of any search for it."""
+        return max((reward for _, reward in self.searches), default=self.reward)
+
+    @property
     def how(self) -> str:
         """Whether it is proven, and by which runs."""
         return f"{'proven' if self.proven else 'not proven'}; {self.source}"
@@ -103,6 +108,7 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
 
     What the shipped data say where task and model are the same in all that matters, bettered by
     what the folder's own searches found; these are named as its source wherever they give it.
+    Searches of an instance of a family are short, and any run of the folder may better them.
     """
     found: dict[tuple[str, str], Optimum] = {}
     runs = study.runs
@@ -119,13 +125,18 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
             if candidates:
                 stored = f"{SHIPPED}, runs {', '.join(entry.run_ids if entry else ())}"
                 found[name, arm] = _best(candidates, searches, stored)
+        if task.family is not None and (name, "free") in found:
+            found[name, "free"] = _bettered(found[name, "free"], runs[runs.task == name])
     return found
 
 
 def locks_base(runs: pd.DataFrame) -> bool:
     """Whether a parameter of these runs locks the base: another problem, another optimum."""
-    asked = (json.loads(own).get("base", BASE) for own in set(runs.parameters))
-    return any(base != BASE for base in asked)
+    return any(map(_locks_base, set(runs.parameters)))
+
+
+def _locks_base(parameters: str) -> bool:
+    return bool(json.loads(parameters).get("base", BASE) != BASE)
 
 
 def essence(task: Task) -> str:
@@ -234,6 +245,20 @@ def _best(
     source = reward if bound is None or reward == proof else f"reward: {reward}; bound: {proof}"
     cells = tuple(dict.fromkeys(given + proving))
     return replace(best, bound=bound, source=source, cells=cells)
+
+
+def _bettered(known: Optimum, runs: pd.DataFrame) -> Optimum:
+    """With the best of all solved runs of a task, where that is more than what is known."""
+    solved = runs[(runs.status == "ok") & ~runs.parameters.map(_locks_base)]
+    if not len(solved) or int(solved.reward.max()) <= known.reward:
+        return known
+    best = solved.iloc[int(solved.reward.astype(int).argmax())]
+    cell = str(best.task), label_of(str(best.method), str(best.variant))
+    source = f"reward: {cell[1]} of this folder, more than by {known.source}"
+    cells = (*known.cells, cell)
+    return replace(
+        known, reward=int(best.reward), hands=str(best.hands), source=source, cells=cells
+    )
 
 
 @cache

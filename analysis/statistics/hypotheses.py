@@ -35,7 +35,7 @@ _TAILS = {
     "less": "one-tailed (less)",
     "two-sided": "two-tailed",
 }
-_IN_MEMORY = 1 << 22  # values that are drawn at once
+_IN_MEMORY = 1 << 18  # values that are drawn at once: few enough for the processor's cache
 MOST_TABLES = 1_000_000
 """Tables of counts up to which Fisher's test enumerates them."""
 

@@ -217,23 +217,24 @@ class Effect:
 def regression(
     values: Array, properties: Array, groups: Sequence[str], *, seed: int
 ) -> tuple[list[Effect], float]:
-    """Least squares of values (n,) on properties (n, k), an intercept beside them, and R².
+    """Least squares of values (n,) on properties (n, k) within groups, and R² within them.
 
+    Each group has an intercept of its own, so that no slope is a difference between groups.
     Percentile intervals of instances drawn with replacement within their group, which need no
-    equal variances. A property that does not vary gets NaN. Raises ValueError for fewer than
-    three instances a coefficient.
+    equal variances. A property that varies in no group gets NaN. Raises ValueError for fewer
+    than three instances a coefficient.
     """
-    varies = np.ptp(properties, axis=0) > 0
-    kept = properties[:, varies]
-    if len(values) < 3 * (kept.shape[1] + 1):
-        raise ValueError(f"{len(values)} instances are too few for {kept.shape[1]} properties")
-    design = np.column_stack([np.ones(len(values)), kept])
+    members = np.asarray(groups) == np.array(list(dict.fromkeys(groups)))[:, None]
+    places = [np.flatnonzero(own) for own in members]
+    varies = np.any([np.ptp(properties[own], axis=0) > 0 for own in places], axis=0)
+    design = np.column_stack([*members, properties[:, varies]]).astype(np.float64)
+    if len(values) < 3 * design.shape[1]:
+        raise ValueError(f"{len(values)} instances are too few for {varies.sum()} properties")
     slopes = np.linalg.lstsq(design, values, rcond=None)[0]
     left = values - design @ slopes
-    about = values - values.mean()
-    explained = 1 - float(left @ left) / float(about @ about) if np.ptp(values) else math.nan
+    about = values - np.array([values[own].mean() for own in places]) @ members
+    explained = 1 - float(left @ left) / float(about @ about) if np.any(about) else math.nan
     rng = np.random.default_rng(seed)
-    places = [np.flatnonzero(np.asarray(groups) == name) for name in dict.fromkeys(groups)]
     counts = np.empty((RESAMPLES, len(values)))
     for own in places:
         counts[:, own] = rng.multinomial(len(own), np.full(len(own), 1 / len(own)), RESAMPLES)
@@ -244,7 +245,7 @@ def regression(
     products = (counts * values) @ design
     drawn = np.einsum("rjk,rk->rj", np.linalg.pinv(squares, hermitian=True), products)
     low, high = np.quantile(drawn, TAILS, axis=0)
-    known: NDArray[np.int64] = np.cumsum(varies)
+    known: NDArray[np.int64] = len(places) - 1 + np.cumsum(varies)
     return [
         Effect(float(slopes[k]), float(low[k]), float(high[k]))
         if there

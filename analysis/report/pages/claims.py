@@ -13,6 +13,7 @@ from coartic.analysis.markup import code, escaped
 from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from coartic.analysis.report.summary import verdicts
 from coartic.analysis.report.tables.layout import LAYOUTS, with_legends
+from coartic.analysis.statistics.power import POWER
 from coartic.analysis.study import Study
 from coartic.analysis.words import NONE, slugs
 
@@ -88,13 +89,15 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
             f"{escaped('; '.join(entry.methods))}."
         )
     if not math.isnan(entry.power):
-        right = "the paper's numbers are exactly right"
-        if claim.families:
-            right = f"the true effect is {claim.effect:g} in each family"
         items.append(
-            f"With so many {'instances' if claim.families else 'runs'} it is supported with a "
-            f"chance of {entry.power:.0%} if {right}, refuted with {entry.contrary_power:.0%} if "
-            "the contrary holds."
+            f"With so many runs it is supported with a chance of {entry.power:.0%} if the paper's "
+            f"numbers are exactly right, refuted with {entry.contrary_power:.0%} if the contrary "
+            "holds."
+        )
+    if math.isfinite(entry.visible):
+        items.append(
+            f"With so many instances it is supported with a chance of {POWER:.0%} if the true "
+            f"effect is {entry.visible:.2g} {claim.unit} in each family."
         )
     items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
     if claim.reconstructions:

@@ -23,6 +23,8 @@ from coartic.analysis.words import NARROW_SPACE, true_minus, typographic
 from coartic.text import counted
 
 TITLE = "Beyond the paper's tasks"
+_FEW = 10
+"""Instances of a family below which no word is said of it."""
 _STEEP = 1.5
 """Exponent above which a method is named; one of 1 is growth in proportion."""
 
@@ -75,7 +77,7 @@ def _sentences(study: Study, sample: Sample) -> Iterator[str]:
     }
     yield from _exploration(study, by_pair)
     yield from _grown(study, sample)
-    yield _known(sample)
+    yield from _known(sample)
     yield from _seen(sample)
 
 
@@ -89,20 +91,21 @@ def _exploration(study: Study, by_pair: dict[tuple[str, str], Contrast]) -> Iter
         if found is None:
             continue
         own = [c for c in study.contrasts if (c.first, c.second) == (first, second) and c.family]
+        own = [c for c in own if c.instances >= _FEW]
         worse = [c.family.partition("/")[0] for c in own if c.difference.high < 0]
         better = [c.family.partition("/")[0] for c in own if c.difference.low > 0]
         parts = [f"better in {', '.join(better)}"] * bool(better)
         parts += [f"worse in {', '.join(worse)}"] * bool(worse)
-        hands, joints = (
-            true_minus(f"{100 * part:+.1f}")
-            for part in (found.hands, found.difference.estimate - found.hands)
+        apart = f"; by family {' and '.join(parts) or 'told apart in none'}" if own else ""
+        median, joints = (
+            true_minus(f"{100 * part:+z.1f}")
+            for part in (found.median, found.difference.estimate - found.hands.estimate)
         )
         yield escaped(
             f"{what} ({short_name(first)} over {short_name(second)}): "
-            f"{_share(found.difference, '+')} (by the hands that are learned {hands}, by joints "
-            f"{joints}); better on {found.better}, worse on {found.worse} of "
-            f"{counted(found.instances, 'instance')}; "
-            f"by family {' and '.join(parts) or 'told apart in none'}."
+            f"{_share(found.difference, '+')} on average, median {median} (by the hands that are "
+            f"learned {_share(found.hands, '+')}, by joints {joints}); better on {found.better}, "
+            f"worse on {found.worse} of {counted(found.instances, 'instance')}{apart}."
         )
 
 
@@ -116,13 +119,17 @@ def _grown(study: Study, sample: Sample) -> Iterator[str]:
     )
     if gaps and powers:
         said = ", ".join(f"{short_name(g.label)} {_points(g.goals)}" for g in gaps)
-        steep = [g for g in powers if g.goals.slope > _STEEP]
+        steep = [g for g in powers if g.goals.low > _STEEP]
         flat = [g.goals.slope for g in powers if g not in steep]
         like = [f"{min(flat):.1f} to {max(flat):.1f}"] * bool(flat)
-        like += [f"{g.goals.slope:.1f} ({short_name(g.label)})" for g in steep]
+        like += [
+            f"{g.goals.slope:.1f} [{g.goals.low:.1f}, {g.goals.high:.1f}] ({short_name(g.label)})"
+            for g in steep
+        ]
         yield escaped(
-            f"A goal more goes with so many points more of gap: {said}. Evaluations of kinematics "
-            f"grow with the number of goals to the power of {', '.join(like)}."
+            f"Within families a goal more goes with so many points more of gap: {said}. "
+            f"Evaluations of kinematics grow with the number of goals to the power of "
+            f"{', '.join(like)}."
         )
 
 
@@ -133,14 +140,16 @@ def _points(found: Effect) -> str:
     return f"{point} [{low}, {high}]"
 
 
-def _known(sample: Sample) -> str:
+def _known(sample: Sample) -> Iterator[str]:
     known = sample.references.values()
     proven = sum(r.proven for r in known)
     bounded = sum(r.bound is not None for r in known)
     beaten = sum(r.searched is not None and r.best > r.searched for r in known)
     found = over(learner_gaps(sample, to_bound=True), list(sample.families))
-    most = f"; to it the learner's gap is {_share(found)}" if found is not None else ""
-    return escaped(
+    most = f"; to it the learner's gap is {_share(found)} of it" if found is not None else ""
+    if not bounded:
+        return
+    yield escaped(
         f"The best known reward is proven to be the optimum on {proven} of "
         f"{counted(len(known), 'instance')}, on {bounded - proven} others a bound is proven that "
         f"it does not reach{most}. Gaps to the optimum lie between the two. Some method found "

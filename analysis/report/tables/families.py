@@ -177,8 +177,8 @@ def exploration_table(study: Study, sample: Sample) -> DataTable | None:
             contrast=pair,
             family=family,
             gain=_shown(found.difference),
-            by_hands=found.hands,
-            by_joints=gain - found.hands,
+            by_hands=_shown(found.hands),
+            by_joints=gain - found.hands.estimate,
         )
         rows.append(row)
     return layout.table(rows)
@@ -301,12 +301,10 @@ def _variance_table(sample: Sample) -> DataTable | None:
         known = {of: None if math.isnan(share) else share for of, share in shares.items()}
         cells = _cells(sample, [n for n in sample.labels if " " not in n], families=[found.family])
         row = layout.row(
-            name,
-            None,
+            f"{name}, {found.of}",
+            found,
             cells,
             family=name,
-            methods=found.methods,
-            instances=found.instances,
             sd=math.sqrt(found.components.total),
             **known,
         )
