@@ -11,6 +11,7 @@ import pandas as pd
 from coartic.analysis.comparisons.methods import median
 from coartic.analysis.comparisons.reached import ALL_TASKS
 from coartic.analysis.figures.ranking import GROUPS, learner, standings
+from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report.document import Column, DataTable, Row, Value
 from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
 from coartic.analysis.study import Study
@@ -22,10 +23,14 @@ _METHODS, _VERDICTS = LAYOUTS["main-methods"], LAYOUTS["main-verdicts"]
 
 
 def main_methods(study: Study) -> DataTable | None:
-    """Gaps of every method without its variants: one row a method, one column a task."""
+    """Gaps of every method without its variants: one row a method, one column a task.
+
+    Many instances of families have the one over all tasks together.
+    """
     found = standings(study)
     names = {task: slug.replace("-", "_") for task, slug in slugs(study.tasks).items()}
-    shown = [task for task in study.tasks if (found.task == task).any()]
+    alone = one_by_one(study)
+    shown = [task for task in study.tasks if task in alone and (found.task == task).any()]
     over_all = (found.task == ALL_TASKS).any()
     rows = []
     for method, own in sorted(found.groupby("method", sort=False), key=_order):
@@ -113,7 +118,6 @@ def main_verdicts(study: Study) -> DataTable | None:
             statement=entry.claim.statement,
             verdict=entry.marked,
         )
-        tested = "beside" if entry.claim.beside else "paper"
-        family = entry.claim.id if math.isnan(entry.p) else tested
+        family = entry.claim.id if math.isnan(entry.p) else entry.claim.correction
         rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
     return _VERDICTS.table(rows)
