@@ -71,7 +71,9 @@ def surroundings() -> Environment:
 
 
 def command() -> list[str]:
-    """The command line of this process."""
+    """The command line of this process; that of a notebook's kernel says nothing."""
+    if "ipykernel" in Path(sys.argv[0]).name:
+        return ["a notebook"]
     return [plain(word) for word in (Path(sys.argv[0]).name, *sys.argv[1:])]
 
 

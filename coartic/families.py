@@ -21,7 +21,7 @@ import itertools
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -451,8 +451,10 @@ def names_in(text: str) -> list[str]:
     first, last = ends[0], ends[-1]
     if first is None or last is None or first.stream != last.stream:
         raise TaskError(f"{text!r} is no range of instances; write two-armed/v1/i000..i039")
-    if not 0 <= last.number - first.number < MOST_CELLS:
-        raise TaskError(f"{text!r} names no instance, or more than {MOST_CELLS:_}")
+    if last.number < first.number:
+        raise TaskError(f"{text!r} goes backwards; the lower number stands first")
+    if last.number - first.number >= MOST_CELLS:
+        raise TaskError(f"{text!r} names more than {MOST_CELLS:_} instances")
     numbers = range(first.number, last.number + 1)
     return [str(first._replace(number=number)) for number in numbers]
 
@@ -491,32 +493,45 @@ def rejections(names: Iterable[str]) -> Rejections:
 @cache
 def families() -> dict[str, Family]:
     """The shipped families by name with version, such as ``two-armed/v1``."""
-    return {family.name: family for family in map(read_family, sorted(_files()))}
+    return {name: _shipped(name) for name in _files()}
 
 
-def _files() -> Sequence[Path]:
-    return list(FAMILY_FOLDER.glob("*.v*.toml"))
+def _files() -> dict[str, Path]:
+    """By name with version."""
+    return {_name(path): path for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))}
+
+
+def _name(path: Path) -> str:
+    return "/".join(path.stem.rsplit(".", 1))
+
+
+@cache
+def _shipped(name: str) -> Family:
+    return read_family(_files()[name])
 
 
 def load_family(name: str) -> Family:
     """A family by name, with its version or, without, the newest. Raises TaskError."""
-    known = families()
+    known = _files()
     newest = {family.partition("/")[0]: family for family in sorted(known, key=_version)}
     full = newest.get(name, name)
     if full not in known:
         hint = did_you_mean(full, known) or ";"
         raise TaskError(f"unknown family {name!r}{hint} families are {', '.join(known)}")
-    return known[full]
+    return _shipped(full)
 
 
 def _version(name: str) -> int:
-    return int(name.partition("/v")[2])
+    number = name.partition("/v")[2]
+    return int(number) if number.isdecimal() else 0
 
 
 def read_family(path: Path) -> Family:
     """A family from its file. Raises TaskError with one line per problem."""
     content = read_toml(path, error=TaskError)
-    name = "/".join(path.stem.rsplit(".", 1))
+    name = _name(path)
+    if "name" in content:
+        raise TaskError(f"{path}: name: is an unknown key; a family is named by its file")
     try:
         family = Family(**content, name=name)
     except ValidationError as error:

@@ -11,10 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import coartic.families
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task, parse_task
 from coartic.benchmarks.run import Selection, plan_suite, run_suite
 from coartic.families import (
     CORRECTIVE,
+    FAMILY_FOLDER,
     MOST_NUMBER,
     RULES,
     RULES_IN_WORDS,
@@ -112,6 +114,26 @@ def test_the_family_of_the_guide_is_one(tmp_path):
     path.write_text(guide.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
     family = read_family(path)
     assert (family.name, family.links, family.base) == ("six-links/v1", (6, 6), ("rail",))
+
+
+def test_a_family_has_the_name_of_its_file(tmp_path):
+    path = family_file(tmp_path)
+    path.write_text(f'name = "other"\n{path.read_text(encoding="utf-8")}', encoding="utf-8")
+    with pytest.raises(TaskError, match="name: is an unknown key; a family is named by its file"):
+        read_family(path)
+
+
+def test_a_family_is_there_whatever_another_file_holds(tmp_path, monkeypatch):
+    broken = tmp_path / "broken.v1.toml"
+    broken.write_text("x = [", encoding="utf-8")
+    shipped = load_family("two-armed")
+    (tmp_path / "two-armed.v1.toml").write_bytes(
+        (FAMILY_FOLDER / "two-armed.v1.toml").read_bytes()
+    )
+    monkeypatch.setattr(coartic.families, "FAMILY_FOLDER", tmp_path)
+    assert load_family("two-armed/v1") == shipped
+    with pytest.raises(TaskError, match="broken.v1.toml: is not valid TOML"):
+        load_family("broken")
 
 
 @pytest.mark.parametrize("name", RELEASED)
@@ -332,9 +354,10 @@ def test_ranges():
     assert names_in("long/v1/2027-008..2027-011") == [
         f"long/v1/2027-{n}" for n in ("008", "009", "010", "011")
     ]
-    for text in ("long/v1/i003..i001", f"long/v1/i000..i{MOST_CELLS}"):
-        with pytest.raises(TaskError, match="names no instance, or more than 10_000"):
-            names_in(text)
+    with pytest.raises(TaskError, match="goes backwards"):
+        names_in("long/v1/i003..i001")
+    with pytest.raises(TaskError, match="names more than 10_000 instances"):
+        names_in(f"long/v1/i000..i{MOST_CELLS}")
     for text in ("long/v1/i000..d003", "long/v1/i000", "long/v1/i000..", "i000..i003"):
         with pytest.raises(TaskError, match="is no range of instances"):
             names_in(text)

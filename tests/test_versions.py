@@ -151,12 +151,17 @@ def test_without_shared_seeds_runs_are_independent(first, tmp_path):
     comparison = compare_versions(first, second)
     row = comparison.cells.set_index("method").loc[LEARNED]
     assert not row.paired
+    assert "no shared seeds" in row.remarks
     assert (row.n_a, row.n_b, row.shared) == (RUNS, RUNS + 2, 0)
     assert row.difference == pytest.approx(row.mean_b - row.mean_a)
     assert ("seed", "0", "1") in comparison.differing
     assert ("runs", "6", "8") in comparison.differing
     alone = comparison.cells.set_index("method").loc["corrective-alone/given"]
-    assert alone.verdict == "no interval"  # one run each, by other seeds
+    assert (alone.verdict, alone.shared, alone.difference) == (
+        "identical",
+        0,
+        0.0,
+    )  # draws nothing
 
 
 def test_one_run_that_differs_has_no_interval(first):

@@ -185,6 +185,7 @@ def _runs(
     ]
     compared = not differing and not remarks
     remarks.append(_parameters(first, second))
+    remarks += [] if len(both) else ["no shared seeds"]
     if differing:  # the rewards of two tasks say nothing of each other
         remarks = [f"the tasks of this name differ: {', '.join(differing)}"]
     remarks += ["other code"] if other_code else []
@@ -201,7 +202,9 @@ def _compared(row: VersionRow, a: CellRuns, b: CellRuns) -> VersionRow:
     """With the difference of mean rewards, B less A, its interval, test and verdict."""
     if row.verdict == "not compared":
         return row
-    if row.identical == len(a.good) == len(b.good):
+    # What draws nothing has one result, whatever the seed.
+    alike = not row.shared and len({*a.good.result, *b.good.result}) == 1
+    if alike or row.identical == len(a.good) == len(b.good):
         return replace(row, verdict="identical", paired=True, difference=0.0)
     before, after = paired_by_seed(a.good, b.good)
     paired = len(before) >= FEWEST

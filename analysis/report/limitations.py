@@ -89,7 +89,7 @@ def _failures(study: Study) -> Iterator[str]:
     runs = study.results.runs
     failed = runs[runs.status != "ok"]
     if not len(failed):
-        yield _said("no_failures", runs=len(runs))
+        yield _said("no_failures", runs=counted(len(runs), "run"))
     for key, own in failed.groupby(["task", "status"], sort=False):
         task, status = map(str, key)
         cells = ", ".join(

@@ -79,9 +79,12 @@ def verdicts(judged: Sequence[Judged]) -> Bullets:
         found = Counter(entry.verdict for entry in paper if entry.claim.fitted == fitted)
         counts = ", ".join(f"{found[verdict]} {verdict}" for verdict in _VERDICTS)
         items.append(f"{counted(found.total(), 'claim')} of the paper, {name}: {counts}.")
-    beyond = len(judged) - len(paper)
+    beyond = Counter(entry.verdict for entry in judged if not entry.claim.place)
     if beyond:
-        items.append(f"{counted(beyond, 'comparison')} that the paper does not make: measured.")
+        counts = ", ".join(f"{beyond[verdict]} {verdict}" for verdict in _VERDICTS)
+        items.append(
+            f"{counted(beyond.total(), 'comparison')} that the paper does not make: {counts}."
+        )
     return Bullets(tuple(items))
 
 
