@@ -29,7 +29,7 @@ from coartic.analysis.figures.profiles import profiles
 from coartic.analysis.figures.published import published
 from coartic.analysis.figures.recruitment import recruitment
 from coartic.analysis.figures.signature_matrix import signature_matrix
-from coartic.analysis.figures.style import RC, amount, looks, number, on
+from coartic.analysis.figures.style import ONE, RC, TWO, amount, looks, number, on, widest
 from coartic.analysis.figures.svg import compact, relative
 from coartic.analysis.figures.tasks import tasks_plot
 from coartic.analysis.methods import METHODS, short_name
@@ -123,6 +123,24 @@ def test_a_study_is_itself_alone(study):
     for name, words in ((" ", "empty"), (3, "folder is 3; it must be a path")):
         with pytest.raises(CoarticError, match=words):
             load(name)
+
+
+def test_wide_figures_are_drawn_one_column_wide_as_well(study):
+    """What is wider than a column, with the same data and its panels below each other."""
+    drawn = Figures(study)
+    before = [plot.figure.get_figwidth() for plot in drawn.plots]
+    for section in {entry.section for entry in REGISTER}:
+        wide = {plot.id: plot for plot in drawn.of_section(section)}
+        for name, narrow in drawn.for_a_phone(section).items():
+            plot = wide[name]
+            assert narrow.id == f"{name}-narrow"
+            assert narrow.figure.get_figwidth() == ONE < plot.figure.get_figwidth()
+            pd.testing.assert_frame_equal(narrow.data, plot.data)
+            columns = {round(axes.get_subplotspec().colspan.start) for axes in narrow.figure.axes
+                       if axes.get_subplotspec() is not None}  # fmt: skip
+            assert columns <= {0}
+    assert [plot.figure.get_figwidth() for plot in drawn.plots] == before
+    assert widest() == TWO
 
 
 def test_an_unknown_name_gets_an_answer(study):

@@ -61,8 +61,10 @@ def test_a_clean_folder(clean):
         "Learned reward", "Failures", "Trials", "Number of runs", "One seed", "Times", "Model",
         "One posture",
     ]  # fmt: skip
-    assert found["Failures"].endswith(f"None: of {len(clean.results.runs)} runs each has a solution, "
-                                      "executed and scored.")  # fmt: skip
+    runs = len(clean.results.runs)
+    assert found["Failures"].endswith(
+        f"None: of {runs} runs each has a solution, executed and scored."
+    )
     assert "run once" in found["One seed"]
     assert "The paper has 20 runs a cell; here are 4." in " ".join(limitations(clean))
 

@@ -310,6 +310,21 @@ def test_wide_figures_stay_readable():
         assert ('tabindex="0"' in text) == (least is not None)
 
 
+def test_a_figure_is_drawn_for_a_narrow_page_as_well():
+    """Two drawings, of which one is shown; their ids are apart and none is scrolled."""
+    wide, narrow = (SVG.replace("0 0 90 45", f"0 0 {width} 45") for width in (500, 240))
+    narrow = narrow.replace('id="', 'id="f-narrow-').replace("#", "#f-narrow-")
+    figure = FigureBlock("f", "F", "", "x", wide, narrow=narrow)
+    text = html(Document("t", (Section("a", "A", (figure,)),)))
+    page = Page(text)
+    kinds = [of["class"] for of in page.all("div") if "still" in of.get("class", "")]
+    assert [kind.split()[-1] for kind in kinds] == ["on-desk", "on-phone"]
+    ids = [of["id"] for _, of in page.elements if "id" in of]
+    assert len(ids) == len(set(ids))
+    assert 'tabindex="0"' not in text
+    assert "min-width" not in text.partition("</style>")[2]
+
+
 def test_marks_are_explained_once():
     columns = (Column("method", "method †"), Column("told", "told"), Column("d", "Cliff's δ"))
     table = DataTable("t", "T", columns, (Row("r", ("a", "GF", None)),), ("Own note.",))

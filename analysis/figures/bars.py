@@ -49,13 +49,15 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
     width = style.column_width(0.5 + 0.58 * sum(counts))
-    figure = Figure(figsize=(width, 2.6), layout="constrained")
-    panels = figure.subplots(1, len(labels), width_ratios=counts, squeeze=False)[0]
+    rows, columns = style.row(len(labels))
+    figure = Figure(figsize=(width, 2.6 * rows), layout="constrained")
+    ratios = counts if columns > 1 else None
+    panels = figure.subplots(rows, columns, width_ratios=ratios, squeeze=False).ravel()
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: study.cells[name, label].rewards for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
         axes.set_title(style.heading(study.tasks[name]))
-        axes.set_ylabel("learned reward (ticks)" if axes is panels[0] else "")
+        axes.set_ylabel("learned reward (ticks)" if columns == 1 or axes is panels[0] else "")
     style.letters(panels)
     return worded(
         "learned-reward",

@@ -178,7 +178,7 @@ def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | No
 
 def _draw(shown: Sequence[Solution]) -> Figure:
     end, gap, head, foot = 0.46, 0.08, 0.34, 0.3  # inches
-    wide = (style.TWO - end) / max(len(solution.task.goals) for solution in shown)
+    wide = (style.widest() - end) / max(len(solution.task.goals) for solution in shown)
     postures: dict[str, list[Array]] = {}
     for s in shown:
         postures.setdefault(s.task.name, [s.task.q0]).extend(s.execution.configurations)
@@ -187,7 +187,7 @@ def _draw(shown: Sequence[Solution]) -> Figure:
     scale = (wide - gap) / max(extent[0] for extent in extents.values())
     sizes = [scale * extents[s.task.name] for s in shown]
     height = sum(size[1] for size in sizes) + head * len(shown) + foot
-    figure = Figure(figsize=(style.TWO, height))
+    figure = Figure(figsize=(style.widest(), height))
     top = height
     bold: Any = {"va": "top", "fontsize": style.NORMAL, "weight": "bold"}
     for solution, (width, tall) in zip(shown, sizes, strict=True):
@@ -197,20 +197,30 @@ def _draw(shown: Sequence[Solution]) -> Figure:
         top -= head + tall
         panels = [
             figure.add_axes(
-                ((k * wide + gap / 2) / style.TWO, top / height, width / style.TWO, tall / height)
+                (
+                    (k * wide + gap / 2) / style.widest(),
+                    top / height,
+                    width / style.widest(),
+                    tall / height,
+                )
             )
             for k in range(len(task.goals))
         ]
         _panels(panels, solution, *corners[task.name])
         total = f"total\n{style.number(-solution.execution.ticks)}"
-        place = 1 - 0.02 / style.TWO, (top + tall / 2) / height
+        place = 1 - 0.02 / style.widest(), (top + tall / 2) / height
         figure.text(*place, total, ha="right", va="center", fontsize=style.NORMAL)
     before = style.entry("before", color=style.GREY, linewidth=0.9)
     handles = legend_entries(hand for solution in shown for hand in solution.task.hands)
-    figure.legend(handles=[*handles, before], loc="lower center", ncols=4, borderaxespad=0.2)
-    bar = np.array([0.08, 0.08 + scale]) / style.TWO
+    figure.legend(
+        handles=[*handles, before],
+        loc="lower center",
+        ncols=min(4, int(style.widest() / 1.5)),
+        borderaxespad=0.2,
+    )
+    bar = np.array([0.08, 0.08 + scale]) / style.widest()
     figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=style.INK, linewidth=1.2))
-    figure.text(bar[1] + 0.04 / style.TWO, 0.13 / height, "1 length unit", va="center")
+    figure.text(bar[1] + 0.04 / style.widest(), 0.13 / height, "1 length unit", va="center")
     return figure
 
 
@@ -226,9 +236,8 @@ def _panels(panels: Sequence[Axes], solution: Solution, low: Array, high: Array)
         draw_robot(axes, task, before, color=style.GREY)
         draw_goals(axes, task, current=k + 1)
         draw_robot(axes, task, q, marked=(hands[k],))
-        axes.set_title(
-            f"goal {k + 1}: {hands[k]}, {style.number(-ticks[k])}", fontsize=style.SMALL, pad=1
-        )
+        goal = f"goal {k + 1}: " if style.widest() > style.ONE else ""  # they stand in order
+        axes.set_title(f"{goal}{hands[k]}, {style.number(-ticks[k])}", fontsize=style.SMALL, pad=1)
         before = q
 
 

@@ -52,8 +52,10 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
     looks = style.looks(order)
     families = list(sample.families)
-    figure = Figure(figsize=(style.TWO, 0.9 + 0.19 * len(order)), layout="constrained")
-    panels = figure.subplots(1, len(families), sharey=True, squeeze=False)[0]
+    rows, columns = style.row(len(families))
+    size = style.widest(), (0.9 + 0.19 * len(order)) * rows
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     dot: Any = {"markersize": 2.4, "alpha": 0.5, "markeredgewidth": 0, "linestyle": ""}
     mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
     for axes, family in zip(panels, families, strict=True):
@@ -72,7 +74,7 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
     style.name_rows(panels[0], [short_name(label) for label in order])
-    panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
+    panels[len(panels) // 2 if columns > 1 else -1].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
     joined = data.merge(ends, on=["method", "family"])
     told = spoken(ends, "{method}, {family}: {mean:.1%}")
@@ -129,8 +131,9 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
     data = pd.DataFrame(rows)
     families = list(dict.fromkeys(data.family))
     order = list(dict.fromkeys(data.method))
-    figure = Figure(figsize=(style.TWO, 2.0), layout="constrained")
-    panels = figure.subplots(1, len(order), sharey=True, sharex=True, squeeze=False)[0]
+    shape = style.row(len(order))
+    figure = Figure(figsize=(style.widest(), 2.0 * shape[0]), layout="constrained")
+    panels = figure.subplots(*shape, sharey=True, sharex=True, squeeze=False).ravel()
     dot: Any = {"markersize": 2.6, "alpha": 0.55, "markeredgewidth": 0, "linestyle": ""}
     mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
     for axes, pair in zip(panels, order, strict=True):

@@ -103,8 +103,10 @@ def _draw(data: pd.DataFrame, labels: Sequence[str]) -> Figure:
         for label, like in alike.items()
     }
     rows = -(-len(labels) // 3)
-    figure = Figure(figsize=(style.TWO, 2.35 + 0.15 * rows), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
+    up, across = style.row(2)
+    size = style.widest(), 2.35 * up + 0.15 * rows * up
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(up, across, sharey=True)
     for axes, (kind, curves) in zip(panels, data.groupby("kind", sort=False), strict=True):
         for label, own in curves.groupby("method", sort=False):
             line = lines[str(label)]

@@ -43,8 +43,10 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     common = shares.sort_values(ascending=False, kind="stable").index
     order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
     bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
-    figure = Figure(figsize=(style.TWO, 0.75 + 0.155 * max(bars)), layout="constrained")
-    panels = figure.subplots(1, len(found), squeeze=False)[0]
+    rows, columns = style.row(len(found))
+    size = style.widest(), (0.75 + 0.155 * max(bars)) * rows
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
     colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
     for axes, task in zip(panels, found.values(), strict=True):
         _panel(axes, task, data[data.task == task.name], order, colors)

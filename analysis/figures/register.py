@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
 
 from coartic import CoarticError
+from coartic.analysis.figures import style
 from coartic.analysis.figures.bars import bars
 from coartic.analysis.figures.configurations import PAPER, paper_configurations
 from coartic.analysis.figures.context import context
@@ -58,6 +60,8 @@ class Entry(NamedTuple):
     """Figure of the paper that it is like."""
     by_task: bool = False
     """Whether there is one for each task, which may be too many."""
+    narrows: bool = True
+    """Whether it can be read one column wide."""
 
 
 REGISTER = (
@@ -73,7 +77,7 @@ REGISTER = (
     Entry("gaps-by-family", gaps_by_family, "families"),
     Entry("exploration-by-family", exploration_by_family, "families"),
     Entry("context", context, "coarticulation"),
-    Entry("signatures", signature_matrix, "coarticulation", by_task=True),
+    Entry("signatures", signature_matrix, "coarticulation", by_task=True, narrows=False),
     Entry("frontier", frontier, "cost"),
     Entry("profiles", profiles, "methods"),
     Entry("postures", postures, "answers"),
@@ -117,6 +121,19 @@ class Figures(Mapping[str, Figure]):
     def of_section(self, section: str) -> list[Plot]:
         """Figures of one section of a report."""
         return [plot for e in REGISTER if e.section == section for plot in self._of(e)]
+
+    def for_a_phone(self, section: str) -> dict[str, Plot]:
+        """Figures of one section that are wider than a column, drawn one column wide, by id."""
+        found: dict[str, Plot] = {}
+        for entry in REGISTER:
+            asked = entry.section == section and entry.narrows
+            plots = self._of(entry) if asked else []
+            if any(plot.figure.get_figwidth() > style.ONE for plot in plots):
+                with style.on_a_phone():
+                    drawn = entry.draw(self._study, methods=self._methods)
+                narrow = drawn if isinstance(drawn, list) else [drawn]
+                found |= {plot.id: replace(plot, id=f"{plot.id}-narrow") for plot in narrow}
+        return found
 
     @property
     def like_the_paper(self) -> dict[str, str]:

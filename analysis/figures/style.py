@@ -7,7 +7,9 @@ white. All are legible on white and on #111; marks and dashes tell what colours 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any, NamedTuple
@@ -113,9 +115,27 @@ def dagger(tasks: Iterable[Task]) -> str:
     return " † Reconstructed: what the paper does not print of this task was inferred."
 
 
+_WIDEST: ContextVar[float] = ContextVar("widest", default=TWO)
+
+
+def widest() -> float:
+    """How wide a figure may be, inches: two columns of a journal, one :func:`on_a_phone`."""
+    return _WIDEST.get()
+
+
+@contextmanager
+def on_a_phone() -> Iterator[None]:
+    """Figures that are drawn within are one column wide: their panels stand below each other."""
+    before = _WIDEST.set(ONE)
+    try:
+        yield
+    finally:
+        _WIDEST.reset(before)
+
+
 def column_width(inches: float) -> float:
-    """Width in inches of a figure that needs so many: one column of a journal or two."""
-    return ONE if inches <= ONE else TWO
+    """Width in inches of a figure that needs so many: one column, or all that there is."""
+    return ONE if inches <= ONE else widest()
 
 
 def number(value: float, digits: int = 0) -> str:
@@ -125,8 +145,13 @@ def number(value: float, digits: int = 0) -> str:
 
 def grid(panels: int) -> tuple[int, int]:
     """Rows and columns of so many panels."""
-    columns = min(2 if panels <= 6 else 3, panels)
+    columns = 1 if widest() <= ONE else min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
+
+
+def row(panels: int) -> tuple[int, int]:
+    """Rows and columns of so many panels that stand side by side where there is room."""
+    return (panels, 1) if widest() <= ONE else (1, panels)
 
 
 def task_panels(
@@ -137,7 +162,8 @@ def task_panels(
     ``tall``, ``legend``: inches of a panel, where the page allows, and of the legend.
     """
     rows, columns = grid(len(tasks))
-    figure = Figure(figsize=(TWO, min(tall * rows + legend, TALLEST)), layout="constrained")
+    height = tall * rows + legend * (1 if columns > 1 else 2)
+    figure = Figure(figsize=(widest(), min(height, TALLEST)), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False, **subplots).ravel().tolist()
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()
@@ -159,7 +185,10 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """A legend below all panels."""
+    """A legend below all panels, of fewer columns where the figure is narrow."""
+    if widest() <= ONE:
+        columns = min(columns, 2)
+        more = {"fontsize": SMALL - 1, "columnspacing": 0.8, **more}
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
 
 

@@ -32,7 +32,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
     rows, columns = style.grid(len(tasks))
     above, around = 0.62, 0.55  # inches of a panel for title and axes
     scale = min(
-        (style.TWO / columns - around) / width,
+        (style.widest() / columns - around) / width,
         (style.TALLEST - 0.3 - rows * above) / rows / height,
         0.42,
     )

@@ -126,10 +126,12 @@ def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
     def drawn(section: FigureSection) -> list[FigureBlock]:
         plots = [] if figures is None else figures.of_section(section)
         chart_of = charts(study, {plot.id: plot.data for plot in plots})
+        narrow = {} if figures is None or chart_of else figures.for_a_phone(section)
         return [
             FigureBlock(
                 *(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot)),
                 chart=chart_of.get(plot.id, ""),
+                narrow=svg_text(narrow[plot.id]) if plot.id in narrow else "",
             )
             for plot in plots
         ]

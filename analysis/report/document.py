@@ -190,6 +190,8 @@ class FigureBlock:
     chart: str = ""
     """A specification of Vega-Lite as JSON, which a page of HTML shows in the place of the SVG
     where scripts are on; empty where there is none."""
+    narrow: str = ""
+    """The same drawn for a narrow page of HTML, an SVG document; empty where one will do."""
 
 
 Tone = Literal["good", "bad", "open", "plain"]

@@ -203,32 +203,35 @@ def stretches(cells: Iterable[CellKey], numbers: Mapping[CellKey, int]) -> list[
 
 def is_wide(figure: FigureBlock) -> bool:
     """Whether a narrow page scrolls it. Raises ValueError as :func:`inlined_svg` does."""
-    return _width(figure) > _WIDE
+    return not figure.narrow and _width(figure, figure.svg) > _WIDE
 
 
-def _width(figure: FigureBlock) -> float:
+def _width(figure: FigureBlock, svg: str) -> float:
     """Of the drawing, pt. Raises ValueError where there is no SVG with a ``viewBox``."""
-    size = re.search(r'<svg\b[^>]*viewBox="\s*\S+\s+\S+\s+([\d.]+)', figure.svg)
+    size = re.search(r'<svg\b[^>]*viewBox="\s*\S+\s+\S+\s+([\d.]+)', svg)
     if not size:
         raise ValueError(f"figure {figure.id}: its svg holds no <svg> element with a viewBox")
     return float(size[1])
 
 
-def inlined_svg(figure: FigureBlock) -> Markup:
+def inlined_svg(figure: FigureBlock, narrow: bool = False) -> Markup:
     """A figure's SVG for use inside HTML: named for who cannot see it, its ids its own.
 
     Prologue and metadata go, and ids get the figure's id before them where they have not,
-    since those of several SVGs would meet in one page. It is shown up to half as large again
+    since those of several SVGs would meet in one page. ``narrow``: the one drawn for a narrow
+    page. It is shown up to half as large again
     as on paper; a wide one never so small that it cannot be read.
     Raises ValueError where there is no SVG with a ``viewBox``.
     """
-    width, root = _width(figure), re.search(r"<svg\b([^>]*)>", figure.svg)
+    svg = figure.narrow if narrow else figure.svg
+    width, root = _width(figure, svg), re.search(r"<svg\b([^>]*)>", svg)
     assert root is not None
     attributes = re.sub(r'\s(role|aria-label|width|height|style)="[^"]*"', "", root[1])
-    body = re.sub(r"<metadata>.*?</metadata>\s*", "", figure.svg[root.end() :], flags=re.S)
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", svg[root.end() :], flags=re.S)
     fresh = rf'(\sid="|href="#|url\(#)(?!{re.escape(figure.id)}-)'
     body = re.sub(fresh, rf"\g<1>{figure.id}--", body)
-    least = f"; min-width: {_READABLE * width:.0f}px" if width > _WIDE else ""
+    scrolled = width > _WIDE and not figure.narrow
+    least = f"; min-width: {_READABLE * width:.0f}px" if scrolled else ""
     return Markup(
         f'<svg{attributes} role="img" aria-label="{escape(one_line(figure.alt))}" '
         f'style="max-width: {_MAGNIFIED * width:.0f}pt{least}">{body.strip()}'
