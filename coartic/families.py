@@ -123,27 +123,30 @@ class Region(_Data):
     """Where goals are: a box, of whose sides a share is drawn and placed within it."""
 
     x: Span
+    """From, to, length unit; at the start the base is at the origin."""
     y: Span
+    """From, to, length unit."""
     scale: Annotated[tuple[_Share, _Share], AfterValidator(_ordered)] = (_PARTS, _PARTS)
+    """Share of both sides that an instance's own box has, from, to."""
 
 
 class Alignment(_Data):
     """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
 
     steps: Annotated[tuple[_Positive, _Positive], AfterValidator(_ordered)]
-    """From goal to goal along the line."""
+    """From goal to goal along the line, length unit, from, to."""
     off: Annotated[tuple[_Positive, _Positive], AfterValidator(_ordered)]
-    """Of the one goal from the line, to either side."""
+    """Distance of the one goal from the line, to either side, length unit, from, to."""
 
 
 class Posture(_Data):
     """An arm at the start."""
 
     first: Span
-    """Angle of the first joint from +x, rad."""
+    """Angle of the first joint from +x, rad, from, to."""
     others: Annotated[tuple[_Bend, _Bend], AfterValidator(_ordered)]
-    """Of each other joint from the link before it, within ±π/2: an arm whose bends are so small
-    is straight, and thereby singular, where they are all 0."""
+    """Angle of each other joint from the link before it, rad, from, to, within ±π/2: an arm whose
+    bends are so small is straight, and thereby singular, where they are all 0."""
 
 
 _PARKED = Posture(first=(0, 0), others=(0, 0))
@@ -153,36 +156,49 @@ class Postures(_Data):
     """Both arms at the start; an arm whose hand has nothing to do is parked at 0."""
 
     left: Posture = _PARKED
+    """The left arm."""
     right: Posture = _PARKED
+    """The right arm."""
 
 
 class Family(_Data):
-    """Distributions of tasks, and what no instance may be."""
+    """Distributions of tasks, and what no instance may be.
+
+    Lengths, angles and shares are kept in thousandths of what the file says.
+    """
 
     name: str
     """With the version, as ``two-armed/v1``."""
     title: Line
+    """For figures and tables."""
     description: Line
+    """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
+    """Hands that may hit goals; the robot has both arms anyway."""
     goals: Annotated[tuple[_Goals, _Goals], AfterValidator(_ordered)]
-    """How many, from, to."""
+    """How many there are, from, to; each number as likely."""
     links: Annotated[tuple[_Links, _Links], AfterValidator(_ordered)]
     """How many each of both arms has, from, to; they have one length (to a thousandth)."""
     reach: _Positive = 4 * _PARTS
-    """Sum of an arm's links; the paper's."""
+    """Sum of an arm's links, length unit; the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
+    """One is drawn: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
     """Bases, beside its own, under which every instance can be done."""
     radius: _Positive = 100
+    """Of every goal, length unit."""
     region: Region
+    """Where goals are: table ``[region]``."""
     line: Alignment | None = None
+    """Goals on a line: table ``[line]``; scattered over the region where left out."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
+    """Postures of which one is drawn: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
     """How the hands of trial 0 are found; the instance names them."""
     apart: Parts = 300
-    """Least distance between the centres of two goals."""
+    """Least distance between the centres of two goals, length unit."""
     clear: Parts = 200
-    """Least distance of a hand at the start from a goal's rim."""
+    """Least distance of a hand at the start from a goal's rim, length unit."""
     within: _Share = 950
     """Share of the reach within which goals are, where the base cannot come nearer."""
     bent: Parts = 200

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
+import json
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
+
+from coartic.families import Parts
+
+_IN_PARTS = get_args(Parts)[1]  # what reads a figure into thousandths
+LONGEST_DEFAULT = 60
+"""Characters of one that is shown in a table."""
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
@@ -26,6 +36,103 @@ def attribute_words(module: str, owner: str) -> dict[str, str]:
     """What the docstrings of a class's attributes say."""
     words = ModuleAnalyzer.for_module(module).find_attr_docs()
     return {name: " ".join(text).strip() for (of, name), text in words.items() if of == owner}
+
+
+def add_meanings() -> None:
+    """Let ``meanings.toml`` stand for docstrings. Raises KeyError for what is no class's field."""
+    path = Path(__file__).with_name("meanings.toml")
+    for owner, said in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        module, _, name = owner.rpartition(".")
+        known = hints(getattr(importlib.import_module(module), name))
+        docs = ModuleAnalyzer.for_module(module).find_attr_docs()
+        for key, meaning in said.items():
+            if key not in known:
+                raise KeyError(f"{path.name}: {owner} has no field {key}")
+            docs[name, key] = [meaning, ""]
+
+
+def meanings_of(model: type) -> dict[str, str]:
+    """What every field of a model means."""
+    words: dict[str, str] = {}
+    for owner in reversed(model.__mro__):
+        if owner.__module__.startswith("coartic"):
+            words |= attribute_words(owner.__module__, owner.__qualname__)
+    return words
+
+
+def hints(model: Any) -> dict[str, Any]:
+    """Annotations of a model's fields, with all that they are annotated with."""
+    fields = model.__pydantic_fields__.items()
+    return {name: Annotated[f.annotation, *f.metadata, None] for name, f in fields}
+
+
+def bare(kind: Any) -> Any:
+    """A type without what it is annotated with."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return bare(parts[0])
+    if origin in (tuple, dict):
+        return origin[tuple(map(bare, parts))]
+    if origin in (Union, UnionType):
+        return Union[tuple(map(bare, parts))]  # noqa: UP007
+    return kind
+
+
+def values(kind: Any) -> str:
+    """What a value may be, in words of TOML."""
+    parts = get_args(kind)
+    match get_origin(kind):
+        case origin if origin is Annotated:
+            return "number" if _IN_PARTS in parts else values(parts[0])
+        case origin if origin is Literal:
+            return " or ".join(f"`{toml(value)}`" for value in parts)
+        case origin if origin in (Union, UnionType):
+            kinds = dict.fromkeys(values(part) for part in parts if part is not NoneType)
+            return " or ".join(kinds)
+        case origin if origin is tuple and parts[-1] is ...:
+            inner = values(parts[0])
+            return "tables" if inner == "table" else f"list of {inner}"
+        case origin if origin is tuple:
+            return f"[{', '.join(map(values, parts))}]"
+        case origin if origin is dict:
+            inner = values(parts[1])
+            return "tables" if inner == "table" else f"table of {inner}"
+    simple = {bool: "`true` or `false`", int: "integer", float: "number", str: "text"}
+    return simple.get(kind, "table")
+
+
+def in_parts(kind: Any) -> bool:
+    """Whether figures are kept in thousandths of what a file says (coartic.families)."""
+    parts = get_args(kind)
+    return _IN_PARTS in parts or any(map(in_parts, parts))
+
+
+def toml(value: Any, kind: Any = None) -> str:
+    """A value as a file says it; thousandths as what they are thousandths of."""
+    if hasattr(value, "__pydantic_fields__"):
+        of = hints(type(value))
+        fields = {name: getattr(value, name) for name in type(value).__pydantic_fields__}
+        inner = (f"{name} = {toml(item, of[name])}" for name, item in fields.items())
+        return "{ " + ", ".join(inner) + " }"
+    match value:
+        case dict():
+            inner = (f"{name} = {toml(item)}" for name, item in value.items())
+            return "{ " + ", ".join(inner) + " }" if value else "{}"
+        case tuple() | list():
+            return "[" + ", ".join(toml(item, kind) for item in value) + "]"
+        case bool() | str():
+            return json.dumps(value, ensure_ascii=False)
+        case int() if in_parts(kind):
+            return repr(value / 1000)
+    return repr(value)
+
+
+def default_of(value: Any, kind: Any) -> str:
+    """For a table: as TOML; what is too long for it stands in a table of its own."""
+    if value is None:
+        return "none"
+    text = toml(value, kind)
+    return f"`{text}`" if len(text) <= LONGEST_DEFAULT else "as below"
 
 
 def code(text: Any) -> str:
@@ -93,43 +200,56 @@ def methods() -> Iterator[str]:
 def parameters() -> Iterator[str]:
     """Parameters of every built-in method with their defaults; methods that share them once."""
     from coartic.benchmarks.registry import CLASSES
+    from coartic.dual_process import DualProcessParameters
+    from coartic.readings import readings
 
+    condition = attribute_words("coartic.exploration", "ExplorationCondition")
+    read = {
+        reading.field: f"{condition[reading.field]} ([Reading](#readings) `{reading.id}`.)"
+        for reading in readings()
+        if reading.part == "condition"
+    }
     shared: dict[Any, list[str]] = {}
     for name, method in CLASSES.items():
         shared.setdefault(method.Parameters, []).append(name)
     for kind, names in shared.items():
-        fields = kind.model_fields
         yield from (", ".join(map(code, names)), "")
-        if not fields:
+        if not kind.model_fields:
             yield from ("None.", "")
             continue
-        words: dict[str, str] = {}
-        for owner in reversed(kind.__mro__):
-            if owner.__module__.startswith("coartic"):
-                words |= attribute_words(owner.__module__, owner.__name__)
-        yield from table(
-            ("parameter", "default", "meaning"),
-            ((code(name), code(field.default), words.get(name) or field.description or "")
-             for name, field in fields.items()),
-        )  # fmt: skip
+        words = meanings_of(kind)
+        if issubclass(kind, DualProcessParameters):
+            words |= read
+        yield from table(("parameter", "default", "values", "meaning"), rows_of(kind, words))
+
+
+def rows_of(model: Any, words: dict[str, str], but: str = "") -> Iterator[Sequence[str]]:
+    """Of a table of a model's fields. Raises KeyError for one without a meaning."""
+    of = hints(model)
+    defaults = {
+        name: ... if f.is_required() else f.get_default(call_default_factory=True)
+        for name, f in model.__pydantic_fields__.items()
+    }
+    for name, default in defaults.items():
+        if name != but:
+            shown = "required" if default is ... else default_of(default, of[name])
+            yield code(name), shown, values(of[name]), words[name]
 
 
 def conditions() -> Iterator[str]:
     """Exploration conditions and variants, as the learner takes them."""
-    from dataclasses import fields
-
     from coartic import CONDITIONS, VARIANTS
 
     every = {**CONDITIONS, **VARIANTS}
-    names = [field.name for field in fields(next(iter(every.values())))]
+    first = next(iter(every.values()))
+    names = [field.name for field in dataclasses.fields(first)]
     yield from table(
         ("condition", "what differs from the first"),
         (
             (code(name), ", ".join(
-                f"`{field} = {getattr(condition, field)}`" for field in names
+                f"`{field} = {toml(getattr(condition, field))}`" for field in names
                 if field != "id" and (
-                    name == next(iter(every))
-                    or getattr(condition, field) != getattr(next(iter(every.values())), field)
+                    condition is first or getattr(condition, field) != getattr(first, field)
                 )
             ))
             for name, condition in every.items()
@@ -190,31 +310,17 @@ def _reading(name: str, reading: Any) -> Iterator[str]:
     yield from ("", reading["why"], "")
 
 
-def fields(module: str, owner: str) -> Iterator[str]:
-    """Keys of a file, as its model checks them."""
-    import dataclasses
-    import importlib
-
+def fields(module: str, owner: str, but: str = "") -> Iterator[str]:
+    """Keys of a file, as its model checks them; ``but``: one that no file has."""
     model = getattr(importlib.import_module(module), owner)
-    words = attribute_words(module, owner)
-    if dataclasses.is_dataclass(model):
-        rows = [(f.name, f.default) for f in dataclasses.fields(model)]
-    else:
-        rows = [
-            (name, "required" if f.is_required() else f.get_default(call_default_factory=True))
-            for name, f in model.model_fields.items()
-        ]
-    yield from table(
-        ("key", "default", "meaning"),
-        ((code(name), code(default), words.get(name, "")) for name, default in rows),
-    )
+    yield from table(("key", "default", "values", "meaning"), rows_of(model, meanings_of(model), but))
 
 
 class Made(SphinxDirective):
     """``{made} methods``: what a function of this file gives, as Markdown."""
 
     required_arguments = 1
-    optional_arguments = 2
+    optional_arguments = 3
 
     def run(self) -> list[nodes.Node]:
         """The nodes in its place."""
@@ -224,7 +330,23 @@ class Made(SphinxDirective):
         )
 
 
+def plainly(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str, returns: str
+) -> tuple[str, None] | None:
+    """Models whose signature is that of their fields, which are listed below it, have none.
+
+    The types of these are shown without what they are checked for.
+    """
+    if what != "class" or "__pydantic_fields__" not in vars(thing):
+        return None
+    thing.__annotations__ |= {name: bare(kind) for name, kind in hints(thing).items()
+                              if name in thing.__annotations__}  # fmt: skip
+    return "", None
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the directive."""
+    """Register what is made here."""
+    add_meanings()
     app.add_directive("made", Made)
+    app.connect("autodoc-process-signature", plainly)
     return {"parallel_read_safe": True}
