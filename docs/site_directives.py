@@ -14,11 +14,13 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
+from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
 from coartic.families import Parts
 
 _IN_PARTS = get_args(Parts)[1]  # what reads a figure into thousandths
+_MANY = {"number": "numbers", "integer": "integers"}
 LONGEST_DEFAULT = 60
 """Characters of one that is shown in a table."""
 
@@ -91,7 +93,7 @@ def values(kind: Any) -> str:
             return " or ".join(kinds)
         case origin if origin is tuple and parts[-1] is ...:
             inner = values(parts[0])
-            return "tables" if inner == "table" else f"list of {inner}"
+            return "tables" if inner == "table" else f"list of {_MANY.get(inner, inner)}"
         case origin if origin is tuple:
             return f"[{', '.join(map(values, parts))}]"
         case origin if origin is dict:
@@ -313,7 +315,9 @@ def _reading(name: str, reading: Any) -> Iterator[str]:
 def fields(module: str, owner: str, but: str = "") -> Iterator[str]:
     """Keys of a file, as its model checks them; ``but``: one that no file has."""
     model = getattr(importlib.import_module(module), owner)
-    yield from table(("key", "default", "values", "meaning"), rows_of(model, meanings_of(model), but))
+    yield from table(
+        ("key", "default", "values", "meaning"), rows_of(model, meanings_of(model), but)
+    )
 
 
 class Made(SphinxDirective):
@@ -332,16 +336,23 @@ class Made(SphinxDirective):
 
 def plainly(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str, returns: str
-) -> tuple[str, None] | None:
-    """Models whose signature is that of their fields, which are listed below it, have none.
+) -> tuple[str, str] | None:
+    """Types in signatures without what they are annotated with.
 
-    The types of these are shown without what they are checked for.
+    A model, whose signature is that of the fields that are listed below it, has none.
     """
-    if what != "class" or "__pydantic_fields__" not in vars(thing):
+    if what == "class" and "__pydantic_fields__" in vars(thing):
+        own = thing.__annotations__
+        own |= {field: bare(kind) for field, kind in hints(thing).items() if field in own}
+        return "", ""
+    if "Annotated[" not in (signature or ""):
         return None
-    thing.__annotations__ |= {name: bare(kind) for name, kind in hints(thing).items()
-                              if name in thing.__annotations__}  # fmt: skip
-    return "", None
+    kinds, found = get_type_hints(thing), inspect.signature(thing, bound_method=what == "method")
+    of_it = [
+        p.replace(annotation=kinds.get(p.name, p.annotation)) for p in found.parameters.values()
+    ]
+    shown = found.replace(parameters=of_it)
+    return inspect.stringify_signature(shown, show_return_annotation=False), returns
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
