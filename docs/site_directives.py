@@ -234,6 +234,8 @@ def rows_of(model: Any, words: dict[str, str], but: str = "") -> Iterator[Sequen
     }
     for name, default in defaults.items():
         if name != but:
+            if name not in words:
+                raise KeyError(f"{model.__name__}.{name}: neither docstring nor meanings.toml")
             shown = "required" if default is ... else default_of(default, of[name])
             yield code(name), shown, values(of[name]), words[name]
 
