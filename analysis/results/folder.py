@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import ArrayLike
 
 from coartic import CoarticError, Task, parse_task
 from coartic.analysis.results.laws import check_tables, read_manifest
@@ -43,7 +45,8 @@ class CellRuns(Cell):
     @cached_property
     def good(self) -> pd.DataFrame:
         """The runs that have a solution."""
-        return self.runs[self.runs["status"] == "ok"]
+        solved = self.runs["status"] == "ok"
+        return self.runs if solved.all() else self.runs[solved]
 
     @cached_property
     def rewards(self) -> Array:
@@ -71,11 +74,10 @@ class Results:
     def cells(self) -> dict[CellKey, CellRuns]:
         """The cells with their runs, in the order of the plan."""
         found, runs = {}, self.runs
+        rows = runs.groupby(["task", "method", "variant"], sort=False).indices
         for cell in self.manifest.specification.cells:
             names = cell.task, cell.method, cell.variant
-            own = (runs.task == cell.task) & (runs.method == cell.method)
-            own &= runs.variant == cell.variant
-            found[cell.task, cell.label] = CellRuns(*names, runs[own])
+            found[cell.task, cell.label] = CellRuns(*names, _taken(runs, rows.get(names, [])))
         return found
 
     def solutions(self) -> pd.DataFrame:
@@ -99,6 +101,14 @@ class Results:
                 rewards = table["reward"].cast("float64").to_numpy()
                 ends = np.flatnonzero(np.diff(codes)) + 1
                 yield from zip(map(str, runs), np.split(rewards, ends), strict=False)  # maybe none
+
+
+def _taken(frame: pd.DataFrame, rows: ArrayLike) -> pd.DataFrame:
+    """Rows by number, without a copy where they follow each other."""
+    places = np.asarray(rows, dtype=np.int64)
+    if len(places) and places[-1] - places[0] == len(places) - 1 and (np.diff(places) == 1).all():
+        return frame.iloc[places[0] : places[-1] + 1]
+    return frame.iloc[places]
 
 
 def load_results(folder: Path) -> Results:
@@ -129,4 +139,11 @@ def made_here(folder: Path) -> Results:
 
 def read_table(folder: Path, name: str) -> pd.DataFrame:
     """A table of a results folder that lacks values: with nullable types."""
-    return pd.read_parquet(folder / f"{name}.parquet", dtype_backend="numpy_nullable")
+    path = folder / f"{name}.parquet"
+    # Texts repeat from run to run: read once each, they take a fraction of the memory on the way.
+    texts = [field.name for field in pq.read_schema(path) if pa.types.is_string(field.type)]
+    repeated = [name for name in texts if name != "run_id"]
+    frame = pd.read_parquet(path, dtype_backend="numpy_nullable", read_dictionary=repeated)
+    for column in repeated:
+        frame[column] = frame[column].astype("string")
+    return frame
