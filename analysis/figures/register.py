@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from matplotlib.figure import Figure
 
@@ -33,8 +33,8 @@ from coartic.text import did_you_mean
 
 Section = Literal[
     "answers",
-    "tasks-drawn",
     "families",
+    "tasks-drawn",
     "paper",
     "movements",
     "learning",
@@ -43,6 +43,8 @@ Section = Literal[
     "coarticulation",
 ]
 """Of a report that shows figures, by id."""
+SECTIONS: tuple[Section, ...] = get_args(Section)
+"""In the order of a report."""
 
 
 class Entry(NamedTuple):
@@ -61,7 +63,8 @@ class Entry(NamedTuple):
     by_task: bool = False
     """Whether there is one for each task, which may be too many."""
     narrows: bool = True
-    """Whether it can be read one column wide."""
+    """Whether it is drawn one column wide as well: where it can be read so, and no chart is shown
+    in its place."""
 
 
 REGISTER = (
@@ -81,8 +84,8 @@ REGISTER = (
     Entry("frontier", frontier, "cost"),
     Entry("profiles", profiles, "methods"),
     Entry("postures", postures, "answers"),
-    Entry("ranking", ranking, "answers"),
-    Entry("price", price, "answers"),
+    Entry("ranking", ranking, "answers", narrows=False),
+    Entry("price", price, "answers", narrows=False),
 )
 """The paper's figures in its order, and the others."""
 
@@ -126,8 +129,7 @@ class Figures(Mapping[str, Figure]):
         """Figures of one section that are wider than a column, drawn one column wide, by id."""
         found: dict[str, Plot] = {}
         for entry in REGISTER:
-            asked = entry.section == section and entry.narrows
-            plots = self._of(entry) if asked else []
+            plots = self._of(entry) if entry.narrows and entry.section == section else []
             if any(plot.figure.get_figwidth() > style.ONE for plot in plots):
                 with style.on_a_phone():
                     drawn = entry.draw(self._study, methods=self._methods)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import CoarticError
-from coartic.analysis.figures import Figures, Plot
-from coartic.analysis.figures.plot import FILES, rendered, svg_text
+from coartic.analysis.figures import Figures
+from coartic.analysis.figures.plot import FILES
 from coartic.analysis.figures.register import Section as FigureSection
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.markup import escaped, words
@@ -47,6 +47,7 @@ from coartic.analysis.report.pages.claims import claim_section, claims_table
 from coartic.analysis.report.pages.comparisons import cost_table, pairwise_table, reading_of_pairs
 from coartic.analysis.report.pages.families import families_section
 from coartic.analysis.report.pages.frontier import cost_tables, optima_known, reading_of_cost
+from coartic.analysis.report.pictures import Pictures
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.summary import (
     tasks_table,
@@ -82,20 +83,22 @@ class Report:
     """A document with the figures and the numbers that belong to it."""
 
     document: Document
-    plots: tuple[Plot, ...]
+    pictures: Pictures
     numbers: tuple[Number, ...]
-    formats: tuple[str, ...] = FILES
-    """Endings of the figures' files."""
 
 
 def build(
-    study: Study, methods: Sequence[str] | None = None, formats: Sequence[str] = FILES
+    study: Study,
+    methods: Sequence[str] | None = None,
+    formats: Sequence[str] = FILES,
+    *,
+    processes: int = 1,
 ) -> Report:
     """Everything a report holds. A section that the runs do not allow is left out.
 
     ``methods``: labels that the figures show instead of their own choice; ``formats``: endings of
-    the figures' files, ``.svg`` among them. Raises CoarticError for a method that the folder does
-    not have, and for other formats.
+    the figures' files, ``.svg`` among them; ``processes`` make the pictures. Raises CoarticError
+    for a method that the folder does not have, and for other formats.
     """
     if ".svg" not in formats or not set(formats) <= _FORMATS.keys():
         raise CoarticError(
@@ -103,12 +106,13 @@ def build(
             "which report.md shows"
         )
     figures = Figures(study, methods, MOST_TASKS)
+    pictures = Pictures(figures, formats, processes)
     numbers = tuple(headline_numbers(study))
-    sections = [*_sections(study, figures), _about(study, figures, numbers, formats)]
+    sections = [*_sections(study, pictures), _about(study, figures, numbers, formats)]
     document = Document(
         _title(study.results), tuple(sections), _lead(study.results), study.run_ids
     )
-    return Report(document, tuple(figures.plots), numbers, tuple(formats))
+    return Report(document, pictures, numbers)
 
 
 def report_tables(study: Study) -> dict[str, pd.DataFrame]:
@@ -120,35 +124,36 @@ def report_tables(study: Study) -> dict[str, pd.DataFrame]:
     }
 
 
-def _sections(study: Study, figures: Figures | None) -> Iterator[Section]:
+def _sections(study: Study, pictures: Pictures | None) -> Iterator[Section]:
     """The sections that have something to show; without figures and films where None."""
 
     def drawn(section: FigureSection) -> list[FigureBlock]:
-        plots = [] if figures is None else figures.of_section(section)
+        if pictures is None:
+            return []
+        plots = pictures.sections[section]
         chart_of = charts(study, {plot.id: plot.data for plot in plots})
-        narrow = {} if figures is None or chart_of else figures.for_a_phone(section)
         return [
             FigureBlock(
-                *(plot.id, plot.title, escaped(plot.caption), plot.alt, svg_text(plot)),
+                *(plot.id, plot.title, escaped(plot.caption), plot.alt, pictures[plot.id].svg),
                 chart=chart_of.get(plot.id, ""),
-                narrow=svg_text(narrow[plot.id]) if plot.id in narrow else "",
+                narrow=pictures[plot.id].narrow,
             )
             for plot in plots
         ]
 
     limits = limitations(study)
-    pictures = {picture.id: picture for picture in drawn("answers")}
+    first = {picture.id: picture for picture in drawn("answers")}
     played = bool(one_by_one(study))  # of many instances alone there is too much to be played
-    player = _player(study) if figures is not None and played else None
+    player = _player(study) if pictures is not None and played else None
     sections = (
-        answers(study, pictures, player),
+        answers(study, first, player),
         families_section(study, drawn("families")),
         _section(
             "tasks-drawn", "Tasks", drawn("tasks-drawn"), [tasks_table(study)], _facts(study)
         ),
         _section("paper", "Paper", drawn("paper"), beside_paper(study), cells_found(study)),
         *(
-            [_claims(study, {} if figures is None else figures.like_the_paper)]
+            [_claims(study, {} if pictures is None else pictures.like_the_paper)]
             if of_the_paper(study) or any(map(address_of, study.tasks))
             else []
         ),
@@ -185,9 +190,7 @@ def write(
         "numbers.tex": numbers_tex(report.numbers, about),
         FILE: trace_json(study, report.document, report.numbers),
     }
-    figures: dict[str, bytes] = {}
-    for plot in report.plots:
-        figures |= rendered(plot, endings=report.formats)
+    figures = report.pictures.files()
     write_report(report.document, figures, folder, extra, printed=printed, begin=begin)
 
 

@@ -17,6 +17,8 @@ from coartic.files import folder_named
 from coartic.text import counted
 
 GROUP = "Read"
+PROCESSES = -1
+"""That draw the figures of a report: one a core."""
 
 
 def analyse(folder: given.ResultsFolder) -> None:
@@ -91,7 +93,7 @@ def report(
     with opened(folder) as first, opened(folder if other is None else other) as second:
         study = load(first)
         check_report_folder(out, first)
-        made = build(study, labels, endings)
+        made = build(study, labels, endings, processes=PROCESSES)
         if other is not None:
             against = load(second)
             found = compare_versions(study, against)
@@ -102,7 +104,7 @@ def report(
     say(
         f"{out / 'report.html'} is the report, made in {took:.0f} s. Beside it: report.md, "
         f"{'report.pdf, ' * pdf}{tables} (tables/, CSV and LaTeX), "
-        f"{counted(len(made.plots), 'figure')} (figures/, as {formats}), numbers.tex."
+        f"{counted(len(made.pictures.plots), 'figure')} (figures/, as {formats}), numbers.tex."
     )
 
 

@@ -7,8 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-import coartic.analysis.report.build
+import coartic.cli.reading
 from coartic.analysis.figures import register
+from coartic.analysis.report import pictures
 from coartic.analysis.report.build import build, write
 from coartic.analysis.report.formats.latex import PACKAGES
 
@@ -31,12 +32,9 @@ LATEX = r"""\documentclass{article}
 def undrawn():
     """Reports whose figures are empty: drawing takes long, and has tests of its own."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coartic.analysis.report.build, "svg_text", lambda plot: SVG)
-        patch.setattr(
-            coartic.analysis.report.build,
-            "rendered",
-            lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
-        )
+        patch.setattr(pictures, "svg_text", lambda plot: SVG)
+        patch.setattr(pictures, "rendered", lambda plot, endings: {f"{plot.id}.svg": SVG.encode()})
+        patch.setattr(coartic.cli.reading, "PROCESSES", 1)  # others know no patches
         yield
 
 
