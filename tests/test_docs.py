@@ -44,7 +44,7 @@ def test_figures_are_made_by_the_functions_that_are_named():
 
 def test_the_example_report():
     size = sum(path.stat().st_size for path in EXAMPLE.rglob("*") if path.is_file())
-    assert size < 8_500_000
+    assert size < 9_500_000
     assert (EXAMPLE / "report.html").stat().st_size < 6_000_000
     page = (EXAMPLE / "report.md").read_text(encoding="utf-8")
     pictures = re.findall(r"\((figures/[^)]+)\)", page)

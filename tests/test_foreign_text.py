@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
 
-import coartic.analysis.report.build
 import coartic.analysis.results.folder
 import coartic.analysis.study
 import coartic.benchmarks.registry
@@ -29,7 +28,6 @@ from coartic.analysis.comparisons.versions import compare_versions
 from coartic.analysis.figures.plot import svg_text
 from coartic.analysis.figures.tasks import tasks_plot
 from coartic.analysis.markup import code, escaped, markdown, markdown_text, words
-from coartic.analysis.report.build import build, write
 from coartic.analysis.report.comparison import comparison_document
 from coartic.analysis.report.document import (
     Bullets,
@@ -59,7 +57,7 @@ from coartic.tables import label_of
 from coartic.text import json_text, one_line, plain, printed, shell_line
 from tests.support.commands import call
 from tests.support.made_up import MadeUp, replanned
-from tests.support.reports import Page
+from tests.support.reports import Page, report_of
 from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, run_and_write, with_environment
 
@@ -500,15 +498,7 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
 @pytest.fixture(scope="module")
 def report(hostile, tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign") / "report"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coartic.analysis.report.build, "svg_text", lambda plot: SVG)
-        patch.setattr(
-            coartic.analysis.report.build, "rendered",
-            lambda plot, endings: {f"{plot.id}.svg": SVG.encode()},
-        )  # fmt: skip
-        study = Study(hostile)
-        write(build(study), study, folder)
-    return folder
+    return report_of(Study(hostile), folder)
 
 
 def test_report_page(report):

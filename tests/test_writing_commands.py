@@ -56,7 +56,7 @@ def test_interrupted_while_it_writes(interrupted, monkeypatch, tmp_path):
         begin()
         interrupt()
 
-    monkeypatch.setattr("coartic.analysis.report.build.build", lambda *_: None)
+    monkeypatch.setattr("coartic.analysis.report.build.build", lambda *_, **__: None)
     monkeypatch.setattr("coartic.analysis.report.build.write", write)
     out = tmp_path / "report"
     assert interrupted("report", tmp_path) == f"interrupted; {WITHIN.format(out)}\n"

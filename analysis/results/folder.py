@@ -74,7 +74,8 @@ class Results:
     def cells(self) -> dict[CellKey, CellRuns]:
         """The cells with their runs, in the order of the plan."""
         found, runs = {}, self.runs
-        rows = runs.groupby(["task", "method", "variant"], sort=False).indices
+        names_of = ["task", "method", "variant"]
+        rows = runs.groupby(names_of, sort=False).indices if len(runs) else {}
         for cell in self.manifest.specification.cells:
             names = cell.task, cell.method, cell.variant
             found[cell.task, cell.label] = CellRuns(*names, _taken(runs, rows.get(names, [])))
