@@ -72,7 +72,7 @@ def surroundings() -> Environment:
 
 def command() -> list[str]:
     """The command line of this process; that of a notebook's kernel says nothing."""
-    if "ipykernel" in Path(sys.argv[0]).name:
+    if "ipykernel" in sys.argv[0]:
         return ["a notebook"]
     return [plain(word) for word in (Path(sys.argv[0]).name, *sys.argv[1:])]
 

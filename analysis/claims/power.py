@@ -102,8 +102,8 @@ def seen_over_instances(samples: Sequence[Array], family: int) -> float:
 
     Of values of instances (n,), less their bound, in their unit. By the SDs that the samples show,
     for t-tests at the level that Holm's correction leaves the last of ``family`` claims, as if the
-    tests were of different instances: those of the same ones agree more often. Infinite where no
-    mean is enough, as with two instances without spread.
+    tests were of different instances: those of the same ones agree more often. NaN where none
+    varies, infinite where it is more than a hundred times the largest SD.
     """
     known = [(sd(values), len(values)) for values in samples]
 
@@ -112,8 +112,8 @@ def seen_over_instances(samples: Sequence[Array], family: int) -> float:
         return math.prod(chances) - POWER
 
     most = 100 * max(spread for spread, _ in known)
-    if most == 0:
-        return 0.0
+    if not most > 0:
+        return math.nan
     return float(optimize.brentq(short_of, 0.0, most)) if short_of(most) > 0 else math.inf
 
 

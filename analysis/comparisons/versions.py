@@ -205,7 +205,7 @@ def _compared(row: VersionRow, a: CellRuns, b: CellRuns) -> VersionRow:
     # What draws nothing has one result, whatever the seed.
     alike = not row.shared and len({*a.good.result, *b.good.result}) == 1
     if alike or row.identical == len(a.good) == len(b.good):
-        return replace(row, verdict="identical", paired=True, difference=0.0)
+        return replace(row, verdict="identical", paired=not alike, difference=0.0)
     before, after = paired_by_seed(a.good, b.good)
     paired = len(before) >= FEWEST
     samples: tuple[Array, Array | float] = after - before, 0.0

@@ -37,9 +37,7 @@ class Pictures:
         work: Iterable[Any] = (
             delayed(_pictured)(*plots, tuple(formats)) for plots in self._drawn(figures)
         )
-        if (
-            effective_n_jobs(processes) == 1
-        ):  # which takes up nothing before it is asked for a picture
+        if effective_n_jobs(processes) == 1:  # then none is begun before it is asked for
             work = list(work)
         made = Parallel(n_jobs=processes, return_as="generator", pre_dispatch="all")(work)
         self.plots = tuple(itertools.chain.from_iterable(self.sections.values()))
@@ -55,6 +53,8 @@ class Pictures:
 
     def __getitem__(self, name: str) -> Picture:
         """The figure's by its id, when it is made."""
+        if name not in {plot.id for plot in self.plots}:
+            raise KeyError(f"no figure {name!r}")
         while name not in self._made:
             done, picture = next(self._coming)
             self._made[done] = picture

@@ -255,7 +255,7 @@ def _bettered(known: Optimum, runs: pd.DataFrame) -> Optimum:
     best = solved.iloc[int(solved.reward.astype(int).argmax())]
     cell = str(best.task), label_of(str(best.method), str(best.variant))
     source = f"reward: {cell[1]} of this folder, more than by {known.source}"
-    cells = (*known.cells, cell)
+    cells = tuple(dict.fromkeys([*known.cells, cell]))
     return replace(
         known, reward=int(best.reward), hands=str(best.hands), source=source, cells=cells
     )

@@ -232,8 +232,9 @@ def regression(
         raise ValueError(f"{len(values)} instances are too few for {varies.sum()} properties")
     slopes = np.linalg.lstsq(design, values, rcond=None)[0]
     left = values - design @ slopes
+    spread_within = any(np.ptp(values[own]) > 0 for own in places)
     about = values - np.array([values[own].mean() for own in places]) @ members
-    explained = 1 - float(left @ left) / float(about @ about) if np.any(about) else math.nan
+    explained = 1 - float(left @ left) / float(about @ about) if spread_within else math.nan
     rng = np.random.default_rng(seed)
     counts = np.empty((RESAMPLES, len(values)))
     for own in places:

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
@@ -119,12 +119,23 @@ def performing(suite: str, folder: Path) -> Iterator[Display]:
             sys.exit(130)
 
 
+def _end_workers() -> None:
+    """Ends joblib's processes, which outlive a process that a signal ends."""
+    import psutil
+
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            if any("loky" in word for word in child.cmdline()):
+                child.kill()
+
+
 def if_interrupted(sentence: str) -> None:
     """What Ctrl-C says from here on, before it ends the process as ever."""
 
     def end(*_: object) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         say(f"interrupted; {sentence}", stream=sys.stderr)
+        _end_workers()
         signal.raise_signal(signal.SIGINT)
 
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as it is in the background

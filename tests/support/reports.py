@@ -13,7 +13,7 @@ from coartic.analysis.report import pictures
 from coartic.analysis.report.build import build, write
 from coartic.analysis.report.formats.latex import PACKAGES
 
-SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
 
 LATEX = r"""\documentclass{article}

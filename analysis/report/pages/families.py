@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -113,6 +114,7 @@ def _grown(study: Study, sample: Sample) -> Iterator[str]:
     """What a goal more costs methods without variants, the learner under one condition alone."""
     left_out = {INITIAL, EC2, EC3, *sample.searches}
     rows = [g for g in study.growth if not (" " in g.label or g.label in left_out)]
+    rows = [g for g in rows if not math.isnan(g.goals.slope)]  # goals that do not vary
     gaps, powers = (
         sorted((g for g in rows if g.what == what), key=lambda g: g.goals.slope)
         for what in ("gap", "kinematics")
@@ -146,15 +148,19 @@ def _known(sample: Sample) -> Iterator[str]:
     bounded = sum(r.bound is not None for r in known)
     beaten = sum(r.searched is not None and r.best > r.searched for r in known)
     found = over(learner_gaps(sample, to_bound=True), list(sample.families))
-    most = f"; to it the learner's gap is {_share(found)} of it" if found is not None else ""
-    if not bounded:
-        return
-    yield escaped(
-        f"The best known reward is proven to be the optimum on {proven} of "
-        f"{counted(len(known), 'instance')}, on {bounded - proven} others a bound is proven that "
-        f"it does not reach{most}. Gaps to the optimum lie between the two. Some method found "
-        f"more than the search for the optimum on {beaten}."
+    most = (
+        f"; to it the learner's gap, as a share of the bound, is {_share(found)}"
+        if found is not None
+        else ""
     )
+    if bounded:
+        yield escaped(
+            f"The best known reward is proven to be the optimum on {proven} of "
+            f"{counted(len(known), 'instance')}, on {bounded - proven} others a bound is proven "
+            f"that it does not reach{most}. Gaps to the optimum lie between the two."
+        )
+    if any(r.searched is not None for r in known):
+        yield f"Some method found more than the search for the optimum on {beaten}."
 
 
 def _seen(sample: Sample) -> Iterator[str]:
