@@ -126,22 +126,26 @@ def _families(claim: str) -> Sequence[str]:
     return found
 
 
-def _sign(data: Data, claim: str, sign: str, bound: float, unit: str) -> Finding:
-    """Whether a signature is beyond a bound in every family."""
+Parts = tuple[list[Array], list[str]]
+"""Values of instances by family, less their bound, and what was seen of each."""
+
+
+def _beyond(data: Data, claim: str, sign: str, bound: float, unit: str) -> Parts:
+    """By how much a signature is beyond a bound in every family."""
     samples, parts = [], []
     for family in _families(claim):
         own = _over(data, family, list(_signs(data, family, sign)))
         samples.append(own - bound)
         parts.append(f"{family} {shown(own, '.2f')}{unit} on {len(own)} instances")
-    return _held(samples, parts)
+    return samples, parts
 
 
 @decides("first-movement-sacrificed-in-general")
 def _first_movement(data: Data) -> Finding:
     claim = "first-movement-sacrificed-in-general"
-    first = _sign(data, claim, "first", ROUNDING, " ticks longer")
-    whole = _sign(data, claim, "whole", 0.0, " ticks shorter in all")
-    return _held((*first.samples, *whole.samples), (first.evidence, whole.evidence))
+    first, one = _beyond(data, claim, "first", ROUNDING, " ticks longer")
+    whole, two = _beyond(data, claim, "whole", 0.0, " ticks shorter in all")
+    return _held(first + whole, one + two)
 
 
 @decides("hand-coarticulation-in-general")
@@ -163,12 +167,13 @@ def _more_hands(data: Data, name: str) -> float | None:
 
 @decides("arm-coarticulation-in-general")
 def _arm(data: Data) -> Finding:
-    return _sign(data, "arm-coarticulation-in-general", "arm", 0.0, " ticks")
+    return _held(*_beyond(data, "arm-coarticulation-in-general", "arm", 0.0, " ticks"))
 
 
 @decides("other-arm-coarticulation-in-general")
 def _other_arm(data: Data) -> Finding:
-    return _sign(data, "other-arm-coarticulation-in-general", "other arm", 0.0, " of the way")
+    claim = "other-arm-coarticulation-in-general"
+    return _held(*_beyond(data, claim, "other arm", 0.0, " of the way"))
 
 
 @decides("corrective-ensures-in-general")
