@@ -6,8 +6,9 @@ methods were tuned, are not judged.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -115,10 +116,9 @@ def _mean_sign(data: Data, name: str, condition: str, sign: str) -> float | None
     return None if values is None else float(spread.mean(values))
 
 
-def _signs(data: Data, family: str, sign: str) -> Iterator[float | None]:
-    """Mean of a signature over the runs of the learner, of each instance."""
-    for name in _judged(data, family):
-        yield _mean_sign(data, name, _learner(data, name), sign)
+def _learned_sign(data: Data, sign: str, name: str) -> float | None:
+    """Mean of a signature over the runs of the learner on an instance."""
+    return _mean_sign(data, name, _learner(data, name), sign)
 
 
 def _families(claim: str) -> Sequence[str]:
@@ -130,33 +130,35 @@ Parts = tuple[list[Array], list[str]]
 """Values of instances by family, less their bound, and what was seen of each."""
 
 
-def _beyond(data: Data, claim: str, sign: str, bound: float, unit: str) -> Parts:
-    """By how much a signature is beyond a bound in every family."""
+def _beyond(
+    data: Data, claim: str, of: Callable[[str], float | None], unit: str, bound: float = 0.0
+) -> Parts:
+    """By how much what is measured of an instance is beyond a bound, in every family."""
     samples, parts = [], []
     for family in _families(claim):
-        own = _over(data, family, list(_signs(data, family, sign)))
+        own = _over(data, family, [of(name) for name in _judged(data, family)])
         samples.append(own - bound)
-        parts.append(f"{family} {shown(own, '.2f')}{unit} on {len(own)} instances")
+        parts.append(f"{family} {shown(own, '.2f')} {unit} on {len(own)} instances")
     return samples, parts
 
 
 @decides("first-movement-sacrificed-in-general")
 def _first_movement(data: Data) -> Finding:
     claim = "first-movement-sacrificed-in-general"
-    first, one = _beyond(data, claim, "first", ROUNDING, " ticks longer")
-    whole, two = _beyond(data, claim, "whole", 0.0, " ticks shorter in all")
+    first, one = _beyond(
+        data, claim, partial(_learned_sign, data, "first"), "ticks longer", ROUNDING
+    )
+    whole, two = _beyond(
+        data, claim, partial(_learned_sign, data, "whole"), "ticks shorter in all"
+    )
     return _held(first + whole, one + two)
 
 
 @decides("hand-coarticulation-in-general")
 def _hands(data: Data) -> Finding:
     """By learning, less what comes of taking the closest hand."""
-    samples, parts = [], []
-    for family in _families("hand-coarticulation-in-general"):
-        own = _over(data, family, [_more_hands(data, name) for name in _judged(data, family)])
-        samples.append(own)
-        parts.append(f"{family} {shown(own)} points on {len(own)} instances")
-    return _held(samples, parts)
+    claim = "hand-coarticulation-in-general"
+    return _held(*_beyond(data, claim, partial(_more_hands, data), "points"))
 
 
 def _more_hands(data: Data, name: str) -> float | None:
@@ -167,13 +169,14 @@ def _more_hands(data: Data, name: str) -> float | None:
 
 @decides("arm-coarticulation-in-general")
 def _arm(data: Data) -> Finding:
-    return _held(*_beyond(data, "arm-coarticulation-in-general", "arm", 0.0, " ticks"))
+    claim = "arm-coarticulation-in-general"
+    return _held(*_beyond(data, claim, partial(_learned_sign, data, "arm"), "ticks"))
 
 
 @decides("other-arm-coarticulation-in-general")
 def _other_arm(data: Data) -> Finding:
     claim = "other-arm-coarticulation-in-general"
-    return _held(*_beyond(data, claim, "other arm", 0.0, " of the way"))
+    return _held(*_beyond(data, claim, partial(_learned_sign, data, "other arm"), "of the way"))
 
 
 @decides("corrective-ensures-in-general")

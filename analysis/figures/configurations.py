@@ -215,7 +215,7 @@ def _draw(shown: Sequence[Solution]) -> Figure:
     figure.legend(
         handles=[*handles, before],
         loc="lower center",
-        ncols=min(4, int(style.widest() / 1.5)),
+        ncols=2 if style.narrow() else 4,
         borderaxespad=0.2,
     )
     bar = np.array([0.08, 0.08 + scale]) / style.widest()
@@ -236,7 +236,7 @@ def _panels(panels: Sequence[Axes], solution: Solution, low: Array, high: Array)
         draw_robot(axes, task, before, color=style.GREY)
         draw_goals(axes, task, current=k + 1)
         draw_robot(axes, task, q, marked=(hands[k],))
-        goal = f"goal {k + 1}: " if style.widest() > style.ONE else ""  # they stand in order
+        goal = "" if style.narrow() else f"goal {k + 1}: "  # they stand in order
         axes.set_title(f"{goal}{hands[k]}, {style.number(-ticks[k])}", fontsize=style.SMALL, pad=1)
         before = q
 

@@ -53,10 +53,8 @@ def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     labels = list(methods or main_methods(shown))
     spends = [spend for spend in SHOWN if (shown.spend == spend).any()]
     rows = -(-len(labels) // 4)
-    shape = style.row(len(spends))
-    size = style.widest(), (2.2 + 0.15 * rows) * shape[0]
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(*shape, squeeze=False, sharey=True).ravel()
+    figure = Figure(figsize=(style.TWO, 2.2 + 0.15 * rows), layout="constrained")
+    panels = figure.subplots(1, len(spends), squeeze=False, sharey=True).ravel()
     for axes, spend in zip(panels, spends, strict=True):
         _panel(axes, shown[shown.spend == spend], labels, NAMES[spend])
     panels[0].set_ylabel("levels of reward reached (%)")

@@ -103,7 +103,7 @@ def ranking(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     shown = data[data.task == data.task.iloc[0]]
     groups = [(told, shown[shown.told == told]) for told in GROUPS if (shown.told == told).any()]
     rows = len(shown) + len(groups)
-    figure = Figure(figsize=(style.widest(), 0.5 + 0.145 * rows), layout="constrained")
+    figure = Figure(figsize=(style.TWO, 0.5 + 0.145 * rows), layout="constrained")
     heights = [len(own) + 0.8 for _, own in groups]
     panels = figure.subplots(len(groups), squeeze=False, sharex=True, height_ratios=heights)
     for axes, (told, own) in zip(panels.ravel(), groups, strict=True):

@@ -86,9 +86,9 @@ def _plot(task: Task, slug: str, data: pd.DataFrame) -> Plot:
 
 def _matrix(data: pd.DataFrame, labels: Sequence[str], columns: Sequence[str]) -> Figure:
     """The figure: labels by columns, as large as they need."""
-    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), style.widest() / 2)
+    left = min(0.1 + 0.062 * max(len(short_name(label)) for label in labels), style.TWO / 2)
     above, right, below, tall = 1.38, 0.7, 0.06, 0.19  # inches
-    side = min((style.widest() - left - right) / len(columns), 0.6)
+    side = min((style.TWO - left - right) / len(columns), 0.6)
     width = style.column_width(left + side * len(columns) + right)
     side = (width - left - right) / len(columns)
     height = above + tall * len(labels) + below

@@ -123,6 +123,11 @@ def widest() -> float:
     return _WIDEST.get()
 
 
+def narrow() -> bool:
+    """Whether there is room for one column alone."""
+    return widest() <= ONE
+
+
 @contextmanager
 def on_a_phone() -> Iterator[None]:
     """Figures that are drawn within are one column wide: their panels stand below each other."""
@@ -145,13 +150,13 @@ def number(value: float, digits: int = 0) -> str:
 
 def grid(panels: int) -> tuple[int, int]:
     """Rows and columns of so many panels."""
-    columns = 1 if widest() <= ONE else min(2 if panels <= 6 else 3, panels)
+    columns = 1 if narrow() else min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
 
 
 def row(panels: int) -> tuple[int, int]:
     """Rows and columns of so many panels that stand side by side where there is room."""
-    return (panels, 1) if widest() <= ONE else (1, panels)
+    return (panels, 1) if narrow() else (1, panels)
 
 
 def task_panels(
@@ -186,7 +191,7 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
     """A legend below all panels, of fewer columns where the figure is narrow."""
-    if widest() <= ONE:
+    if narrow():
         columns = min(columns, 2)
         more = {"fontsize": SMALL - 1, "columnspacing": 0.8, **more}
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
