@@ -27,7 +27,7 @@ from coartic.benchmarks.run import plan_suite
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
 from coartic.compiled import addresses, entry, generator_at
 from coartic.exploration import ExplorationCondition
-from coartic.lanes import LANES, board, lanes_for, place
+from coartic.lanes import LANES, board, lanes_for, near, place
 from coartic.learner import rules_of
 from coartic.learning import METHOD_PREFIX, TRIALS, LearningRun, warm_up
 
@@ -206,13 +206,13 @@ def _grown() -> Iterator[tuple[str, Task, str, int]]:
 @entry
 def _board_all(lanes: Any, starts: Any, arm: Any) -> None:
     for lane in range(LANES):
-        board(lanes, lane, lane, starts[lane], arm)
+        board(lanes.at, lane, lane, starts[lane], arm)
 
 
 @entry
 def _place_often(at: Any, times: int) -> None:
     for _ in range(times):
-        place(at, LANES)
+        place(at, LANES, near(at, LANES))
 
 
 @entry

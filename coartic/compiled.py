@@ -32,6 +32,8 @@ from coartic.trigonometry import cosine, sine
 # Loops over the links of an arm are unrolled, or the loop over lanes around them could not be
 # made of vector instructions: LLVM's own bound ends that at four links.
 binding.set_option("coartic", "-unroll-threshold=1000")
+# Nor is the first lane taken out of a loop over whole vectors, which would leave seven over.
+binding.set_option("coartic", "-unroll-peel-max-count=0")
 
 PACKAGE = Path(__file__).parent
 F = TypeVar("F", bound=Callable[..., Any])

@@ -18,7 +18,9 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-from coartic.compiled import entry, inner, joint_chain, joint_lever, lanewise
+import numpy as np
+
+from coartic.compiled import entry, inlined, inner, joint_chain, joint_lever, lanewise
 from coartic.lanes import (
     GOING,
     board,
@@ -27,12 +29,15 @@ from coartic.lanes import (
     fill,
     lanes_for,
     leave,
+    near,
     place,
     whole,
+    winding,
 )
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import checked_goal, configuration
 from coartic.robot import BASE_DOF, Array, Hand, Robot
+from coartic.trigonometry import LARGEST
 
 _CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 # Of the smaller pivot of J Jᵀ, in units of its trace: nothing where J has full rank, above
@@ -122,22 +127,34 @@ def _stay_near(at: Any, count: int, how: Any) -> None:
             at.pulled[i] = 1.0 if moved else 0.0
 
 
+@inner
+def largest_square(length: float) -> float:
+    """The largest number whose square root, as it is rounded, does not exceed a length."""
+    square = length * length
+    while math.sqrt(square) > length:
+        square = np.nextafter(square, 0.0)
+    while math.sqrt(np.nextafter(square, math.inf)) <= length:
+        square = np.nextafter(square, math.inf)
+    return square
+
+
 @lanewise
-def _errors(at: Any, count: int, goal: Any, model: Any) -> None:
+def _errors(at: Any, count: int, goal: Any, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
     for i in range(whole(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
-        error = math.sqrt(error_x * error_x + error_y * error_y)
+        error = error_x * error_x + error_y * error_y
         fate = GOING if error < math.inf else _FAILED
-        at.fate[i] = _CONVERGED if error <= model.correction_tolerance else fate
+        at.fate[i] = _CONVERGED if error <= square else fate
 
 
-@lanewise
-def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> int:
-    """q += α Jᵀ e in every lane that goes on; number of lanes that have ended."""
+@inlined
+def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, bool]:
+    """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
     ended = 0
+    far = 0
     tip = len(at.length)
     for i in range(whole(count)):
         error_x = goal.x - at.x[tip, i]
@@ -158,7 +175,8 @@ def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> int:
         stuck = going & (not moved)
         at.fate[i] = _STUCK if stuck else at.fate[i]
         ended += 0 if (going & moved) | (i >= count) else 1
-    return ended
+        far += 0 if winding(at.q, i) < LARGEST else 1
+    return ended, far == 0
 
 
 @inner
@@ -172,33 +190,35 @@ def correct_lanes(
     at = lanes.at
     if how.nullspace_gain > 0.0:
         copy_lanes(at.q, at.start)
+    square = largest_square(model.correction_tolerance)
+    is_near = near(at, count)
     iteration = 0
     while count > 0:
-        place(at, count)
-        _errors(at, count, goal, model)
+        place(at, count, is_near)
+        _errors(at, count, goal, square)
         ended = count
         if iteration < model.max_iterations:
             if how.nullspace_gain > 0.0:
                 _stay_near(at, count, how)
-            ended = _descend(at, count, goal, how, model)
+            ended, is_near = _descend(at, count, goal, how, model)
         if ended > 0:
             for lane in range(count - 1, -1, -1):
                 if at.fate[lane] == GOING and iteration < model.max_iterations:
                     continue
-                run = lanes.run[lane]
-                leave(lanes, lane, found[run])
+                run = at.run[lane]
+                leave(at, lane, found[run])
                 ends.converged[run] = at.fate[lane] == _CONVERGED
                 ends.iterations[run] = iteration + (at.fate[lane] == _STUCK)
                 ends.evaluations[run] += ends.iterations[run] + 1
                 count -= 1
-                fill(lanes, lanes.corrected, lane, count)
+                fill(lanes.corrected, lane, count)
         iteration += 1
 
 
 @entry
 def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> None:
     """Correct ``q`` in place."""
-    board(lanes, 0, 0, q, arm)
+    board(lanes.at, 0, 0, q, arm)
     correct_lanes(lanes, 1, goal, how, model, q.reshape((1, len(q))), ends)
 
 

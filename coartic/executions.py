@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.compiled import entry, fill_row, inner
-from coartic.lanes import LANES, ends_of, lanes_for
+from coartic.lanes import LANES, depart, ends_of, lanes_for
 from coartic.model import MotionModel, checked_model
-from coartic.movement import LARGEST, depart, move_lanes
+from coartic.movement import LARGEST, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array, Hand
 from coartic.task import Task
@@ -74,7 +74,7 @@ def _move_chosen(number: int, arrives: bool, problem: Any, rows: Any, work: Any)
     for run in range(len(work.q)):
         if work.row[run] >= 0:
             arm = arm_of(problem, rows.hands[run, number])
-            depart(work.lanes, count, run, work.q[run], work.target[run], arm, problem.model)
+            depart(work.lanes.at, count, run, work.q[run], work.target[run], arm)
             count += 1
         if count == LANES or (run == len(work.q) - 1 and count > 0):
             move_lanes(

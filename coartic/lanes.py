@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import inner, lanewise
+from coartic.compiled import inlined, inner, lanewise
 from coartic.robot import BASE_DOF, Arm, Robot, chain
 from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
@@ -32,15 +32,10 @@ class Lanes(NamedTuple):
     at: Any
     """The rows, by name; see :func:`lanes_for`."""
     corrected: Any
-    """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``."""
+    """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``. Only to be
+    copied: some are integers."""
     moved: Any
     """Those of one that moves."""
-    run: Any
-    """Index of the run in each lane, shape ``(LANES,)``."""
-    first: Any
-    """Index in a configuration of the first joint of its arm."""
-    links: Any
-    """Number of links of its arm."""
 
 
 class Ends(NamedTuple):
@@ -64,54 +59,85 @@ def lanes_for(robot: Robot) -> Lanes:
     links = robot.most_links
     joints = (BASE_DOF + links,)
     corrected = {"q": joints, "pulled": ()}  # base x and y, then the joints of the arm
-    shared = {"length": (links,), "shoulder": (2,), "start": joints}
+    shared = {
+        "run": (),  # which is in the lane: its index
+        "first": (),  # index in a configuration of the first joint of its arm
+        "links": (),  # of its arm
+        "length": (links,),
+        "shoulder": (2,),
+        "start": joints,
+    }
     moved = {
         "target": joints,
         "rate": (links,),  # of the absolute link angles, rad a step
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
-        **dict.fromkeys(("step", "last", "whole", "distance", "speed", "bend"), ()),
+        "distance": (),  # from start to target; its square, before the arm sets off
+        **dict.fromkeys(("step", "last", "whole", "speed", "bend"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing
-    at = np.zeros(1, [(name, np.float64, (*shape, LANES)) for name, shape in shapes.items()])
+    kinds = dict.fromkeys(("run", "first", "links"), np.int64)
+    at = np.zeros(
+        1,
+        [(name, kinds.get(name, np.float64), (*shape, LANES)) for name, shape in shapes.items()],
+    )
     rows = at.view(np.float64).reshape(-1, LANES)
     first, last = _height(corrected), _height(corrected | shared)
-    return Lanes(
-        at[0],
-        rows[:last],
-        rows[first : last + _height(moved)],
-        *np.zeros((3, LANES), np.int64),
-    )
+    return Lanes(at[0], rows[:last], rows[first : last + _height(moved)])
 
 
 def _height(shapes: Mapping[str, tuple[int, ...]]) -> int:
     return sum(math.prod(shape) for shape in shapes.values())
 
 
-@inner
-def board(lanes: Any, lane: int, run: int, q: Any, arm: Any) -> None:
-    """Put an arm into a lane, where the robot is in configuration ``q``."""
-    at = lanes.at
-    lanes.run[lane], lanes.first[lane], lanes.links[lane] = run, arm.first, len(arm.links)
-    at.pulled[lane] = 0.0
+@inlined
+def _seat(at: Any, lane: int, run: int, arm: Any) -> None:
+    """Say whose arm is in a lane, and what it is like."""
+    at.run[lane], at.first[lane], at.links[lane] = run, arm.first, len(arm.links)
     at.shoulder[0, lane] = arm.shoulder_x
     at.shoulder[1, lane] = arm.shoulder_y
-    at.q[0, lane] = q[0]
-    at.q[1, lane] = q[1]
     for k in range(len(at.length)):
-        own = k < len(arm.links)
-        at.length[k, lane] = arm.links[k] if own else 0.0
-        at.q[BASE_DOF + k, lane] = q[arm.first + k] if own else 0.0
+        at.length[k, lane] = arm.links[k] if k < len(arm.links) else 0.0
 
 
-@inner
-def leave(lanes: Any, lane: int, q: Any) -> None:
+@inlined
+def _copy_arm(row: Any, lane: int, q: Any, arm: Any) -> None:
+    """Copy the base and an arm's joints of a configuration into a lane."""
+    row[0, lane] = q[0]
+    row[1, lane] = q[1]
+    for k in range(len(row) - BASE_DOF):
+        row[BASE_DOF + k, lane] = q[arm.first + k] if k < len(arm.links) else 0.0
+
+
+@inlined
+def board(at: Any, lane: int, run: int, q: Any, arm: Any) -> None:
+    """Put an arm into a lane, where the robot is in configuration ``q``."""
+    _seat(at, lane, run, arm)
+    _copy_arm(at.q, lane, q, arm)
+    at.pulled[lane] = 0.0
+
+
+@inlined
+def depart(at: Any, lane: int, run: int, q: Any, target: Any, arm: Any) -> None:
+    """Put an arm into a lane that the robot is to move from ``q`` to ``target``."""
+    _seat(at, lane, run, arm)
+    _copy_arm(at.start, lane, q, arm)
+    _copy_arm(at.target, lane, target, arm)
+    square = 0.0
+    for j in range(len(q)):
+        delta = target[j] - q[j]
+        square += delta * delta
+    at.distance[lane] = square
+
+
+@inlined
+def leave(at: Any, lane: int, q: Any) -> None:
     """Copy the arm of a lane into ``q``."""
-    q[0] = lanes.at.q[0, lane]
-    q[1] = lanes.at.q[1, lane]
-    for k in range(lanes.links[lane]):
-        q[lanes.first[lane] + k] = lanes.at.q[BASE_DOF + k, lane]
+    q[0] = at.q[0, lane]
+    q[1] = at.q[1, lane]
+    for k in range(at.links[lane]):
+        q[at.first[lane] + k] = at.q[BASE_DOF + k, lane]
 
 
 @inner
@@ -122,16 +148,12 @@ def copy_lanes(source: Any, destination: Any) -> None:
             destination[j, i] = source[j, i]
 
 
-@inner
-def fill(lanes: Any, rows: Any, lane: int, last: int) -> None:
-    """Move ``rows`` of the last lane into one that has ended."""
-    if lane == last:
-        return
-    lanes.run[lane] = lanes.run[last]
-    lanes.first[lane] = lanes.first[last]
-    lanes.links[lane] = lanes.links[last]
-    for row in range(len(rows)):
-        rows[row, lane] = rows[row, last]
+@inlined
+def fill(rows: Any, lane: int, last: int) -> None:
+    """Move rows of the last lane into one that has ended."""
+    if lane != last:
+        for row in range(len(rows)):
+            rows[row, lane] = rows[row, last]
 
 
 @inner
@@ -147,15 +169,21 @@ _chain = inner(chain)
 
 
 @lanewise
-def _near(at: Any, count: int) -> bool:
-    """Whether no link's angle is too large for the kernels' own cosine."""
+def near(at: Any, count: int) -> bool:
+    """Whether no lane's angles are too large for the kernels' own cosine."""
     far = 0
-    for i in range(count):
-        angle = 0.0
-        for k in range(len(at.length)):
-            angle = angle + at.q[BASE_DOF + k, i]
-            far += 0 if abs(angle) < LARGEST else 1
+    for i in range(whole(count)):
+        far += 0 if winding(at.q, i) < LARGEST else 1
     return far == 0
+
+
+@inlined
+def winding(q: Any, lane: int) -> float:
+    """Bound on the angle of every link of an arm, rad: all its joints' together."""
+    total = 0.0
+    for k in range(len(q) - BASE_DOF):
+        total += abs(q[BASE_DOF + k, lane])
+    return total
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
@@ -175,9 +203,9 @@ _far_chains = _chains_by(cosine, sine)
 
 
 @inner
-def place(at: Any, count: int) -> None:
-    """Forward kinematics of every lane: fill ``x`` and ``y``."""
-    if _near(at, whole(count)):
+def place(at: Any, count: int, is_near: bool) -> None:
+    """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near`` says :func:`near`."""
+    if is_near:
         _near_chains(at, whole(count))
     else:
         _far_chains(at, whole(count))

@@ -26,8 +26,8 @@ import numpy as np
 from coartic.compiled import entry, fill_row, generator_at, inlined, inner, joint_chain
 from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
-from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
-from coartic.movement import Scratch, depart, move_lanes, scratch_for
+from coartic.lanes import LANES, Ends, Lanes, board, depart, ends_of, lanes_for
+from coartic.movement import Scratch, move_lanes, scratch_for
 from coartic.problem import arm_of, goal_of
 from coartic.robot import HANDS
 from coartic.task import Task
@@ -364,7 +364,7 @@ def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
     for run in range(len(work.q)):
         if work.acting[run]:
             arm = arm_of(problem, work.hand[run])
-            depart(lanes, count, run, work.q[run], work.target[run], arm, problem.model)
+            depart(lanes.at, count, run, work.q[run], work.target[run], arm)
             count += 1
     goal = goal_of(problem, number)
     stops = kind == LEARNED or problem.model.corrective_arrival
@@ -397,7 +397,7 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
             work.going[run] = False
         else:
             fill_row(work.target[run], work.q[run])
-            board(lanes, count, run, work.q[run], arm_of(problem, work.hand[run]))
+            board(lanes.at, count, run, work.q[run], arm_of(problem, work.hand[run]))
             count += 1
             work.acting[run] = True
     goal = goal_of(problem, number)

@@ -23,8 +23,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from coartic import trigonometry
 from coartic.compiled import entry, fill_row, inner, lanewise
-from coartic.lanes import GOING, board, copy_lanes, ends_of, fill, lanes_for, place, whole
+from coartic.lanes import (
+    GOING,
+    copy_lanes,
+    depart,
+    ends_of,
+    fill,
+    lanes_for,
+    place,
+    whole,
+    winding,
+)
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
@@ -80,46 +91,41 @@ def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
     """
     gap -= _CLEARANCE
     root = math.sqrt(closing * closing + 2.0 * bend * gap)
-    approaching = 2.0 * gap / (closing + root)
-    leaving = (root - closing) / bend if bend > 0.0 else math.inf
-    curved = approaching if closing > 0.0 else leaving
+    approaching = closing > 0.0
+    way = 2.0 * gap if approaching else root - closing
+    rate = closing + root if approaching else bend
+    curved = way / rate if rate > 0.0 else math.inf
     straight = gap / speed if speed > 0.0 else math.inf
     steps = max(straight, curved) * (1.0 - 1e-9)
     return steps if gap > 0.0 else 0.0
 
 
-@inner
-def depart(lanes: Any, lane: int, run: int, q: Any, target: Any, arm: Any, model: Any) -> None:
-    """Put an arm into a lane, on its way from ``q`` to ``target``."""
-    board(lanes, lane, run, q, arm)
-    at = lanes.at
-    for j in range(len(at.q)):
-        joint = j if j < BASE_DOF else j - BASE_DOF + arm.first
-        own = j < BASE_DOF + len(arm.links)
-        at.start[j, lane] = q[joint] if own else 0.0
-        at.target[j, lane] = target[joint] if own else 0.0
-
-    square = 0.0
-    for j in range(len(q)):
-        delta = target[j] - q[j]
-        square += delta * delta
-    distance = math.sqrt(square)
-    per_step = model.step / distance if distance > 0.0 else 0.0
-    base_x = (target[0] - q[0]) * per_step
-    base_y = (target[1] - q[1]) * per_step
-    speed = math.sqrt(base_x * base_x + base_y * base_y)
-    bend = 0.0
-    rate = 0.0
-    for k in range(len(at.length)):
-        rate += (at.target[BASE_DOF + k, lane] - at.start[BASE_DOF + k, lane]) * per_step
-        at.rate[k, lane] = rate
-        speed += at.length[k, lane] * abs(rate)
-        bend += at.length[k, lane] * rate * rate
-    at.base_rate[0, lane], at.base_rate[1, lane] = base_x, base_y
-    at.distance[lane], at.speed[lane], at.bend[lane] = distance, speed, bend
-    last = math.ceil(distance / model.step)
-    at.step[lane], at.last[lane] = 0.0, last
-    at.whole[lane] = -1.0 if model.whole_last_step and last > 0.0 else last
+@lanewise
+def _set_off(at: Any, count: int, model: Any) -> bool:
+    """Rates, bounds and number of steps of every lane; whether all stay :func:`near`."""
+    far = 0
+    for i in range(whole(count)):
+        distance = math.sqrt(at.distance[i])
+        per_step = model.step / distance if distance > 0.0 else 0.0
+        base_x = (at.target[0, i] - at.start[0, i]) * per_step
+        base_y = (at.target[1, i] - at.start[1, i]) * per_step
+        speed = math.sqrt(base_x * base_x + base_y * base_y)
+        bend = 0.0
+        rate = 0.0
+        for k in range(len(at.length)):
+            rate += (at.target[BASE_DOF + k, i] - at.start[BASE_DOF + k, i]) * per_step
+            at.rate[k, i] = rate
+            speed += at.length[k, i] * abs(rate)
+            bend += at.length[k, i] * rate * rate
+        at.base_rate[0, i], at.base_rate[1, i] = base_x, base_y
+        at.distance[i], at.speed[i], at.bend[i] = distance, speed, bend
+        last = np.ceil(distance / model.step)
+        at.step[i], at.last[i] = 0.0, last
+        at.whole[i] = -1.0 if model.whole_last_step & (last > 0.0) else last
+        # No joint turns farther than at the farther end, and, where it passes it, a step.
+        most = winding(at.start, i) + winding(at.target, i) + model.step * len(at.length)
+        far += 0 if most < trigonometry.LARGEST else 1
+    return far == 0
 
 
 @lanewise
@@ -188,22 +194,23 @@ def move_lanes(
     """
     at = lanes.at
     evaluations = 0
+    is_near = _set_off(at, count, model)
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
-        place(at, count)
+        place(at, count, is_near)
         fill_row(at.end[0], at.x[-1])
         fill_row(at.end[1], at.y[-1])
         evaluations += 1
     while count > 0:
         _go(at, count, model)
-        place(at, count)
+        place(at, count, is_near)
         evaluations += 1
         if _look(at, count, goal, stop_on_arrival, model) == 0:
             continue
         for lane in range(count - 1, -1, -1):
             if at.fate[lane] == GOING:
                 continue
-            run = lanes.run[lane]
+            run = at.run[lane]
             arrived = at.step[lane] == at.whole[lane]
             fraction = 0.0 if arrived else at.step[lane] * model.step / at.distance[lane]
             for j in range(q.shape[1]):
@@ -213,7 +220,7 @@ def move_lanes(
             ends.ticks[run] = int(at.step[lane]) + model.arrival_tick
             ends.evaluations[run] += evaluations
             count -= 1
-            fill(lanes, lanes.moved, lane, count)
+            fill(lanes.moved, lane, count)
 
 
 @entry
@@ -228,7 +235,7 @@ def _move_one(
     ends: Any,
 ) -> None:
     """Move ``q`` in place."""
-    depart(lanes, 0, 0, q, target, arm, model)
+    depart(lanes.at, 0, 0, q, target, arm)
     shape = (1, len(q))
     move_lanes(
         lanes, 1, goal, stop_on_arrival, model, q.reshape(shape), target.reshape(shape), ends

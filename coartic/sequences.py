@@ -16,9 +16,9 @@ import numpy as np
 
 from coartic.compiled import entry, fill_row, inner
 from coartic.corrective import correct_lanes
-from coartic.lanes import board, ends_of, lanes_for
+from coartic.lanes import board, depart, ends_of, lanes_for
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import LARGEST, Goal, depart, move_lanes
+from coartic.movement import LARGEST, Goal, move_lanes
 from coartic.problem import arm_of, problem_of
 from coartic.robot import HANDS, Array
 from coartic.task import Task, hands_of
@@ -54,13 +54,13 @@ def _hit(g: int, problem: Any, path: Any, lanes: Any, ends: Any) -> None:
     fill_row(target[0], path.q[g])
     if not math.isnan(path.ticks[g]):
         # A movement to where the robot is tells whether it stands in the goal already.
-        depart(lanes, 0, 0, q[0], target[0], arm, problem.model)
+        depart(lanes.at, 0, 0, q[0], target[0], arm)
         move_lanes(lanes, 1, goal, False, problem.model, q, target, ends)
         if not ends.hit[0]:
-            board(lanes, 0, 0, q[0], arm)
+            board(lanes.at, 0, 0, q[0], arm)
             correct_lanes(lanes, 1, goal, problem.corrector, problem.model, target, ends)
             if ends.converged[0]:
-                depart(lanes, 0, 0, q[0], target[0], arm, problem.model)
+                depart(lanes.at, 0, 0, q[0], target[0], arm)
                 stops = problem.model.corrective_arrival
                 move_lanes(lanes, 1, goal, stops, problem.model, q, target, ends)
                 path.ticks[g + 1] += ends.ticks[0]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from coartic.compiled import entry, fill_row, inner
 from coartic.corrective import correct_lanes
-from coartic.lanes import LANES, Ends, Lanes, board, ends_of, lanes_for
+from coartic.lanes import LANES, Ends, Lanes, board, depart, ends_of, lanes_for
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import LARGEST, depart, move_lanes
+from coartic.movement import LARGEST, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array
 from coartic.task import Task, hands_of
@@ -81,7 +81,7 @@ def _depart(arm: Any, problem: Any, work: Any) -> int:
     for trial in range(len(work.q)):
         if work.acting[trial]:
             q, target = work.q[trial], work.target[trial]
-            depart(work.lanes, count, trial, q, target, arm, problem.model)
+            depart(work.lanes.at, count, trial, q, target, arm)
             count += 1
     return count
 
@@ -119,7 +119,7 @@ def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: An
         work.acting[trial] = work.going[trial] and not ends.hit[trial]
         if work.acting[trial]:
             fill_row(work.target[trial], work.q[trial])
-            board(lanes, count, trial, work.q[trial], arm)
+            board(lanes.at, count, trial, work.q[trial], arm)
             count += 1
     correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
     for trial in range(len(work.q)):

@@ -1,5 +1,7 @@
 """The corrective process against its definition, and what it must leave alone."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct, reference
 from coartic.compiled import entry
-from coartic.corrective import shift_kernel
+from coartic.corrective import largest_square, shift_kernel
 from coartic.movement import Goal, scratch_for
 from coartic.robot import HANDS
 from tests.support.strategies import UNEVEN, configurations
@@ -33,6 +35,29 @@ def test_equals_the_matrix_form(robot, data, hand, goal, locked):
     if fast.converged:
         assert fast.iterations == slow.iterations
         np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
+
+
+@entry
+def _largest(length):
+    return largest_square(length)
+
+
+@settings(max_examples=200)
+@given(length=st.floats(1e-9, 1e5) | st.sampled_from([0.0, 1e-200, 0.001, 0.01, 0.1]))
+def test_a_square_within_the_largest_has_a_root_within_the_length(length):
+    """Errors are compared by their squares: to the last bit as by themselves."""
+    square = _largest(length)
+    assert math.sqrt(square) <= length < math.sqrt(math.nextafter(square, math.inf))
+
+
+@pytest.mark.parametrize("turn", [3e4, -6e4, 9.9e4])  # rad; a link's angle is the sum of joints'
+def test_equals_the_matrix_form_where_the_arm_is_wound_up(turn):
+    q = np.array([0.3, -0.2, *np.linspace(0.1, 0.8, 8)])
+    q[2:] += turn * np.array([1, 1, 1, 1, 1, -1, 1, 1])
+    for hand in HANDS:
+        fast, slow = (way(ROBOT, q, hand, (3.0, 2.0)) for way in (correct, reference.correct))
+        assert (fast.converged, fast.iterations) == (True, slow.iterations)
+        np.testing.assert_allclose(fast.q, slow.q, atol=1e-6)
 
 
 @pytest.mark.parametrize("hand", HANDS)
