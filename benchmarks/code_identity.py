@@ -28,17 +28,16 @@ def built_in_code(module: str) -> str:
     """Hash for a method of this project, defined in ``module``, with all of ``baselines`` it
     imports."""
     if module.startswith("coartic.") and not module.startswith(_BASELINES):
-        return _code_hash([])  # part of the model's code anyway
+        return _hash([])  # part of the model's code anyway
     found: dict[str, bytes] = {}
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        path = PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")
-        if name in found or not name.startswith(_BASELINES) or not path.is_file():
+        if name in found or not name.startswith(_BASELINES):
             continue
-        found[name] = _text(path)
-        waiting += _imported(found[name], name)
-    return _code_hash(found[name] for name in sorted(found))
+        found[name], imported = _baseline(name)
+        waiting += imported
+    return _hash(found[name] for name in sorted(found))
 
 
 @cache
@@ -60,17 +59,20 @@ def foreign_code(foreign: Foreign) -> str:
     """
     if foreign.kind == "installed":
         root = foreign.where.partition(":")[0].partition(".")[0]
-        return _code_hash(map(_text, _files_of(root)))
+        return _hash(_essence(_tree(_text(path))) for path in _files_of(root))
     local: dict[str, list[Path]] = {}
-    waiting = _imported(foreign.source, foreign.where)
+    waiting = _imported(_tree(foreign.source, foreign.where))
     while waiting:
         root = waiting.pop().partition(".")[0]
         if root in local or root in sys.stdlib_module_names or root == "coartic":
             continue
         local[root] = [path for path in _files_of(root) if "site-packages" not in path.parts]
-        waiting += [name for path in local[root] for name in _imported(_text(path), str(path))]
+        waiting += [
+            name for path in local[root] for name in _imported(_tree(_text(path), str(path)))
+        ]
     files = [path for root in sorted(local) for path in local[root]]
-    return _code_hash([foreign.source, *map(_text, files)], foreign.where)
+    sources = [foreign.source, *map(_text, files)]
+    return _hash(_essence(_tree(source, foreign.where)) for source in sources)
 
 
 def _files_of(root: str) -> list[Path]:
@@ -87,9 +89,19 @@ def _files_of(root: str) -> list[Path]:
     return [Path(spec.origin)] if spec.origin and spec.origin.endswith(".py") else []
 
 
-def _imported(source: str | bytes, name: str) -> list[str]:
+@cache
+def _baseline(name: str) -> tuple[bytes, list[str]]:
+    """What counts of a module of this project, and what it imports: many methods share it."""
+    path = PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")
+    if not path.is_file():  # a name within a module
+        return b"", []
+    tree = _tree(_text(path), name)
+    return _essence(tree), _imported(tree)
+
+
+def _imported(tree: ast.Module) -> list[str]:
     names: list[str] = []
-    for node in ast.walk(_tree(source, name)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -97,10 +109,10 @@ def _imported(source: str | bytes, name: str) -> list[str]:
     return names
 
 
-def _code_hash(sources: Iterable[str | bytes], name: str = "") -> str:
+def _hash(essences: Iterable[bytes]) -> str:
     digest = hashlib.sha256(_model())
-    for source in sources:
-        digest.update(_essence(source, name))
+    for essence in essences:
+        digest.update(essence)
     return digest.hexdigest()[:12]
 
 
@@ -108,7 +120,7 @@ def _code_hash(sources: Iterable[str | bytes], name: str = "") -> str:
 def _model() -> bytes:
     """The model, and the worker that hands it to methods."""
     return b"".join(
-        path.name.encode() + _essence(_text(path), str(path)) for path in _model_files()
+        path.name.encode() + _essence(_tree(_text(path), str(path))) for path in _model_files()
     )
 
 
@@ -116,9 +128,8 @@ def _model_files() -> list[Path]:
     return [*model_files(), Path(__file__).with_name("worker.py")]
 
 
-def _essence(source: str | bytes, name: str) -> bytes:
-    """A module's syntax tree without docstrings."""
-    tree = _tree(source, name)
+def _essence(tree: ast.Module) -> bytes:
+    """A module's syntax tree without docstrings, which it loses."""
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
@@ -135,7 +146,7 @@ def _is_text(node: ast.AST) -> bool:
     )
 
 
-def _tree(source: str | bytes, name: str) -> ast.Module:
+def _tree(source: str | bytes, name: str = "<method>") -> ast.Module:
     try:
         return ast.parse(source, name or "<method>")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:

@@ -6,6 +6,7 @@ it is called, so that help and completion are there at once.
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import signal
@@ -57,6 +58,7 @@ for group, commands in (
 
 def main() -> None:
     """Run the command line; exit code 2 for what the user can put right."""
+    gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")

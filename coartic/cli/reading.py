@@ -213,7 +213,6 @@ def cite(
 ) -> None:
     """Print what to cite: the software, the paper, and the methods of a results folder."""
     from coartic.analysis.citations import MethodSource, bibliography
-    from coartic.analysis.results.folder import load_results
     from coartic.benchmarks.registry import CLASSES
     from coartic.record import BUILT_IN
 
@@ -225,6 +224,8 @@ def cite(
             MethodSource(item.name, item.title, item.citation, True) for item in CLASSES.values()
         ]
     else:
+        from coartic.analysis.results.folder import load_results  # and pandas
+
         manifest = load_results(folder).manifest
         environment = manifest.environment.model_dump(mode="json")
         methods = [

@@ -24,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -834,16 +835,51 @@ def attack(root: Path, cases: Sequence[str] = (), *, words: bool = True) -> list
         kept = {key: os.environ[key] for key in ("PATH", "LANG", "TMPDIR") if key in os.environ}
         env = kept | {"HOME": name, "PYTHONPATH": str(root), "COLUMNS": "250", "NO_COLOR": "1"}
         (folder / "cases.json").write_text(json.dumps(list(cases)), encoding="utf-8")
-        command = [sys.executable, "-P", __file__, "--here"]
-        done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
-        if done.returncode:
-            raise RuntimeError(f"the attack on {root} itself failed: {done.stderr[-2000:]}")
+        with (folder / "failed.txt").open("w+") as failed:
+            if _is_loaded(root):
+                code = _forked(folder, env, failed.fileno())
+            else:
+                command = [sys.executable, "-P", __file__, "--here"]
+                code = subprocess.run(command, cwd=folder, env=env, stderr=failed).returncode
+            if code:
+                failed.seek(0)
+                raise RuntimeError(f"the attack on {root} itself failed: {failed.read()[-2000:]}")
         outcomes = json.loads((folder / "outcomes.json").read_text(encoding="utf-8"))
     for outcome in outcomes:
         outcome["problems"] = tuple(
             text for text in outcome["problems"] if words or not text.startswith(_OTHER_WORDS)
         )
     return [Outcome(**outcome) for outcome in outcomes]
+
+
+def _is_loaded(root: Path) -> bool:
+    """Whether this process has imported that checkout: a fork of it need not do so again."""
+    found = getattr(sys.modules.get("coartic.cli"), "__file__", None)
+    return found is not None and Path(found).is_relative_to(root / "coartic")
+
+
+def _forked(folder: Path, env: Mapping[str, str], stderr: int) -> int:
+    """Exit code of :func:`_here` in a fork of this process, which is as if it had just begun,
+    whatever runs tests in this one."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    try:
+        os.dup2(stderr, 2)
+        sys.stdin = open(0, closefd=False)
+        sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))
+        warnings.resetwarnings()
+        for category in (DeprecationWarning, PendingDeprecationWarning, ResourceWarning):
+            warnings.simplefilter("ignore", category)
+        os.environ.clear()
+        os.environ.update(env)
+        os.chdir(folder)
+        _here()
+        os._exit(0)
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+    os._exit(1)
 
 
 # What follows runs in the surroundings of the checkout that is attacked.
