@@ -71,7 +71,7 @@ def foreign_code(foreign: Foreign) -> str:
             name for path in local[root] for name in _imported(_tree(_text(path), str(path)))
         ]
     files = [path for root in sorted(local) for path in local[root]]
-    sources = [foreign.source, *map(_text, files)]
+    sources: list[str | bytes] = [foreign.source, *map(_text, files)]
     return _hash(_essence(_tree(source, foreign.where)) for source in sources)
 
 

@@ -3,6 +3,8 @@
 import gc
 import os
 import signal
+import socket
+import subprocess
 
 import pytest
 from filelock import FileLock
@@ -57,6 +59,34 @@ def _unsynced():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda number: None)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _nursery():
+    """Sandboxes begin as forks where that is possible: imports and kernels take a hundred times
+    as long. That they can begin by themselves is for some tests of sandboxes, and for all that
+    run a suite in a process of its own."""
+    from coartic.benchmarks import sandbox
+    from tests.support.nursery import Nursery
+
+    if not (hasattr(os, "fork") and hasattr(socket, "SOCK_SEQPACKET")):
+        yield
+        return
+    nursery = Nursery()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sandbox, "subprocess", nursery)
+        yield
+    sandbox.close_all()
+    nursery.close()
+
+
+@pytest.fixture
+def sandboxes_by_themselves(monkeypatch):
+    """No nursery, and no sandbox of earlier tests."""
+    from coartic.benchmarks import sandbox
+
+    sandbox.close_all()
+    monkeypatch.setattr(sandbox, "subprocess", subprocess)
 
 
 @pytest.fixture(autouse=True)

@@ -87,7 +87,7 @@ def no_sandbox_before():
 @pytest.mark.usefixtures("no_sandbox_before")
 def test_a_killed_worker_is_a_crash_with_its_signal(known):
     sandbox = Sandbox()
-    (worker,) = workers_of(os.getpid())
+    (worker,) = workers()
     os.kill(worker, signal.SIGKILL)
     answer = sandbox.ask(PREPARE, 60.0)
     assert isinstance(answer, Failure)
@@ -96,10 +96,10 @@ def test_a_killed_worker_is_a_crash_with_its_signal(known):
     assert not sandbox.alive
 
 
-@pytest.mark.usefixtures("no_sandbox_before")
+@pytest.mark.usefixtures("sandboxes_by_themselves")
 def test_a_worker_does_not_outlive_its_guard():
     own = Sandbox()
-    (worker,) = map(psutil.Process, workers_of(os.getpid()))
+    (worker,) = map(psutil.Process, workers())
     worker.suspend()  # it would answer still
     worker.parent().kill()
     answer = own.ask(PREPARE, 60.0)
@@ -113,7 +113,7 @@ def test_a_worker_does_not_outlive_its_guard():
 def test_a_question_that_nobody_reads_is_not_waited_for():
     """It is larger than what a pipe holds, and its worker stands still."""
     own = Sandbox()
-    (worker,) = workers_of(os.getpid())
+    (worker,) = workers()
     os.kill(worker, signal.SIGSTOP)
     clock = time.monotonic()
     answer = own.ask({"question": "x" * 10_000_000}, 0.3)
@@ -132,7 +132,7 @@ def test_a_worker_killed_from_outside_loses_nothing(known, tmp_path):
         def perform(self, jobs):
             for index, answer in enumerate(super().perform(jobs)):
                 if index == 0:  # the next run has begun
-                    (worker,) = workers_of(os.getpid())
+                    (worker,) = workers()
                     os.kill(worker, signal.SIGKILL)
                 yield answer
 
@@ -140,26 +140,9 @@ def test_a_worker_killed_from_outside_loses_nothing(known, tmp_path):
     assert (progress.done, progress.failed) == (3, 0)
 
 
-def workers_of(pid):
-    """Process ids of the workers at work below a process."""
-    parents = {}
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (entry / "stat").read_text().rpartition(")")[2].split()
-            parents[int(entry.name)] = (int(fields[1]), (entry / "cmdline").read_bytes())
-        except (OSError, ValueError):
-            continue
-
-    def below(child):
-        while child in parents:
-            child = parents[child][0]
-            if child == pid:
-                return True
-        return False
-
-    return [
-        p for p, (_, line) in parents.items() if b"coartic.benchmarks.worker" in line and below(p)
-    ]
+def workers():
+    """Process ids of the workers at work below this process."""
+    return [one._worker.pid for one in sandbox._open if one.alive]
 
 
 @pytest.fixture(scope="module")
@@ -179,9 +162,8 @@ def test_one_sandbox_performs_many_jobs_and_says_warm(known, shared):
 
 def test_the_clock_stops_where_the_run_is_stopped(known, shared):
     (spec,) = spec_of(known, "test/naps", Limits(1.0))
-    own = os.getpid()
-    stop = threading.Timer(0.3, lambda: [os.kill(p, signal.SIGSTOP) for p in workers_of(own)])
-    go_on = threading.Timer(2.0, lambda: [os.kill(p, signal.SIGCONT) for p in workers_of(own)])
+    stop = threading.Timer(0.3, lambda: [os.kill(p, signal.SIGSTOP) for p in workers()])
+    go_on = threading.Timer(2.0, lambda: [os.kill(p, signal.SIGCONT) for p in workers()])
     (warm,) = spec_of(known, "test/good")
     shared(warm)
     stop.start()
@@ -371,12 +353,12 @@ def test_a_run_that_was_disturbed_is_tried_again_in_fresh_processes(
     assert [one.jobs for one in counted.made] == [["x"]] * tries
 
 
-@pytest.mark.usefixtures("no_sandbox_before")
+@pytest.mark.usefixtures("sandboxes_by_themselves")
 def test_a_line_from_elsewhere_is_no_answer():
     """Whoever may write into a worker's stream does not know what it was asked."""
     own = Sandbox()
     try:
-        (worker,) = workers_of(os.getpid())
+        (worker,) = workers()
         stream = next(
             path for path in Path(f"/proc/{worker}/fd").iterdir()
             if os.readlink(path) == os.readlink(f"/proc/self/fd/{own._guard.stdout.fileno()}")

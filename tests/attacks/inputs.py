@@ -866,8 +866,8 @@ def _forked(folder: Path, env: Mapping[str, str], stderr: int) -> int:
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     try:
         os.dup2(stderr, 2)
-        sys.stdin = open(0, closefd=False)
-        sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))
+        sys.stdin = os.fdopen(0, closefd=False)
+        sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
         warnings.resetwarnings()
         for category in (DeprecationWarning, PendingDeprecationWarning, ResourceWarning):
             warnings.simplefilter("ignore", category)
