@@ -126,7 +126,8 @@ import json, sys
 for line in sys.stdin:
     print(json.dumps(in_process(json.loads(line))), flush=True)
 """
-_ours: set[int] = set()  # processes that are to live on
+ours: set[int] = set()
+"""Processes that are to live on, though nothing below them is."""
 
 
 class Driver:
@@ -142,7 +143,7 @@ class Driver:
             text=True,
             env={**os.environ, "PYTHONPATH": str(root)},
         )
-        _ours.add(self._process.pid)
+        ours.add(self._process.pid)
 
     def run(self, *arguments: str | Path) -> Ended:
         """One command."""
@@ -156,7 +157,7 @@ class Driver:
 
     def close(self) -> None:
         """End the process."""
-        _ours.discard(self._process.pid)
+        ours.discard(self._process.pid)
         self._process.kill()
         self._process.wait()
 
@@ -168,15 +169,15 @@ def adopt_orphans() -> None:
 
 
 def descendants() -> list[int]:
-    """Process ids of all that run below this process, but for drivers."""
+    """Process ids of all that run below this process, but for :data:`ours`."""
     parents: dict[int, int] = {}
     for entry in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError, ValueError):
             state, parent = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
-            if state != "Z" and int(entry.name) not in _ours:
+            if state != "Z" and int(entry.name) not in ours:
                 parents[int(entry.name)] = int(parent)
     found: list[int] = []
-    below = {os.getpid()}
+    below = {os.getpid(), *ours}
     while below:
         below = {pid for pid, parent in parents.items() if parent in below}
         found += below

@@ -861,7 +861,9 @@ def _is_loaded(root: Path) -> bool:
 def _forked(folder: Path, env: Mapping[str, str], stderr: int) -> int:
     """Exit code of :func:`_here` in a fork of this process, which is as if it had just begun,
     whatever runs tests in this one."""
-    child = os.fork()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of threads, which a fork does not have
+        child = os.fork()
     if child:
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     try:

@@ -3,13 +3,9 @@
 ``python -m tests.attacks`` tries them all, through the command line.
 """
 
-import json
 import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -26,8 +22,8 @@ from .checkout import PART_OF_A_FOLDER, Ended, in_process
 from .edits import SUITE, accepted, edits
 from .forgeries import FORGERIES, forge_in, says
 from .methods import ATTACKS
+from .trial import in_a_fork
 
-ROOT = Path(__file__).parent.parent.parent
 COMMANDS = (
     "runs/reward",
     "manifest/seed of another",
@@ -178,13 +174,7 @@ def test_a_forger_who_makes_ids_anew_is_seen(whole, copied):
 
 
 def test_hostile_methods_forge_nothing_and_leave_nothing(tmp_path):
-    said = subprocess.run(
-        [sys.executable, "-m", "tests.attacks.trial", ROOT, tmp_path, *TOGETHER],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        check=True,
-    )
-    assert json.loads(said.stdout) == []
+    assert in_a_fork(TOGETHER, tmp_path) == []
 
 
 @pytest.mark.parametrize("name", REFUSED)

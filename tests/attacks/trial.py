@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import re
@@ -10,6 +9,7 @@ import shutil
 import sys
 import traceback
 import unicodedata
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -23,6 +23,7 @@ from coartic.benchmarks import sandbox
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.specification import RunSpec, Setting
 from coartic.rows import movements_from
+from tests.support.nursery import Nursery
 from tests.support.suites import InProcess
 
 from .checkout import (
@@ -31,6 +32,7 @@ from .checkout import (
     adopt_orphans,
     in_process,
     left_behind,
+    ours,
     read_json,
     run,
     size_of,
@@ -144,6 +146,13 @@ def let_loose(attacks: Sequence[Attack], root: Path, clean: Path, folder: Path) 
     return found + _forged(hostile, clean, out)
 
 
+@cache
+def _nursery() -> Nursery:
+    found = Nursery()
+    ours.add(found.pid)
+    return found
+
+
 def _run_forked(
     root: Path, arguments: Sequence[str], folder: Path, *, limit: float, paths: Sequence[Path] = ()
 ) -> Ended:
@@ -155,6 +164,7 @@ def _run_forked(
     assert root == HERE
     assert not paths
     said = folder / "said-forked.txt"
+    nursery = _nursery()
 
     def command() -> None:
         os.setsid()
@@ -163,6 +173,7 @@ def _run_forked(
             (folder / name).mkdir(exist_ok=True)
             os.environ[variable] = str(folder / name)
         sandbox._RETRIES = 0
+        sandbox.subprocess = nursery  # type: ignore[assignment]
         own_job = Setting.job
 
         def job(setting: Setting, specs: Sequence[RunSpec]) -> dict[str, Any]:
@@ -298,15 +309,28 @@ def _hidden(c: str) -> bool:
     return c not in "\n\t" and unicodedata.category(c) in ("Cc", "Cf", "Cs")
 
 
-def main() -> None:
-    """``ROOT FOLDER ID...``: these attacks in one suite; what did not hold, as JSON."""
-    root, base, names = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), sys.argv[3:]
-    adopt_orphans()
-    (base / "clean.toml").write_text(_SUITE + _cells(*BUILT_IN))
-    run_suite(base / "clean.toml", base / "clean", executor=InProcess())
-    found = let_loose([ATTACKS[name] for name in names], root, base / "clean", base)
-    print(json.dumps(found))
+def in_a_fork(attacks: Sequence[str], folder: Path) -> list[str]:
+    """These attacks of :data:`ATTACKS` on this checkout in one suite; what did not hold.
 
+    In a fork of this process: it adopts orphans, and ends with what it has adopted.
+    """
+    context = multiprocessing.get_context("fork")
+    found, said = context.Pipe(duplex=False)
 
-if __name__ == "__main__":
-    main()
+    def trial() -> None:
+        warnings.simplefilter("ignore")  # whatever runs tests has made of them
+        adopt_orphans()
+        (folder / "clean.toml").write_text(_SUITE + _cells(*BUILT_IN))
+        run_suite(folder / "clean.toml", folder / "clean", executor=InProcess())
+        chosen = [ATTACKS[name] for name in attacks]
+        said.send(let_loose(chosen, HERE, folder / "clean", folder))
+
+    child = context.Process(target=trial)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of threads, which a fork does not have
+        child.start()
+    said.close()
+    try:
+        return list(found.recv())
+    finally:
+        child.join()
