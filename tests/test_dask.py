@@ -26,24 +26,31 @@ from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
+from tests.support.nursery import Nursery
 from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables
 
 LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 
 
+SCHEDULER, WORKER = "distributed.cli.dask_scheduler", "distributed.cli.dask_worker"
+
+
+@pytest.fixture(scope="module")
+def nursery():
+    """Schedulers and workers begin as forks: to import Dask takes longer than all they do."""
+    found = Nursery((SCHEDULER, WORKER, "coartic.benchmarks.cluster"))
+    yield found
+    found.close()
+
+
 class Process:
     """A module of Python's as a process with a session of its own and its output in a file."""
 
-    def __init__(self, log, *command, environment):
+    def __init__(self, nursery, log, *command, environment):
         self.log = log
-        with log.open("wb") as output:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", *command],
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                env={**os.environ, **environment},
-            )
+        with log.open("wb") as output, open(os.devnull, "rb") as nothing:
+            streams = [file.fileno() for file in (nothing, output, output)]
+            self.process = nursery.start(command, {**os.environ, **environment}, streams)
 
     @property
     def alive(self):
@@ -70,7 +77,8 @@ class Process:
 class Cluster:
     """A scheduler on the loopback, and as many workers as a test asks for."""
 
-    def __init__(self, folder, protocol="tcp", **environment):
+    def __init__(self, nursery, folder, protocol="tcp", **environment):
+        self._nursery = nursery
         self._folder, self._protocol = folder, protocol
         self._environment = {"DASK_DISTRIBUTED__WORKER__DAEMON": "False", **environment}
         self._scheduler, self._workers, self._started = None, [], 0
@@ -78,13 +86,13 @@ class Cluster:
     def _start(self, *command):
         self._started += 1
         log = self._folder / f"{self._started}.log"
-        return Process(log, *command, environment=self._environment)
+        return Process(self._nursery, log, *command, environment=self._environment)
 
     @property
     def scheduler(self):
         if self._scheduler is None or not self._scheduler.alive:
             options = (*LOOPBACK, "--protocol", self._protocol, "--port", "0", "--no-show")
-            self._scheduler = self._start("distributed.cli.dask_scheduler", *options)
+            self._scheduler = self._start(SCHEDULER, *options)
         return self._scheduler
 
     @functools.cached_property
@@ -103,7 +111,7 @@ class Cluster:
             worker.kill()
         missing = number - len(self._workers)
         self._workers = self._workers[:number] + [
-            self._start("distributed.cli.dask_worker", address, *options) for _ in range(missing)
+            self._start(WORKER, address, *options) for _ in range(missing)
         ]
         for worker in self._workers:
             worker.wait_for(f"Registered to:\\s+{address}")
@@ -116,8 +124,8 @@ class Cluster:
 
 
 @pytest.fixture(scope="module")
-def shared(tmp_path_factory):
-    made = Cluster(tmp_path_factory.mktemp("cluster"))
+def shared(nursery, tmp_path_factory):
+    made = Cluster(nursery, tmp_path_factory.mktemp("cluster"))
     yield made
     made.close()
 
@@ -468,11 +476,11 @@ def as_environment(settings):
     }
 
 
-def test_over_tls_runs_are_performed_and_strangers_are_refused(quick, tmp_path):
+def test_over_tls_runs_are_performed_and_strangers_are_refused(nursery, quick, tmp_path):
     certificate(tmp_path, "node", certificate(tmp_path, "authority"))
     certificate(tmp_path, "stranger", certificate(tmp_path, "other"))
     ours = tls(tmp_path, "authority", "node", "scheduler", "worker", "client")
-    secured = Cluster(tmp_path, "tls", **as_environment(ours))
+    secured = Cluster(nursery, tmp_path, "tls", **as_environment(ours))
     try:
         address = secured.address
         strangers = {

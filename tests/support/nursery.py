@@ -1,11 +1,12 @@
-"""Guards and workers forked from a process that has imported what they need and has its kernels.
+"""Processes forked from one that has imported what they need, which takes most of their time.
 
-To start one takes a hundredth of what a new Python takes; all else about it is as it is
-(:mod:`coartic.benchmarks.sandbox`). ``python -m tests.support.nursery SOCKET`` is that process: it
-forks a guard for each message, and says how one has ended.
+So begin the guards and workers of sandboxes (:mod:`coartic.benchmarks.sandbox`), kernels loaded;
+all else about them is as it is. ``python -m tests.support.nursery SOCKET MODULE...`` imports the
+modules; it does the ``main`` of one in a fork for each message, and says how one has ended.
 """
 
 import gc
+import importlib
 import json
 import os
 import random
@@ -15,6 +16,7 @@ import sys
 import threading
 import time
 import traceback
+from types import SimpleNamespace
 
 from coartic.benchmarks.sandbox import THREADS
 
@@ -23,11 +25,12 @@ _PYTHON = sys.executable
 
 
 class Nursery:
-    """Starts guards; in place of :mod:`subprocess` in :mod:`coartic.benchmarks.sandbox`."""
+    """Starts what is in ``modules``; those of sandboxes, in place of :mod:`subprocess` there."""
 
     PIPE, TimeoutExpired = subprocess.PIPE, subprocess.TimeoutExpired
 
-    def __init__(self):
+    def __init__(self, modules=("coartic.benchmarks.guard", "coartic.benchmarks.worker")):
+        self._modules = modules
         self._line, self._process, self._lock = None, None, threading.Lock()
 
     @property
@@ -37,7 +40,7 @@ class Nursery:
             self._line, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             with other:
                 self._process = subprocess.Popen(
-                    [_PYTHON, "-P", "-m", __name__, str(other.fileno())],
+                    [_PYTHON, "-P", "-m", __name__, str(other.fileno()), *self._modules],
                     stdin=subprocess.DEVNULL,
                     pass_fds=[other.fileno()],
                     env={**os.environ, **THREADS, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -49,7 +52,11 @@ class Nursery:
         """A guard, or whatever else is to be started."""
         if command[:4] != [_PYTHON, "-P", "-m", "coartic.benchmarks.guard"]:
             return subprocess.Popen(command, **options)
-        return _Guard(self, command, options["env"])
+        return _Guard(self, command[3:], options["env"])
+
+    def start(self, command, environment, streams):
+        """A process in a session of its own: module and arguments, and its three streams."""
+        return _Process(self, command, environment, streams)
 
     def ask(self, question, streams=()):
         """The answer to one message."""
@@ -65,28 +72,33 @@ class Nursery:
             self._process.wait()
 
 
-class _Guard:
+class _Process:
     """As a Popen of it."""
 
-    def __init__(self, nursery, command, environment):
+    def __init__(self, nursery, command, environment, streams):
         self._nursery, self._command, self.returncode = nursery, command, None
-        (theirs, stdin), (stdout, out), (stderr, error) = os.pipe(), os.pipe(), os.pipe()
-        start = {"arguments": command[3:], "environment": environment, "folder": os.getcwd()}
-        try:
-            self.pid = nursery.ask(start, [theirs, out, error])
-        finally:
-            for number in (theirs, out, error):
-                os.close(number)
-        self.stdin = os.fdopen(stdin, "wb")
-        self.stdout, self.stderr = os.fdopen(stdout, "rb"), os.fdopen(stderr, "rb")
+        start = {"command": command, "environment": environment, "folder": os.getcwd()}
+        self.pid = nursery.ask(start, streams)
 
     def poll(self):
         if self.returncode is None:
             self.returncode = self._nursery.ask(self.pid)
         return self.returncode
 
-    def wait(self, timeout):
+    def wait(self, timeout=None):
         return _waited_for(self.poll, self._command, timeout)
+
+
+class _Guard(_Process):
+    def __init__(self, nursery, command, environment):
+        (theirs, stdin), (stdout, out), (stderr, error) = os.pipe(), os.pipe(), os.pipe()
+        try:
+            super().__init__(nursery, command, environment, [theirs, out, error])
+        finally:
+            for number in (theirs, out, error):
+                os.close(number)
+        self.stdin = os.fdopen(stdin, "wb")
+        self.stdout, self.stderr = os.fdopen(stdout, "rb"), os.fdopen(stderr, "rb")
 
 
 class _Worker:
@@ -105,7 +117,8 @@ class _Worker:
 
 def _waited_for(code, command, timeout):
     """Exit code, once there is one; as often looked for as by :mod:`subprocess`."""
-    deadline, delay = time.monotonic() + timeout, 0.0005
+    deadline = float("inf") if timeout is None else time.monotonic() + timeout
+    delay = 0.0005
     while (found := code()) is None:
         if (left := deadline - time.monotonic()) <= 0:
             raise subprocess.TimeoutExpired(command, timeout)
@@ -121,10 +134,8 @@ def _work():
     worker.main()
 
 
-def _guard(start, streams):
+def _begin(start, streams):
     """What a fork of the nursery does."""
-    from types import SimpleNamespace
-
     from coartic.benchmarks import guard
 
     os.setsid()
@@ -134,10 +145,13 @@ def _guard(start, streams):
     os.chdir(start["folder"])
     os.environ.clear()
     os.environ.update(start["environment"])
-    sys.path[:] = os.environ["PYTHONPATH"].split(os.pathsep)
-    sys.argv = start["arguments"]
-    guard.subprocess = SimpleNamespace(Popen=_Worker, TimeoutExpired=subprocess.TimeoutExpired)
-    guard.main()
+    sys.argv = start["command"]
+    if sys.argv[0] == guard.__name__:
+        sys.path[:] = os.environ["PYTHONPATH"].split(os.pathsep)  # all of it
+        guard.subprocess = SimpleNamespace(Popen=_Worker, TimeoutExpired=subprocess.TimeoutExpired)
+    if "dask" in sys.modules:
+        sys.modules["dask"].config.refresh()  # it is in the environment
+    importlib.import_module(sys.argv[0]).main()
 
 
 def _end_with(what):
@@ -164,10 +178,10 @@ def _ended(pid):
 
 def main():
     gc.disable()
-    from coartic.benchmarks import guard, worker  # noqa: F401
-    from coartic.learning import warm_up
-
-    warm_up()
+    for module in sys.argv[2:]:
+        importlib.import_module(module)
+    if "coartic.benchmarks.worker" in sys.argv:
+        sys.modules["coartic.learning"].warm_up()
     gc.freeze()
     with socket.socket(fileno=int(sys.argv[1])) as line:
         while True:
@@ -179,7 +193,7 @@ def main():
                 answer = _ended(question)
             elif not (answer := os.fork()):
                 line.close()
-                _end_with(lambda: _guard(question, streams))  # noqa: B023
+                _end_with(lambda: _begin(question, streams))  # noqa: B023
             for stream in streams:
                 os.close(stream)
             line.send(json.dumps(answer).encode())
