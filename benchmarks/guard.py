@@ -17,6 +17,17 @@ from collections.abc import Iterable
 
 import psutil
 
+# A worker's. One run, one core: BLAS and OpenMP threads would only get in each other's way.
+THREADS = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+    ),
+    "1",
+)
 _LOOK_S = 0.2  # between looks at the parent
 _END_LIMIT_S = 5.0
 # What is imported stays: to look through it for garbage would be a fifth of a worker's start.

@@ -30,8 +30,8 @@ from coartic.baselines.cascade import (
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES
 from coartic.baselines.nullspace_qp import NextGoal
+from coartic.benchmarks.guard import THREADS
 from coartic.benchmarks.provenance import environment
-from coartic.benchmarks.sandbox import THREADS
 from coartic.method import MethodError, Session
 from coartic.robot import Array
 

@@ -26,22 +26,12 @@ from typing import IO, Any
 
 import psutil
 
+from coartic.benchmarks.guard import THREADS as THREADS
 from coartic.benchmarks.guard import end, end_below
 from coartic.errors import CoarticError
 from coartic.learning import METHOD_PREFIX
 from coartic.text import plain
 
-# One run, one core: BLAS and OpenMP threads would only get in each other's way.
-THREADS = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    ),
-    "1",
-)
 MARK = "COARTIC_SANDBOX"
 """Environment variable that a sandbox's processes can be told by."""
 LARGEST_ANSWER = 128 << 20

@@ -10,7 +10,7 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from coartic.benchmarks.sandbox import THREADS
+from coartic.benchmarks.guard import THREADS
 
 # While modules are imported and tests collected, nothing is garbage: see the end of this file.
 gc.disable()

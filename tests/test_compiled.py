@@ -55,7 +55,9 @@ def test_a_user_without_a_home(monkeypatch, tmp_path):
 def test_a_change_in_a_called_module_is_noticed(tmp_path):
     """Another file than the cached function's changes; the result follows."""
     copy = tmp_path / "coartic"
-    shutil.copytree(ROOT / "coartic", copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "coartic", copy, ignore=shutil.ignore_patterns("__pycache__", "benchmarks")
+    )
 
     (tmp_path / "kernel.py").write_text(KERNEL, encoding="utf-8")
 

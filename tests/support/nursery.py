@@ -18,7 +18,7 @@ import time
 import traceback
 from types import SimpleNamespace
 
-from coartic.benchmarks.sandbox import THREADS
+from coartic.benchmarks.guard import THREADS
 
 _MESSAGE = 1 << 18  # bytes, of an environment above all
 _PYTHON = sys.executable
