@@ -480,7 +480,8 @@ def test_table_of_solvers(monkeypatch):
     monkeypatch.setattr(qp_solvers, "HANDS", "RRR")
     monkeypatch.setattr(qp_solvers, "TASK", "ascending")
     monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-293")
-    found = qp_solvers.recorded(6)
+    monkeypatch.setattr(qp_solvers, "_WARM_UP", 1)
+    found = qp_solvers.recorded(3)
     figures = qp_solvers.measure(found)
     figures["osqp"].modelled.failures.append("level 2: osqp ended user_limit")
     figures["osqp"].modelled.solutions[0] = None
