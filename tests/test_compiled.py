@@ -20,6 +20,8 @@ PROGRAM = """
 import os, sys
 import numba, numpy, pydantic, scipy  # once: what follows is in a process of its own each time
 
+numba.njit(lambda x: numpy.cos(x[0]))(numpy.eye(1)[0])  # as is what a first compilation sets up
+
 def found():
     import numpy as np
     from coartic import Robot
