@@ -3,8 +3,8 @@
 import gc
 import os
 import signal
-import socket
 import subprocess
+import sys
 
 import pytest
 from filelock import FileLock
@@ -63,13 +63,15 @@ def _unsynced():
 
 @pytest.fixture(scope="session", autouse=True)
 def _nursery():
-    """Sandboxes begin as forks where that is possible: imports and kernels take a hundred times
-    as long. That they can begin by themselves is for some tests of sandboxes, and for all that
-    run a suite in a process of its own."""
+    """Sandboxes begin as forks, on Linux: imports and kernels take a hundred times as long.
+
+    That they can begin by themselves is for some tests of sandboxes, and for all that run a
+    suite in a process of its own.
+    """
     from coartic.benchmarks import sandbox
     from tests.support.nursery import Nursery
 
-    if not (hasattr(os, "fork") and hasattr(socket, "SOCK_SEQPACKET")):
+    if sys.platform != "linux":
         yield
         return
     nursery = Nursery()
