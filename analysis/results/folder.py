@@ -138,6 +138,10 @@ def made_here(folder: Path) -> Results:
     return Results(folder, manifest, read_table(folder, "runs"), read_table(folder, "sequences"))
 
 
+_OF_CELLS = ("told", "parameters", "commit", "code", "packages")
+"""Columns of runs that all runs of a cell have alike, or nearly: categories, not texts."""
+
+
 def read_table(folder: Path, name: str) -> pd.DataFrame:
     """A table of a results folder that lacks values: with nullable types."""
     path = folder / f"{name}.parquet"
@@ -146,5 +150,6 @@ def read_table(folder: Path, name: str) -> pd.DataFrame:
     repeated = [name for name in texts if name != "run_id"]
     frame = pd.read_parquet(path, dtype_backend="numpy_nullable", read_dictionary=repeated)
     for column in repeated:
-        frame[column] = frame[column].astype("string")
+        if column not in _OF_CELLS:
+            frame[column] = frame[column].astype("string")
     return frame

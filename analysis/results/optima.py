@@ -132,7 +132,7 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
 
 def locks_base(runs: pd.DataFrame) -> bool:
     """Whether a parameter of these runs locks the base: another problem, another optimum."""
-    return any(map(_locks_base, set(runs.parameters)))
+    return any(map(_locks_base, runs.parameters.unique()))
 
 
 def _locks_base(parameters: str) -> bool:
