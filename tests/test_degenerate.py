@@ -48,6 +48,15 @@ tasks = ["two-armed-1"]
 methods = ["dual-process/EC3", "dual-process/EC4"]
 parameters = { noise_sd = 0.0 }
 """
+OPTIMUM = """
+title = "Optimum alone"
+description = "A method without trials, and nothing beside it."
+runs = 1
+[[cells]]
+tasks = ["ascending"]
+methods = ["optimum/dynamic-programming"]
+parameters = { nodes = 10, graphs = 1, chains = 1 }
+"""
 FOLDERS = {
     "one run": "paper --runs 1 --trials 20 --tasks ascending,descending",
     "two runs of two trials": "paper --runs 2 --trials 2 --tasks two-armed-2",
@@ -58,7 +67,7 @@ FOLDERS = {
     "one method": "quick --tasks ascending,two-armed-1 --methods corrective-alone/given",
     "one cell": "paper --runs 3 --trials 20 --tasks ascending",
     "one of all": "paper --runs 1 --trials 1 --tasks ascending",
-    "optimum alone": "quick --tasks ascending --methods optimum/dynamic-programming",
+    "optimum alone": "optimum.toml",
 }
 NONSENSE = re.compile(r"\bnan\b|\binf\b|<NA>|\b0 of 0\b")
 
@@ -69,6 +78,7 @@ def folders(tmp_path_factory):
     home = tmp_path_factory.mktemp("degenerate")
     (home / "stuck.toml").write_text(STUCK, encoding="utf-8")
     (home / "equal.toml").write_text(EQUAL, encoding="utf-8")
+    (home / "optimum.toml").write_text(OPTIMUM, encoding="utf-8")
     made = {}
 
     def folder(name, monkeypatch, capsys):
