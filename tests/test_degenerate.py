@@ -181,6 +181,21 @@ def test_other_means_are_numpys(values):
         np.testing.assert_array_equal(spread.variance(values), values.var(axis=0, ddof=1))
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 8, 9, 15, 16, 20, 50, 127, 128, 129, 300])
+@pytest.mark.parametrize("rows", [1, 5, 400])
+def test_short_rows_are_added_as_numpy_adds(rows, n):
+    """All at once, and to the bit the same."""
+    rng = np.random.default_rng(n)
+    drawn = rng.normal(-500, 20, (rows, n)), 0.1 * rng.integers(-2, 3, (rows, n))
+    for values in (*drawn, drawn[0].T.copy().T):  # in memory by rows, and by columns
+        means = np.clip(values.mean(axis=1), values.min(axis=1), values.max(axis=1))
+        np.testing.assert_array_equal(spread.mean(values, -1), means)
+        if n > 1:
+            variances = values.var(axis=1, ddof=1, mean=means[:, None])
+            for found, expected in zip(spread.moments(values), (means, variances), strict=True):
+                np.testing.assert_array_equal(found, expected)
+
+
 def test_numpys_mean_of_equal_rows_differs_from_them():
     """Or there would be nothing to mend."""
     assert (np.full(3, 0.1).mean() != 0.1) or np.full(3, 0.1).var()

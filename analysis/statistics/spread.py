@@ -20,6 +20,8 @@ _BLOCK = 128
 
 def mean(values: Array, axis: int = 0, *, keepdims: bool = False) -> Array:
     """Mean along an axis; where values are equal, exactly that value."""
+    if _short_rows(values, axis) and not keepdims:
+        return _means(np.ascontiguousarray(values.T))
     return within(np.mean(values, axis=axis, keepdims=keepdims), values, axis, keepdims=keepdims)
 
 
@@ -40,17 +42,30 @@ def variance(values: Array, axis: int = 0) -> Array:
 
 
 def moments(rows: Array) -> tuple[Array, Array]:
-    """Mean and variance of every row of values (k, n), n at least two: shape (k,) each.
-
-    To the bit those of :func:`mean` and :func:`variance`, in a tenth of their time where rows are
-    short, which NumPy walks along one by one: here all rows at once.
+    """:func:`mean` and :func:`variance` of every row of values (k, n), n at least two, in less
+    time than one after the other: shape (k,) each.
     """
-    count = rows.shape[1]
-    if count > _BLOCK:
+    if not _short_rows(rows, 1):
         return mean(rows, 1), variance(rows, 1)
     columns = np.ascontiguousarray(rows.T)
-    means = within(_sums(columns) / count, columns)
-    return means, _sums(np.square(columns - means)) / (count - 1)
+    means = _means(columns)
+    return means, _sums(np.square(columns - means)) / (len(columns) - 1)
+
+
+def _short_rows(values: Array, axis: int) -> bool:
+    """Whether rows are many and short: NumPy walks along them one by one, in ten times the time
+    that it takes with all of them at once. The bits are the same.
+    """
+    return (
+        values.ndim == 2
+        and axis in (1, -1)
+        and 0 < values.shape[1] <= min(_BLOCK, len(values))
+        and values.flags.c_contiguous
+    )
+
+
+def _means(columns: Array) -> Array:
+    return within(_sums(columns) / len(columns), columns)
 
 
 def _sums(columns: Array) -> Array:
