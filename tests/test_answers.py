@@ -3,9 +3,11 @@
 import json
 import re
 
+import altair as alt
 import numpy as np
 import pandas as pd
 import pytest
+from jsonschema import ValidationError
 
 from coartic.analysis.comparisons.overall import ends
 from coartic.analysis.comparisons.reached import ALL_TASKS, WAY
@@ -117,6 +119,9 @@ def test_charts_show_what_the_figures_show(traced):
         chart = json.loads(text)
         assert {param["name"] for param in chart["params"]} >= {"task", "told", "family"}
         assert "http" not in json.dumps({**chart, "$schema": ""})
+        alt.LayerChart.from_dict(chart)  # which is checked by the schema of Vega-Lite
+        with pytest.raises(ValidationError, match="3 is not"):
+            alt.LayerChart.from_dict({**chart, "layer": 3})
     drawn = json.loads(found["ranking"])
     lists = [*drawn.get("datasets", {}).values(), *_all_values(drawn)]
     rows = [[value for value in values if not value.get("heading")] for values in lists]

@@ -48,6 +48,15 @@ tasks = ["two-armed-1"]
 methods = ["dual-process/EC3", "dual-process/EC4"]
 parameters = { noise_sd = 0.0 }
 """
+OPTIMUM = """
+title = "Optimum alone"
+description = "A method without trials, and nothing beside it."
+runs = 1
+[[cells]]
+tasks = ["ascending"]
+methods = ["optimum/dynamic-programming"]
+parameters = { nodes = 10, graphs = 1, chains = 1 }
+"""
 FOLDERS = {
     "one run": "paper --runs 1 --trials 20 --tasks ascending,descending",
     "two runs of two trials": "paper --runs 2 --trials 2 --tasks two-armed-2",
@@ -58,7 +67,7 @@ FOLDERS = {
     "one method": "quick --tasks ascending,two-armed-1 --methods corrective-alone/given",
     "one cell": "paper --runs 3 --trials 20 --tasks ascending",
     "one of all": "paper --runs 1 --trials 1 --tasks ascending",
-    "optimum alone": "quick --tasks ascending --methods optimum/dynamic-programming",
+    "optimum alone": "optimum.toml",
 }
 NONSENSE = re.compile(r"\bnan\b|\binf\b|<NA>|\b0 of 0\b")
 
@@ -69,6 +78,7 @@ def folders(tmp_path_factory):
     home = tmp_path_factory.mktemp("degenerate")
     (home / "stuck.toml").write_text(STUCK, encoding="utf-8")
     (home / "equal.toml").write_text(EQUAL, encoding="utf-8")
+    (home / "optimum.toml").write_text(OPTIMUM, encoding="utf-8")
     made = {}
 
     def folder(name, monkeypatch, capsys):
@@ -169,6 +179,21 @@ def test_other_means_are_numpys(values):
     np.testing.assert_allclose(found, plain, rtol=1e-12, atol=1e-300)
     if inside.all():
         np.testing.assert_array_equal(spread.variance(values), values.var(axis=0, ddof=1))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 8, 9, 15, 16, 20, 50, 127, 128, 129, 300])
+@pytest.mark.parametrize("rows", [1, 5, 400])
+def test_short_rows_are_added_as_numpy_adds(rows, n):
+    """All at once, and to the bit the same."""
+    rng = np.random.default_rng(n)
+    drawn = rng.normal(-500, 20, (rows, n)), 0.1 * rng.integers(-2, 3, (rows, n))
+    for values in (*drawn, drawn[0].T.copy().T):  # in memory by rows, and by columns
+        means = np.clip(values.mean(axis=1), values.min(axis=1), values.max(axis=1))
+        np.testing.assert_array_equal(spread.mean(values, -1), means)
+        if n > 1:
+            variances = values.var(axis=1, ddof=1, mean=means[:, None])
+            for found, expected in zip(spread.moments(values), (means, variances), strict=True):
+                np.testing.assert_array_equal(found, expected)
 
 
 def test_numpys_mean_of_equal_rows_differs_from_them():

@@ -126,9 +126,9 @@ def test_a_study_is_itself_alone(study):
             load(name)
 
 
-def test_wide_figures_are_drawn_one_column_wide_as_well(study):
+def test_wide_figures_are_drawn_one_column_wide_as_well(figures):
     """What is wider than a column, with the same data and its panels below each other."""
-    drawn = Figures(study)
+    drawn = figures
     before = [plot.figure.get_figwidth() for plot in drawn.plots]
     wide = {plot.id: plot for plot in drawn.plots}
     found = {}

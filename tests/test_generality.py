@@ -1,6 +1,7 @@
 """What holds over instances of families: planted runs, and a small folder through a report."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ from scipy import stats
 from coartic import load_task
 from coartic.analysis.claims import CLAIMS, Claim, Finding, judge
 from coartic.analysis.claims.catalogue import family_sizes
+from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.power import seen_over_instances
 from coartic.analysis.generality import sample
 from coartic.analysis.generality.exploration import EC2, EC3, EC4, budgets, contrasts
@@ -27,6 +29,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.words import true_minus
 from coartic.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
+from tests.support.reports import document_of, without_figures
 from tests.support.suites import run_and_write, suite_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -257,8 +260,16 @@ def test_presence_and_hands(tmp_path):
     assert own.as_best_known == 0  # nobody of these runs reached it
 
 
-def verdicts(study):
-    return {entry.claim.id: entry for entry in study.judged}
+def unseen(data):
+    raise MissingError("it is not asked")
+
+
+def verdicts(study, *names):
+    """Of some claims, among all others, which nobody judges; without names of all of them."""
+    claims = [claim for claim in CLAIMS if claim.families]
+    asked = [claim if claim.id in names else replace(claim, judge=unseen) for claim in claims]
+    judged = judge(study, asked) if names else study.judged
+    return {entry.claim.id: entry for entry in judged}
 
 
 def test_claims_of_generality(tmp_path):
@@ -294,23 +305,25 @@ def test_hands_are_learned_where_they_differ_from_the_closest(tmp_path):
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
                 own.values["hand"] = np.array([0.4, 0.6]) + shift  # noqa: PD011
-        return verdicts(MadeUp(study.results, optima=study.optima, signs=signs))[name]
+        return verdicts(MadeUp(study.results, optima=study.optima, signs=signs), name)[name]
 
-    assert judged(0.1).verdict == "supported"
-    assert "12.0" in judged(0.1).evidence
+    more = judged(0.1)
+    assert more.verdict == "supported"
+    assert "12.0" in more.evidence
     assert judged(-0.2).verdict == "not supported"
     assert judged(-0.02).verdict == "cannot tell"
 
 
 def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general(tmp_path):
     falling = study_of(tmp_path, {**RISING, EC4: lambda n: -570 - n})
-    found = verdicts(MadeUp(falling.results, optima=falling.optima, signs=made_up_signs(falling)))
-    assert found["other-arm-pays-in-general"].verdict == "not supported"
-    assert found["proficiency-rises-in-general"].verdict == "not supported"
-    assert found["random-hands-pay-in-general"].verdict == "not supported"
+    arm, rises, hands = (
+        f"{name}-in-general"
+        for name in ("other-arm-pays", "proficiency-rises", "random-hands-pay")
+    )
+    found = verdicts(falling, arm, rises, hands)
+    assert {found[name].verdict for name in (arm, rises, hands)} == {"not supported"}
     mixed = study_of(tmp_path, {**RISING, EC4: lambda n: -540 if n % 2 else -560})
-    found = verdicts(MadeUp(mixed.results, optima=mixed.optima, signs=made_up_signs(mixed)))
-    assert found["other-arm-pays-in-general"].verdict == "cannot tell"
+    assert verdicts(mixed, arm)[arm].verdict == "cannot tell"
 
 
 def test_development_instances_are_not_judged(tmp_path):
@@ -361,15 +374,20 @@ BLOCKS = (
 )
 
 
+OWN_FIGURES = ("gaps-by-family", "exploration-by-family")
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     home = tmp_path_factory.mktemp("families")
     return run_and_write(home / "out", suite_of(home, *BLOCKS), runs=3, trials=40)
 
 
-def test_a_small_folder_through_a_report(folder, undrawn):
+def test_a_small_folder_through_a_report(folder):
     study = Study(folder)
-    document = build(study).document
+    with without_figures(but=OWN_FIGURES):
+        document = build(study).document
+    assert [figure.id for figure in document.figures()] == list(OWN_FIGURES)
     (section,) = [s for s in document.sections if s.id == "families"]
     assert document.sections.index(section) == 1
     lead = section.finding
@@ -389,21 +407,22 @@ def test_a_small_folder_through_a_report(folder, undrawn):
     assert "claim-proficiency-rises" not in {s.id for s in document.walk()}
 
 
-def test_many_instances_alone_are_reported_together(folder, undrawn, monkeypatch):
+def test_many_instances_alone_are_reported_together(folder, monkeypatch):
     monkeypatch.setattr(sample, "MOST_INSTANCES", 1)
     study = Study(folder)
     assert study.signatures.empty
-    document = build(study).document
+    document = document_of(study)
     assert any(table.id == "family-gaps" for table in document.tables())
     assert not any(table.id.startswith("main-signatures") for table in document.tables())
 
 
-def test_a_folder_without_instances_has_no_such_section(tmp_path, undrawn):
-    results = run_and_write(tmp_path / "out", runs=1, trials=5)
-    study = Study(results)
+def test_a_folder_without_instances_has_no_such_section(traced):
+    study = Study(traced.results)
     assert study.instances is None
     assert study.contrasts == []
-    sections = {section.id for section in build(study).document.walk()}
+    with without_figures(but=OWN_FIGURES):
+        sections = {section.id for section in build(study).document.walk()}
+        assert (list(study.figures), study.figures.skipped) == ([], {})
     assert "families" not in sections
     assert "claim-proficiency-rises" in sections
     assert not any("in-general" in name for name in sections)

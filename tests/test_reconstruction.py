@@ -221,8 +221,9 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
     assert counts.p == pytest.approx(exact, abs=0.01)
 
 
-def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
+def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
+    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 1_000)
     rng = np.random.default_rng(0)
     own = Learned(rng.normal(-300.0, 3.0, 1000), ("RRR",) * 1000)
 
@@ -283,7 +284,11 @@ def test_a_task_with_other_goals_is_another_task() -> None:
     assert second.tolist() == own != first.tolist()
 
 
-def test_a_reconstruction_is_found_and_scored(search: Search) -> None:
+def test_a_reconstruction_is_found_and_scored(
+    search: Search, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("coartic.analysis.reconstruction.reconstruct._MOST_NEAR", 30)
+    monkeypatch.setattr("coartic.analysis.reconstruction.reconstruct._MOST_STEPS", 100)
     effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30, last=2)
     small = replace(search, tried=Counter())
     found = reconstruct(small, effort=effort)

@@ -652,6 +652,7 @@ def test_runs_are_made_anew_without_files_of_the_users_own(study, tmp_path, comm
 
 
 SEARCH, BOUND = "optimum/dynamic-programming", "optimum/branch-and-bound"
+SMALL = {"nodes": 10, "graphs": 1, "chains": 1}
 FIGURES = ("configurations-one-armed", "learning-curves")
 """One whose caption names a run, one of the trials: others name no more."""
 
@@ -663,10 +664,11 @@ def searched(tmp_path_factory):
     task = load_task("ascending")
     cells = [
         Cell(task, KNOWN["dual-process/EC1"]),
-        Cell(task, KNOWN[SEARCH]),
-        Cell(task, KNOWN[SEARCH], (("other_arm", "still"),)),
-        Cell(task, KNOWN[SEARCH], (("base", "y"),)),
-        Cell(task, KNOWN[BOUND]),
+        *(
+            Cell(task, KNOWN[SEARCH], tuple({**SMALL, **more}.items()))
+            for more in ({}, {"other_arm": "still"}, {"base": "y"})
+        ),
+        Cell(task, KNOWN[BOUND], tuple(SMALL.items())),
     ]
     run_and_write(folder, cells, runs=3, trials=100)
     return with_environment(folder)
@@ -678,9 +680,15 @@ def searched_home(searched):
         return report_of(Study(searched), searched.folder / "report")
 
 
-def test_searches_in_the_folder_are_the_optimums_runs(searched_home):
+def test_searches_in_the_folder_are_the_optimums_runs(searched, searched_home):
     home = searched_home
-    own = {"free": [SEARCH, BOUND], "still": [f"{SEARCH} other_arm=still"]}
+    searches = [label for _, label in searched.cells if label.startswith("optimum/")]
+    own = {
+        "free": [label for label in searches if "other_arm" not in label and "base" not in label],
+        "still": [label for label in searches if "other_arm=still" in label],
+    }
+    assert [label.partition(" ")[0] for label in own["free"]] == [SEARCH, BOUND]
+    assert len(own["still"]) == 1
 
     def labels(name, *where):
         return [source.label for source in trace(home, name, *where).sources]

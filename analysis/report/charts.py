@@ -12,6 +12,7 @@ from typing import Any
 
 import altair as alt
 import pandas as pd
+from altair.utils.schemapi import debug_mode
 
 from coartic.analysis.comparisons.methods import INFORMED, UNTOLD, informed
 from coartic.analysis.comparisons.progress import SPENDS
@@ -51,11 +52,13 @@ def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
         "ranking": ranking_chart,
         "price": price_chart,
     }
-    return {
-        name: json_text(make(study, shown[name]).to_dict(), allow_nan=False)
-        for name, make in makers.items()
-        if name in shown
-    }
+    # That they are valid does not depend on the runs; to check it takes as long as all else.
+    with debug_mode(False):
+        return {
+            name: json_text(make(study, shown[name]).to_dict(validate=False), allow_nan=False)
+            for name, make in makers.items()
+            if name in shown
+        }
 
 
 def ranking_chart(study: Study, data: pd.DataFrame) -> Any:

@@ -240,9 +240,10 @@ def studentised_null(
         rows = max(1, _IN_MEMORY // len(values))
         for start in range(0, resamples, rows):
             part = slice(start, min(start + rows, resamples))
-            drawn = shifted[rng.integers(len(values), size=(part.stop - start, len(values)))]
-            difference[part] += sign * spread.mean(drawn, 1)
-            variance[part] += spread.variance(drawn, 1) / len(values)
+            places = rng.integers(len(values), size=(part.stop - start, len(values)))
+            means, variances = spread.moments(shifted.take(places))
+            difference[part] += sign * means
+            variance[part] += variances / len(values)
     return _ratio(difference, variance)
 
 

@@ -14,9 +14,14 @@ from numpy.typing import ArrayLike
 
 from coartic.robot import Array
 
+_BLOCK = 128
+"""Numbers up to which NumPy adds without halving them first (pairwise summation)."""
+
 
 def mean(values: Array, axis: int = 0, *, keepdims: bool = False) -> Array:
     """Mean along an axis; where values are equal, exactly that value."""
+    if _short_rows(values, axis) and not keepdims:
+        return _means(np.ascontiguousarray(values.T))
     return within(np.mean(values, axis=axis, keepdims=keepdims), values, axis, keepdims=keepdims)
 
 
@@ -34,6 +39,46 @@ def variance(values: Array, axis: int = 0) -> Array:
     """Variance along an axis with n - 1 degrees of freedom, at least two values; ≥ 0."""
     about = mean(values, axis, keepdims=True)
     return np.asarray(np.var(values, axis=axis, ddof=1, mean=about))
+
+
+def moments(rows: Array) -> tuple[Array, Array]:
+    """:func:`mean` and :func:`variance` of every row of values (k, n), n at least two, in less
+    time than one after the other: shape (k,) each.
+    """
+    if not _short_rows(rows, 1):
+        return mean(rows, 1), variance(rows, 1)
+    columns = np.ascontiguousarray(rows.T)
+    means = _means(columns)
+    return means, _sums(np.square(columns - means)) / (len(columns) - 1)
+
+
+def _short_rows(values: Array, axis: int) -> bool:
+    """Whether rows are many and short: NumPy walks along them one by one, in ten times the time
+    that it takes with all of them at once. The bits are the same.
+    """
+    return (
+        values.ndim == 2
+        and axis in (1, -1)
+        and 0 < values.shape[1] <= min(_BLOCK, len(values))
+        and values.flags.c_contiguous
+    )
+
+
+def _means(columns: Array) -> Array:
+    return within(_sums(columns) / len(columns), columns)
+
+
+def _sums(columns: Array) -> Array:
+    """Sums of columns (n, k) of a block at most, in the order in which NumPy adds along a row."""
+    whole = len(columns) - len(columns) % 8
+    if not whole:
+        return np.asarray(np.add.reduce(columns))
+    lanes = np.add.reduce(columns[:whole].reshape(whole // 8, 8, -1))
+    pairs = lanes[::2] + lanes[1::2]
+    total: Array = (pairs[0] + pairs[1]) + (pairs[2] + pairs[3])
+    for row in columns[whole:]:
+        total += row
+    return total
 
 
 def sd(values: ArrayLike) -> float:

@@ -11,6 +11,7 @@ import coartic.cli.reading
 from coartic.analysis.figures import register
 from coartic.analysis.report import pictures
 from coartic.analysis.report.build import build, write
+from coartic.analysis.report.formats import html as page
 from coartic.analysis.report.formats.latex import PACKAGES
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
@@ -30,10 +31,13 @@ LATEX = r"""\documentclass{article}
 
 @contextmanager
 def undrawn():
-    """Reports whose figures are empty: drawing takes long, and has tests of its own."""
+    """Reports whose figures are empty, as is the script of their charts, which is not ours:
+    making them takes long, and has tests of its own.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pictures, "svg_text", lambda plot: SVG)
         patch.setattr(pictures, "rendered", lambda plot, endings: {f"{plot.id}.svg": SVG.encode()})
+        patch.setattr(page, "vega", str)
         patch.setattr(coartic.cli.reading, "PROCESSES", 1)  # others know no patches
         yield
 
