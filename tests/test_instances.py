@@ -169,7 +169,7 @@ def test_a_planted_property_is_found_and_another_is_not():
     (pays, same, idle), explained = regression(values, table, groups, seed=0)
     assert pays.low < 0.5 < pays.high
     assert pays.low > 0.3
-    assert math.isnan(same.slope)
+    assert math.isnan(same.estimate)
     assert idle.low < 0 < idle.high
     assert 0.5 < explained < 0.9
     again, _ = regression(values, table, groups, seed=0)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coartic import CONDITIONS, ExplorationCondition, learn_many, load_task
-from coartic.analysis.statistics.estimates import SEED, Inference, paired_difference
+from coartic.analysis.statistics.estimates import Inference, paired_difference
 from coartic.robot import Array
 
 NOISE = (0.02, 0.05, 0.1, 0.2)
@@ -54,7 +54,7 @@ def against_printed(
                 _rewards(each, task, JUDGED_BY, trials, jobs)
                 for each in (condition, CONDITIONS[condition.id])
             ]
-            yield Tuned(task, condition, paired_difference(*pair, seed=SEED))
+            yield Tuned(task, condition, paired_difference(*pair))
 
 
 def _best(tried: Iterable[ExplorationCondition], trials: int, jobs: int) -> ExplorationCondition:

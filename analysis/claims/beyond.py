@@ -16,7 +16,7 @@ from coartic.analysis.published import Summary, published_cell
 from coartic.analysis.report.document import Estimate, RestsOn
 from coartic.analysis.results.optima import OtherArm
 from coartic.analysis.statistics.equivalence import MARGIN, difference
-from coartic.analysis.statistics.estimates import SEED, difference_of_means, mean
+from coartic.analysis.statistics.estimates import difference_of_means, mean
 from coartic.analysis.words import NONE, interval
 
 
@@ -63,7 +63,7 @@ def _as_printed(data: Data) -> Finding:
 def _to_the_optimum(data: Data) -> Finding:
     rows, shares = [], []
     for task, condition in CELLS:
-        reward = mean(data.rewards(task, condition), seed=SEED)
+        reward = mean(data.rewards(task, condition))
         arm: OtherArm = "free" if condition in ("EC2", "EC4") else "still"
         best = data.study.optima.get((task, arm))
         if best is None:
@@ -98,7 +98,7 @@ def _proposals(data: Data) -> Finding:
     for (task, condition), (proposal, change) in itertools.product(BEST, _PROPOSALS.items()):
         own = data.rewards(task, condition)
         other = rewards_of(data.learned(task, f"{condition}-{proposal}"))
-        gain = difference_of_means(other, own, seed=SEED)
+        gain = difference_of_means(other, own)
         cells = [(task, LEARNER + name) for name in (condition, f"{condition}-{proposal}")]
         row = layout("proposals").row(
             f"{task} {condition} {proposal}",

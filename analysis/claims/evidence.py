@@ -11,7 +11,7 @@ from coartic.analysis.claims.register import Finding
 from coartic.analysis.report.document import DataTable, Estimate, Row, Value
 from coartic.analysis.report.tables.layout import LAYOUTS, Layout
 from coartic.analysis.results.optima import ARMS, OtherArm
-from coartic.analysis.statistics.estimates import SEED, Inference, mean
+from coartic.analysis.statistics.estimates import Inference, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.words import interval
 from coartic.robot import Array
@@ -29,15 +29,15 @@ def exceeds(values: Array, bound: Array | float, *, sure: bool = False) -> Infer
     ``sure``: with a hundred times the resamples where either tail is near any level that it may
     be held against, so that hardly a verdict hangs on which resamples were drawn.
     """
-    found = bootstrap_test(values, bound, seed=SEED)
+    found = bootstrap_test(values, bound)
     if sure and NEAR[0] < min(found.p, 1 - found.p) < NEAR[1]:
-        return bootstrap_test(values, bound, seed=SEED, resamples=MANY)
+        return bootstrap_test(values, bound, resamples=MANY)
     return found
 
 
 def shown(values: Array, style: str = ".1f") -> str:
     """The mean with its BCa interval."""
-    return interval(mean(values, seed=SEED), style)
+    return interval(mean(values), style)
 
 
 def all_hold(tests: Sequence[Inference], parts: Sequence[str], before: str = "") -> Finding:

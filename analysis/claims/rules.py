@@ -17,7 +17,6 @@ from coartic.analysis.claims.statements import JUDGED, MARGINS, STATEMENTS
 from coartic.analysis.printed import ENTRIES, Count
 from coartic.analysis.published import published_cell, published_exhaustive, published_initial
 from coartic.analysis.statistics.estimates import (
-    SEED,
     Inference,
     difference_of_means,
     probability_of_improvement,
@@ -117,10 +116,10 @@ def _higher(data: Data, claim: Claim) -> Finding:
             if isinstance(b, float):
                 found = f"{shown(a)} against {b:.0f} ({second})"
             else:
-                chance = probability_of_improvement(a, b, seed=SEED)
+                chance = probability_of_improvement(a, b)
                 found = (
                     f"{shown(a)} in {len(a)} runs against {second} {shown(b)} in {len(b)}: "
-                    f"{interval(difference_of_means(a, b, seed=SEED))}, "
+                    f"{interval(difference_of_means(a, b))}, "
                     f"P(higher) {interval(chance, '.2f')}"
                 )
             printed = [_as_printed(task, side) for side in (first, second)]

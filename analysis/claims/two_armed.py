@@ -13,7 +13,7 @@ from coartic.analysis.claims.rules import nearly_all
 from coartic.analysis.claims.statements import decides
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import published_exhaustive, published_initial
-from coartic.analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.hypotheses import independence_test
 from coartic.analysis.words import tally
 from coartic.robot import Array
@@ -106,7 +106,7 @@ def _sequences_change(data: Data) -> Finding:
     initial = data.task(TWO).initial_hands
     names = sorted(set(before) | set(after))
     table = [[count[name] for name in names] for count in (before, after)]
-    test = independence_test(*table, seed=SEED)
+    test = independence_test(*table)
     left = second.total() - second[initial]
     against = [_both_keep(name, before, after) for name in names]
     against.append(nearly_all("", second[initial], second.total()).tests[0])

@@ -25,7 +25,7 @@ from coartic.analysis.statistics.across_tasks import (
     profile,
     task_mean,
 )
-from coartic.analysis.statistics.estimates import FEWEST, SEED, Inference
+from coartic.analysis.statistics.estimates import FEWEST, Inference
 from coartic.initial import initial_hands
 from coartic.record import SEARCH
 from coartic.robot import Array
@@ -159,8 +159,8 @@ def over_tasks(scores: pd.DataFrame) -> pd.DataFrame:
         failed = int(sum(np.isnan(runs).sum() for runs in gap.values()))
         unknown = Inference(math.nan, (), "", note=f"{failed} runs without a solution")
         measures = {
-            "score": unknown if failed else interquartile_mean(score, seed=SEED),
-            "gap": unknown if failed else task_mean(gap, seed=SEED),
+            "score": unknown if failed else interquartile_mean(score),
+            "gap": unknown if failed else task_mean(gap),
             **dict(zip(WITHIN, _shares(gap, NEAR, "at most"), strict=True)),
         }
         row: dict[str, Any] = {"method": method, "tasks": len(gap)}
@@ -193,7 +193,7 @@ def profiles(scores: pd.DataFrame) -> pd.DataFrame:
 
 def _shares(values: dict[str, Array], thresholds: ArrayLike, reached: Reached) -> list[Inference]:
     """Share of runs that reach each threshold, with its interval or why there is none."""
-    found = profile(values, thresholds, reached, seed=SEED)
+    found = profile(values, thresholds, reached)
     shares = []
     for share, low, high in zip(found.share, found.low, found.high, strict=True):
         note = ""

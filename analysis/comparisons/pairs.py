@@ -30,7 +30,6 @@ from coartic.analysis.comparisons.targets import SHARES
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.statistics.estimates import (
-    SEED,
     cliffs_delta,
     difference_of_means,
     paired_by_seed,
@@ -227,15 +226,13 @@ def _inferred(pair: Pair) -> dict[str, Any]:
     if pair.known:
         x, y, paired = x[:0], y[:0], False
         second, interval = float(b[0]), "against a known value"
-    independent = difference_of_means(a, second, seed=SEED)
-    difference = paired_difference(x, y, seed=SEED) if paired else independent
+    independent = difference_of_means(a, second)
+    difference = paired_difference(x, y) if paired else independent
     if pair.kind == "conditions":
-        test = bootstrap_test(a, second, seed=SEED)
+        test = bootstrap_test(a, second)
     else:
-        test = (sign_flip_test if pair.known else permutation_test)(
-            a, second, "two-sided", seed=SEED
-        )
-    improvement = probability_of_improvement(a, second, seed=SEED)
+        test = (sign_flip_test if pair.known else permutation_test)(a, second, "two-sided")
+    improvement = probability_of_improvement(a, second)
     delta = cliffs_delta(improvement)
     spread = len(x) > 2 and np.ptp(x) and np.ptp(y)
     notes = (found.note for found in (difference, test, improvement))

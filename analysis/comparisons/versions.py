@@ -26,7 +26,7 @@ from coartic.analysis.comparisons.surroundings import (
 )
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
-from coartic.analysis.statistics.estimates import FEWEST, SEED, difference_of_means, paired_by_seed
+from coartic.analysis.statistics.estimates import FEWEST, difference_of_means, paired_by_seed
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, load
 from coartic.packs import Packs
@@ -211,19 +211,19 @@ def _compared(row: VersionRow, a: CellRuns, b: CellRuns) -> VersionRow:
     samples: tuple[Array, Array | float] = after - before, 0.0
     if not paired:
         samples = b.rewards, a.rewards
-    found = difference_of_means(*samples, seed=SEED)
+    found = difference_of_means(*samples)
     row = replace(
         row,
         paired=paired,
         difference=found.estimate,
         low=found.low,
         high=found.high,
-        p=bootstrap_test(*samples, "two-sided", seed=SEED).p,
+        p=bootstrap_test(*samples, "two-sided").p,
     )
     margin = MARGIN * abs(row.a.reward)
     if not margin or min(len(a.good), len(b.good)) < FEWEST:
         return row
-    agreed = bootstrap_equivalence(*samples, margin, seed=SEED)
+    agreed = bootstrap_equivalence(*samples, margin)
     # Where most pairs are equal, resamples without any spread leave it without an end.
     if not math.isfinite(agreed.low) or not math.isfinite(agreed.high):
         agreed = replace(agreed, low=found.low, high=found.high)

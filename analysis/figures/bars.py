@@ -19,7 +19,7 @@ from coartic.analysis.figures.plot import Plot, spoken, worded
 from coartic.analysis.figures.selection import CONDITIONS, has, missing, solved
 from coartic.analysis.methods import LEARNER, short_name
 from coartic.analysis.published import Summary, published_cell, published_initial
-from coartic.analysis.statistics.estimates import CONFIDENCE, RESAMPLES, SEED, mean
+from coartic.analysis.statistics.estimates import CONFIDENCE, RESAMPLES, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 
@@ -65,7 +65,6 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         data,
         [study.tasks[name] for name in labels],
         resamples=RESAMPLES,
-        seed=SEED,
         means=spoken(data, "{task}, {method}: {reward:.1f}"),
     )
 
@@ -88,7 +87,7 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     for label in labels:
         cell = solved(study, task, label)
         rewards, paper = cell.rewards, published_of(cell)
-        found = mean(rewards, seed=SEED)
+        found = mean(rewards)
         summary = paper.summary if paper else None
         centre, half = summary.mean if summary else math.nan, _half(summary)
         rows.append(
@@ -102,7 +101,7 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
                 "published": centre,
                 "published_low": centre - half,
                 "published_high": centre + half,
-                "p": bootstrap_test(rewards, before, seed=SEED).p,
+                "p": bootstrap_test(rewards, before).p,
             }
         )
         before = rewards

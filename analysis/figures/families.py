@@ -15,7 +15,6 @@ from coartic.analysis.figures.selection import missing
 from coartic.analysis.generality.exploration import CONTRASTS, gains
 from coartic.analysis.generality.sample import INITIAL, Sample
 from coartic.analysis.methods import short_name
-from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.statistics.instances import RESAMPLES, other_tasks, value
 from coartic.analysis.study import Study
 
@@ -78,14 +77,14 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
     style.letters(panels)
     joined = data.merge(ends, on=["method", "family"])
     told = spoken(ends, "{method}, {family}: {mean:.1%}")
-    return worded("gaps-by-family", figure, joined, seed=SEED, resamples=RESAMPLES, means=told)
+    return worded("gaps-by-family", figure, joined, resamples=RESAMPLES, means=told)
 
 
 def _means(sample: Sample, labels: Sequence[str]) -> pd.DataFrame:
     rows = []
     for label in labels:
         for family, own in sample.gaps(label).items():
-            found = other_tasks({family: own}, seed=SEED)
+            found = other_tasks({family: own})
             rows.append(
                 {
                     "method": label,
@@ -113,7 +112,7 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
         names = sample.shared(first, second)
         scores = gains(sample, first, second, names)
         for family, own in scores.items():
-            found = other_tasks({family: own}, seed=SEED)
+            found = other_tasks({family: own})
             rows += [
                 {
                     "method": f"{short_name(first)} over {short_name(second)}",
@@ -157,6 +156,4 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
     style.letters(panels)
     ends = data.drop_duplicates(["method", "family"])
     told = spoken(ends, "{method}, {family}: {mean:+.1%}")
-    return worded(
-        "exploration-by-family", figure, data, seed=SEED, resamples=RESAMPLES, means=told
-    )
+    return worded("exploration-by-family", figure, data, resamples=RESAMPLES, means=told)

@@ -21,6 +21,7 @@ from coartic import CoarticError, Task
 from coartic.analysis.figures.style import CONFIDENCE, GREY, INK, PAPER, RC, dagger
 from coartic.analysis.figures.svg import compact
 from coartic.analysis.methods import short_name
+from coartic.analysis.statistics.estimates import SEED
 from coartic.files import write_atomically
 from coartic.text import one_line, printed
 
@@ -69,7 +70,10 @@ def worded(
     ``of_tasks``: what a dagger means is said where one of them is reconstructed; ``id``: where it
     is not ``name``.
     """
-    words = {part: text.format(confidence=CONFIDENCE, **of) for part, text in _WORDS[name].items()}
+    words = {
+        part: text.format(confidence=CONFIDENCE, seed=SEED, **of)
+        for part, text in _WORDS[name].items()
+    }
     words["caption"] += dagger(of_tasks)
     return Plot(id or name, figure=figure, data=data, **words)
 

@@ -21,7 +21,6 @@ from coartic.analysis.figures.selection import (
 )
 from coartic.analysis.methods import short_name
 from coartic.analysis.statistics.across_tasks import profile
-from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.study import Study
 
 LEARNER = "learner"
@@ -75,7 +74,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     )
     elsewhere = f" Not run on every task: {', '.join(absent)}." if absent else ""
     figure = _draw(data, everywhere)
-    return worded("profiles", figure, data, tasks=names, seed=SEED, absent=elsewhere, shares=words)
+    return worded("profiles", figure, data, tasks=names, absent=elsewhere, shares=words)
 
 
 def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
@@ -83,7 +82,7 @@ def _profiles(scores: pd.DataFrame, label: str) -> pd.DataFrame:
     parts = []
     for kind, farthest in _FARTHEST.items():
         levels = np.linspace(0.0, farthest, POINTS)
-        found = profile(by_task(scores, label, kind), levels, REACHED[kind], seed=SEED)
+        found = profile(by_task(scores, label, kind), levels, REACHED[kind])
         curve = {"share": found.share, "low": found.low, "high": found.high}
         named = {"method": label, "kind": kind, "threshold": levels}
         parts.append(pd.DataFrame({**named, **curve, "runs": sum(found.n)}))

@@ -18,7 +18,7 @@ from coartic.analysis.figures.plot import Plot, spoken, worded
 from coartic.analysis.figures.price import look_alike
 from coartic.analysis.figures.selection import missing
 from coartic.analysis.methods import LEARNER, family_of, short_name
-from coartic.analysis.statistics.estimates import SEED, mean
+from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.study import Study
 from coartic.record import SEARCH
 
@@ -81,7 +81,7 @@ def _by_task(study: Study) -> Iterator[Standing]:
             continue
         if variant(label) or label.startswith(SEARCH):
             continue
-        found = mean(study.cells[task, label].rewards, seed=SEED)
+        found = mean(study.cells[task, label].rewards)
         # The higher the reward, the smaller the gap.
         ends = (found.estimate, found.high, found.low)
         gap, low, high = (100 * (best.reward - value) / -best.reward for value in ends)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
-from coartic.analysis.statistics.estimates import LEVEL, SEED, Inference
+from coartic.analysis.statistics.estimates import LEVEL, Inference
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Scores, other_tasks, value
 from coartic.robot import Array
@@ -89,9 +89,9 @@ def _contrast(
         second,
         next(iter(names)) if len(names) == 1 else "",
         len(values),
-        other_tasks(scores, seed=SEED),
+        other_tasks(scores),
         float(np.median(values)),
-        other_tasks(hands, seed=SEED),
+        other_tasks(hands),
         int((values > 0).sum()),
         int((values < 0).sum()),
         sum(_apart(*runs) for own in scores.values() for runs in own),
@@ -111,10 +111,10 @@ def _apart(first: Array, second: Array) -> bool:
         first, other = first, float(second[0])
         if not np.ptp(first):
             return bool(first[0] != other)
-        return bool(bootstrap_test(first, other, "two-sided", seed=SEED, resamples=999).p < LEVEL)
+        return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
     if not np.ptp(first) and not np.ptp(second):
         return bool(first[0] != second[0])
-    test = bootstrap_test(first, second, "two-sided", seed=SEED, resamples=999)
+    test = bootstrap_test(first, second, "two-sided", resamples=999)
     return bool(test.p < LEVEL)
 
 
@@ -153,7 +153,7 @@ def budgets(sample: Sample) -> list[Budget]:
                     if name in shared
                 ]
                 if own:
-                    mean = other_tasks({family: own}, seed=SEED)
+                    mean = other_tasks({family: own})
                     found.append(Budget(family, first, second, trials, len(own), mean))
     return found
 

@@ -15,7 +15,7 @@ from coartic.analysis.signatures.other_arm import preshaping
 from coartic.analysis.signatures.subtasks import isolated_agreement, served
 from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, trajectories_of
 from coartic.analysis.statistics import spread
-from coartic.analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.robot import Array
 
@@ -127,7 +127,7 @@ def presence(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Presen
                         label,
                         sign,
                         len(means),
-                        other_tasks(part, seed=SEED),
+                        other_tasks(part),
                         sum(value > THERE[sign] for value in means),
                     )
                 )

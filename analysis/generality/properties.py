@@ -11,8 +11,8 @@ import numpy as np
 from coartic import Task
 from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
 from coartic.analysis.signatures.trajectories import best_sequences
-from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.statistics.instances import Effect, regression
+from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.instances import regression
 
 PROPERTIES = {
     "distance": "mean distance from goal to goal, as a share of the reach",
@@ -34,7 +34,7 @@ class Property(NamedTuple):
 
     outcome: str
     name: str
-    effect: Effect
+    effect: Inference
     least: float
     most: float
     """Least and most that there is of it in the sample."""
@@ -87,12 +87,12 @@ def what_pays(sample: Sample) -> list[Property]:
         table = np.array([list(properties(sample.tasks[name]).values()) for name in names])
         groups = [str(sample.tasks[name].family) for name in names]
         try:
-            effects, explained = regression(values, table, groups, seed=SEED)
+            effects, explained = regression(values, table, groups)
         except ValueError:  # too few
             continue
         for place, (name, effect) in enumerate(zip(PROPERTIES, effects, strict=True)):
             least, most = float(table[:, place].min()), float(table[:, place].max())
-            if not math.isnan(effect.slope):
+            if not math.isnan(effect.estimate):
                 row = Property(outcome, name, effect, least, most, len(names), explained)
                 found.append(row)
     return found

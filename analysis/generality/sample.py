@@ -152,19 +152,6 @@ class Sample:
         return {family: names for family, names in found.items() if names}
 
     @cached_property
-    def beaten(self) -> dict[str, int]:
-        """Instances on which a method found more than the search for the optimum, by label."""
-        found = {}
-        for label in self.labels:
-            cells = (self.study.cells.get((name, label)) for name in self.references)
-            searched = (reference.searched for reference in self.references.values())
-            found[label] = sum(
-                cell is not None and of is not None and bool((cell.rewards > of).any())
-                for cell, of in zip(cells, searched, strict=True)
-            )
-        return {label: count for label, count in found.items() if count}
-
-    @cached_property
     def by_hands(self) -> dict[str, dict[str, int]]:
         """Best reward of any run of the folder with each hand sequence, by instance.
 

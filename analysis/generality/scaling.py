@@ -9,8 +9,8 @@ import numpy as np
 from coartic import Task
 from coartic.analysis.comparisons.methods import solve_times
 from coartic.analysis.generality.sample import Sample
-from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.statistics.instances import Effect, regression
+from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.instances import regression
 
 GROWING = {
     "kinematics": "evaluations of kinematics and Jacobian, exponent",
@@ -26,9 +26,9 @@ class Growth(NamedTuple):
     label: str
     what: str
     """A name of :data:`GROWING`."""
-    goals: Effect
+    goals: Inference
     """Exponent of the number of goals, or gap for one more; NaN where that does not vary."""
-    joints: Effect
+    joints: Inference
     """The same of :func:`size`'s joints."""
     instances: int
     explained: float
@@ -68,7 +68,7 @@ def _growth(sample: Sample, label: str, what: str) -> Growth | None:
         values, sizes = np.log(values), np.log(sizes)
     groups = [str(sample.tasks[name].family) for name in names]
     try:
-        (goals, joints), explained = regression(values, sizes, groups, seed=SEED)
+        (goals, joints), explained = regression(values, sizes, groups)
     except ValueError:  # too few
         return None
     return Growth(label, what, goals, joints, len(names), explained)

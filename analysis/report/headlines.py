@@ -25,7 +25,6 @@ from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.signatures.register import PER_DIMENSION, REGISTER
 from coartic.analysis.signatures.rows import SignatureRow
 from coartic.analysis.statistics.estimates import (
-    SEED,
     Inference,
     difference_of_means,
     mean,
@@ -135,7 +134,7 @@ def _cells(study: Study, names: Names) -> Iterator[Number]:
 def _reward(about: _About, cell: CellRuns) -> Number:
     rewards = cell.good.reward.to_numpy(dtype=np.float64)
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
-    found = mean(rewards, seed=SEED)
+    found = mean(rewards)
     kind = (f"mean learned reward{solved}", 1, "ticks")
     return about.inferred("Reward", found, kind, sd=sd(rewards))
 
@@ -212,9 +211,9 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
                 continue
             stem = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"
             about = _About(stem, f"{higher} less {lower} on {task}", cells)
-            apart = difference_of_means(a, b, seed=SEED)
+            apart = difference_of_means(a, b)
             yield about.inferred("Reward", apart, ("difference of mean rewards", 1, "ticks"))
-            better = probability_of_improvement(a, b, seed=SEED)
+            better = probability_of_improvement(a, b)
             yield about.inferred("Improvement", better, ("probability of improvement", 2, ""))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coartic import Execution, Hand, Task, Trajectory, correct, move
-from coartic.analysis.statistics.estimates import RESAMPLES
+from coartic.analysis.statistics.estimates import RESAMPLES, SEED
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.robot import Array
 
@@ -89,7 +89,7 @@ def sacrifices(change: ArrayLike) -> bool:
     return bool(ticks[0] > ROUNDING and ticks.sum() < 0)
 
 
-def sacrifice_p(changes: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> float:
+def sacrifice_p(changes: ArrayLike, *, seed: int = SEED, resamples: int = RESAMPLES) -> float:
     """Probability of such changes, shape ``(runs, G)``, if there were no sacrifice in the mean.
 
     No sacrifice: the mean first subtask takes longer by no more than :data:`ROUNDING`, or the

@@ -40,7 +40,6 @@ from coartic.analysis.signatures.subtasks import (
 )
 from coartic.analysis.signatures.trajectories import Trajectories, entropy, postures
 from coartic.analysis.statistics import intervals
-from coartic.analysis.statistics.estimates import SEED
 from coartic.robot import Array
 
 
@@ -71,7 +70,7 @@ def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
         yield from without((signature,), NO_INITIAL if cell.runs else NO_RUN)
         return
     shown = share_at(signature, Place(), [*map(sacrifices, changes)])
-    p = sacrifice_p(changes, seed=SEED)
+    p = sacrifice_p(changes)
     untested = "no test: the first subtask or the whole takes the same ticks in every run"
     yield replace(shown, p=p, why_not=shown.why_not or (untested if math.isnan(p) else ""))
 

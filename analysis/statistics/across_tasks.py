@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import (
     RESAMPLES,
+    SEED,
     TAILS,
     Inference,
     bootstrap_estimate,
@@ -51,7 +52,7 @@ def gap_share(rewards: ArrayLike, optimum: float) -> Array:
 
 
 def interquartile_mean(
-    scores: Mapping[str, ArrayLike], *, seed: int, resamples: int = RESAMPLES
+    scores: Mapping[str, ArrayLike], *, seed: int = SEED, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of the middle half of all tasks' runs (Agarwal et al. 2021), with BCa interval.
 
@@ -74,7 +75,7 @@ def interquartile_mean(
 
 
 def task_mean(
-    values: Mapping[str, ArrayLike], *, seed: int, resamples: int = RESAMPLES
+    values: Mapping[str, ArrayLike], *, seed: int = SEED, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean over tasks of the mean over runs, with stratified BCa interval.
 
@@ -107,7 +108,7 @@ def profile(
     thresholds: ArrayLike,
     reached: Reached,
     *,
-    seed: int,
+    seed: int = SEED,
     resamples: int = PROFILE_RESAMPLES,
 ) -> Profile:
     """Share of runs, each task counting the same, that reach each threshold.

@@ -22,6 +22,7 @@ from coartic.analysis.statistics.estimates import (
     FEWEST,
     NO_SPREAD,
     RESAMPLES,
+    SEED,
     Inference,
     sample,
     samples_of,
@@ -94,7 +95,7 @@ def bootstrap_equivalence(
     second: ArrayLike | float,
     margin: float,
     *,
-    seed: int,
+    seed: int = SEED,
     resamples: int = RESAMPLES,
 ) -> Equivalence:
     """Mean of ``first`` less mean of ``second`` with its studentised bootstrap interval.

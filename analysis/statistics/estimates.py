@@ -2,8 +2,8 @@
 
 Samples are rewards (or any score) of independent runs. Where a function compares a sample
 with a plain number, the number is taken as known without error: the reward of a
-deterministic method, say. Every function that resamples takes a seed and gives the same
-result for the same seed; the seed belongs to the resampling, not to the runs.
+deterministic method, say. Every function that resamples gives the same result for the same seed,
+:data:`SEED` by default; the seed belongs to the resampling, not to the runs.
 
 ``coartic.analysis.calibration.error_rates`` measures how well the nominal rates hold for data
 like ours.
@@ -98,7 +98,7 @@ def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]
     return sample(first), sample(second)
 
 
-def mean(values: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> Inference:
+def mean(values: ArrayLike, *, seed: int = SEED, resamples: int = RESAMPLES) -> Inference:
     """Mean with its BCa interval (Efron & Tibshirani 1993, section 14.3).
 
     Fewer than three values: no interval (NaN). All values equal: the interval is that
@@ -109,7 +109,7 @@ def mean(values: ArrayLike, *, seed: int, resamples: int = RESAMPLES) -> Inferen
 
 
 def difference_of_means(
-    first: ArrayLike, second: ArrayLike | float, *, seed: int, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike | float, *, seed: int = SEED, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of ``first`` less mean of ``second``, independent samples; see :func:`mean`."""
     samples = samples_of(first, second)
@@ -118,7 +118,7 @@ def difference_of_means(
 
 
 def paired_difference(
-    first: ArrayLike, second: ArrayLike, *, seed: int, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike, *, seed: int = SEED, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of ``first − second``, pair by pair; see :func:`mean`.
 
@@ -129,7 +129,7 @@ def paired_difference(
 
 
 def probability_of_improvement(
-    first: ArrayLike, second: ArrayLike | float, *, seed: int, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike | float, *, seed: int = SEED, resamples: int = RESAMPLES
 ) -> Inference:
     """P(a run of ``first`` is higher than one of ``second``), a tie counting half.
 

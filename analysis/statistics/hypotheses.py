@@ -22,6 +22,7 @@ from scipy import stats
 from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import (
     RESAMPLES,
+    SEED,
     Inference,
     differences,
     sample,
@@ -45,7 +46,7 @@ def bootstrap_test(
     second: ArrayLike | float,
     alternative: Alternative = "greater",
     *,
-    seed: int,
+    seed: int = SEED,
     resamples: int = RESAMPLES,
 ) -> Inference:
     """Test of equal means by the bootstrap: the paper's own kind of test.
@@ -83,7 +84,7 @@ def permutation_test(
     second: ArrayLike,
     alternative: Alternative = "greater",
     *,
-    seed: int,
+    seed: int = SEED,
     resamples: int = RESAMPLES,
 ) -> Inference:
     """Permutation test of two independent samples, by the studentised difference of means.
@@ -103,7 +104,7 @@ def sign_flip_test(
     second: ArrayLike | float,
     alternative: Alternative = "greater",
     *,
-    seed: int,
+    seed: int = SEED,
     resamples: int = RESAMPLES,
 ) -> Inference:
     """Permutation test of pairs: each difference ``first − second`` may change its sign.
@@ -165,7 +166,9 @@ def share_p(count: ArrayLike, total: int, share: float, alternative: Alternative
     return np.asarray(np.vectorize(lambda one: stats.binomtest(one, total, share).pvalue)(k))
 
 
-def independence_test(first: Sequence[int], second: Sequence[int], *, seed: int) -> Inference:
+def independence_test(
+    first: Sequence[int], second: Sequence[int], *, seed: int = SEED
+) -> Inference:
     """Fisher's exact test that two rows of counts share one distribution over categories.
 
     Freeman & Halton (1951), Biometrika 38, 141: p is the probability, given the margins, of all

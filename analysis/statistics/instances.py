@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from coartic.analysis.statistics import spread
-from coartic.analysis.statistics.estimates import FEWEST, LEVEL, NO_SPREAD, TAILS, Inference
+from coartic.analysis.statistics.estimates import FEWEST, LEVEL, NO_SPREAD, SEED, TAILS, Inference
 from coartic.analysis.statistics.power import POWER
 from coartic.robot import Array
 
@@ -43,7 +43,7 @@ def value(runs: Runs) -> float:
     return float(spread.difference(*runs))
 
 
-def other_tasks(scores: Scores, *, seed: int) -> Inference:
+def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
     """Mean over families of the mean over instances of the mean over runs, for other tasks.
 
     The percentile interval, wider by √(k / (k − 1)) for the k instances of a family: by so much
@@ -205,23 +205,15 @@ def chance(difference: float, sd: float, count: int, level: float, *, tails: int
     return 1.0 if math.isnan(found) and shift > bound else found
 
 
-@dataclass(frozen=True)
-class Effect:
-    """What one more of a property goes with, all others alike."""
-
-    slope: float
-    low: float
-    high: float
-
-
 def regression(
-    values: Array, properties: Array, groups: Sequence[str], *, seed: int
-) -> tuple[list[Effect], float]:
+    values: Array, properties: Array, groups: Sequence[str], *, seed: int = SEED
+) -> tuple[list[Inference], float]:
     """Least squares of values (n,) on properties (n, k) within groups, and R² within them.
 
-    Each group has an intercept of its own, so that no slope is a difference between groups.
-    Percentile intervals of instances drawn with replacement within their group, which need no
-    equal variances. A property that varies in no group gets NaN. Raises ValueError for fewer
+    A slope is what one more of a property goes with, all others alike. Each group has an intercept
+    of its own, so that no slope is a difference between groups. Percentile intervals of instances
+    drawn with replacement within their group, which need no equal variances. A property that
+    varies in no group gets NaN. Raises ValueError for fewer
     than three instances a coefficient.
     """
     members = np.asarray(groups) == np.array(list(dict.fromkeys(groups)))[:, None]
@@ -247,9 +239,10 @@ def regression(
     drawn = np.einsum("rjk,rk->rj", np.linalg.pinv(squares, hermitian=True), products)
     low, high = np.quantile(drawn, TAILS, axis=0)
     known: NDArray[np.int64] = len(places) - 1 + np.cumsum(varies)
+    n, method = (len(values),), f"slope within groups, bootstrap, {RESAMPLES} resamples"
     return [
-        Effect(float(slopes[k]), float(low[k]), float(high[k]))
+        Inference(float(slopes[k]), n, method, float(low[k]), float(high[k]), seed=seed)
         if there
-        else Effect(math.nan, math.nan, math.nan)
+        else Inference(math.nan, n, method, note="it varies in no group")
         for k, there in zip(known.tolist(), varies.tolist(), strict=True)
     ], explained

@@ -18,9 +18,8 @@ from coartic.analysis.report.tables.families import (
     over,
 )
 from coartic.analysis.statistics.estimates import Inference
-from coartic.analysis.statistics.instances import Effect
 from coartic.analysis.study import Study
-from coartic.analysis.words import NARROW_SPACE, true_minus, typographic
+from coartic.analysis.words import NARROW_SPACE, interval, true_minus, typographic
 from coartic.text import counted
 
 TITLE = "Beyond the paper's tasks"
@@ -114,20 +113,17 @@ def _grown(study: Study, sample: Sample) -> Iterator[str]:
     """What a goal more costs methods without variants, the learner under one condition alone."""
     left_out = {INITIAL, EC2, EC3, *sample.searches}
     rows = [g for g in study.growth if not (" " in g.label or g.label in left_out)]
-    rows = [g for g in rows if not math.isnan(g.goals.slope)]  # goals that do not vary
+    rows = [g for g in rows if not math.isnan(g.goals.estimate)]  # goals that do not vary
     gaps, powers = (
-        sorted((g for g in rows if g.what == what), key=lambda g: g.goals.slope)
+        sorted((g for g in rows if g.what == what), key=lambda g: g.goals.estimate)
         for what in ("gap", "kinematics")
     )
     if gaps and powers:
         said = ", ".join(f"{short_name(g.label)} {_points(g.goals)}" for g in gaps)
         steep = [g for g in powers if g.goals.low > _STEEP]
-        flat = [g.goals.slope for g in powers if g not in steep]
+        flat = [g.goals.estimate for g in powers if g not in steep]
         like = [f"{min(flat):.1f} to {max(flat):.1f}"] * bool(flat)
-        like += [
-            f"{g.goals.slope:.1f} [{g.goals.low:.1f}, {g.goals.high:.1f}] ({short_name(g.label)})"
-            for g in steep
-        ]
+        like += [f"{interval(g.goals)} ({short_name(g.label)})" for g in steep]
         yield escaped(
             f"Within families a goal more goes with so many points more of gap: {said}. "
             f"Evaluations of kinematics grow with the number of goals to the power of "
@@ -135,9 +131,9 @@ def _grown(study: Study, sample: Sample) -> Iterator[str]:
         )
 
 
-def _points(found: Effect) -> str:
+def _points(found: Inference) -> str:
     low, point, high = (
-        true_minus(f"{100 * value:z.1f}") for value in (found.low, found.slope, found.high)
+        true_minus(f"{100 * value:z.1f}") for value in (found.low, found.estimate, found.high)
     )
     return f"{point} [{low}, {high}]"
 

@@ -11,7 +11,7 @@ import pandas as pd
 from coartic.analysis.published import Summary
 from coartic.analysis.report.document import Estimate
 from coartic.analysis.report.tables.layout import finite
-from coartic.analysis.statistics.estimates import SEED, mean
+from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study
 from coartic.analysis.words import slugs
@@ -27,7 +27,7 @@ def mean_of(rewards: Any) -> Estimate | None:
     if not len(rewards):
         return None
     values = np.asarray(rewards, dtype=np.float64)
-    found = mean(values, seed=SEED)
+    found = mean(values)
     ends = () if math.isnan(found.low) else (found.low, found.high)
     return Estimate(found.estimate, finite(sd(values)), *ends)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
-from coartic.analysis.generality.exploration import budgets
+from coartic.analysis.generality.exploration import Budget, budgets
 from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed, variance_shares
 from coartic.analysis.generality.presence import SIGNS, THERE, presence, recruitment
 from coartic.analysis.generality.properties import OUTCOMES, PROPERTIES, what_pays
@@ -16,8 +17,8 @@ from coartic.analysis.generality.scaling import GROWING
 from coartic.analysis.markup import escaped
 from coartic.analysis.methods import short_name
 from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
-from coartic.analysis.report.tables.layout import LAYOUTS, with_interval
-from coartic.analysis.statistics.estimates import SEED, Inference
+from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import Runs, Scores, other_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.words import slugs
@@ -79,13 +80,12 @@ def over(scores: Scores, families: Sequence[str]) -> Inference | None:
     """Mean over all of some families; None where one has no score."""
     if not families or not set(families) <= scores.keys():
         return None
-    return other_tasks({family: scores[family] for family in families}, seed=SEED)
+    return other_tasks({family: scores[family] for family in families})
 
 
 def _shown(found: Inference | None, scale: float = 1.0) -> Value:
-    if found is None:
-        return None
-    return with_interval(*(scale * v for v in (found.estimate, found.low, found.high)))
+    ends = found and (found.estimate, found.low, found.high)
+    return with_interval(*(scale * v for v in ends)) if ends else None
 
 
 def gaps_table(sample: Sample) -> DataTable | None:
@@ -93,25 +93,22 @@ def gaps_table(sample: Sample) -> DataTable | None:
     names, layout = slugs(sample.families), LAYOUTS["family-gaps"]
     columns = {family: f"in_{slug.replace('-', '_')}" for family, slug in names.items()}
     layout = layout.plus(
-        Column(name, family.partition("/")[0], "share", digits=1, rests_on=("runs", "optimum"))
+        Column(name, _named(family), "share", digits=1, rests_on=("runs", "optimum"))
         for family, name in columns.items()
     )
     both, rows = two_armed(sample), []
     for label in (LEARNER, *sample.labels):
-        joined = label == LEARNER
-        scores = learner_gaps(sample) if joined else sample.gaps(label)
+        of = partial(learner_gaps, sample) if label == LEARNER else partial(sample.gaps, label)
+        scores, to_bound = of(), of(to_bound=True)
         if not scores:
             continue
-        to_bound = (
-            learner_gaps(sample, to_bound=True) if joined else sample.gaps(label, to_bound=True)
-        )
         means = np.array([float(np.mean(r[0])) for own in scores.values() for r in own])
         found = sum(bool((r[0] <= 0).any()) for own in scores.values() for r in own)
         row = layout.row(
             label,
             None,
-            _cells(sample, (label,) if not joined else (ONE_ARMED, CONDITIONS[-1]), joined),
-            method=LEARNER if joined else short_name(label),
+            _cells(sample, (label,)),
+            method=short_name(label),
             instances=len(means),
             two_arms=_shown(over(scores, both)),
             to_bound=_shown(over(to_bound, both)),
@@ -132,48 +129,45 @@ def gaps_table(sample: Sample) -> DataTable | None:
 def _gap_of(row: Row) -> float:
     """Over families with two arms, those without behind."""
     value = row.values[2]
-    if isinstance(value, Estimate):
-        return value.value
-    return math.inf
+    return value.value if isinstance(value, Estimate) else math.inf
 
 
 def _instances(sample: Sample) -> str:
     """``40 test instances``."""
-    return " and ".join(
-        counted(count, f"{split} instance") for split, count in sample.splits.items()
-    )
+    parts = (counted(count, f"{split} instance") for split, count in sample.splits.items())
+    return " and ".join(parts)
 
 
-def _cells(
-    sample: Sample, labels: Iterable[str], joined: bool = False, families: Sequence[str] = ()
-) -> tuple[CellKey, ...]:
+def _cells(sample: Sample, labels: Iterable[str], of: str = "") -> tuple[CellKey, ...]:
+    """Of a family, or of all; of :data:`LEARNER` those of the condition that stands for it."""
     cells = sample.study.cells
     return tuple(
-        (name, label)
+        (name, own)
         for family, names in sample.families.items()
-        if not families or family in families
+        if of in ("", family)
         for label in labels
-        if not joined or label == learner_on(sample, family)
+        for own in [learner_on(sample, family) if label == LEARNER else label]
         for name in names
-        if (name, label) in cells
+        if (name, own) in cells
     )
+
+
+def _named(family: str) -> str:
+    """Without its version; empty: all of them."""
+    return family.partition("/")[0] or ALL
 
 
 def exploration_table(study: Study, sample: Sample) -> DataTable | None:
     """Pairs of conditions by family, then over all of them."""
     layout, rows = LAYOUTS["family-exploration"], []
     for found in study.contrasts:
-        family = found.family.partition("/")[0] or ALL
-        pair = f"{short_name(found.first)} over {_second(found.second)}"
-        gain = found.difference.estimate
+        family, gain = _named(found.family), found.difference.estimate
+        second = "the initial solution" if found.second == INITIAL else short_name(found.second)
+        pair = f"{short_name(found.first)} over {second}"
         row = layout.row(
             f"{pair}, {family}",
             found,
-            _cells(
-                sample,
-                (found.first, found.second),
-                families=[found.family] if found.family else (),
-            ),
+            _cells(sample, (found.first, found.second), found.family),
             contrast=pair,
             family=family,
             gain=_shown(found.difference),
@@ -184,36 +178,29 @@ def exploration_table(study: Study, sample: Sample) -> DataTable | None:
     return layout.table(rows)
 
 
-def _second(label: str) -> str:
-    return "the initial solution" if label == INITIAL else short_name(label)
-
-
 def _budget_table(sample: Sample) -> DataTable | None:
     found = budgets(sample)
     trials = tuple(dict.fromkeys(row.trials for row in found))
     layout = LAYOUTS["family-budget"].plus(
         Column(
-            f"after_{n}",
-            f"{n:,} trials".replace(",", " "),
-            "share",
+            *(f"after_{n}", f"{n:,} trials".replace(",", " "), "share"),
             digits=1,
             rests_on=("runs", "optimum"),
         )
         for n in trials
     )
+    by_place: dict[tuple[str, str, str], dict[int, Budget]] = {}
+    for each in found:
+        by_place.setdefault((each.label, each.second, each.family), {})[each.trials] = each
     rows = []
-    for label, second, family in dict.fromkeys((r.label, r.second, r.family) for r in found):
-        own = {
-            r.trials: r for r in found if (r.label, r.second, r.family) == (label, second, family)
-        }
+    for (label, second, family), own in by_place.items():
         name = short_name(label) + (f" over {short_name(second)}" if second else "")
-        short = family.partition("/")[0]
         row = layout.row(
-            f"{name}, {short}",
+            f"{name}, {_named(family)}",
             None,
-            _cells(sample, filter(None, (label, second)), families=[family]),
+            _cells(sample, filter(None, (label, second)), family),
             method=name,
-            family=short,
+            family=_named(family),
             instances=max(r.instances for r in own.values()),
             **{f"after_{n}": _shown(own[n].value) if n in own else None for n in trials},
         )
@@ -227,11 +214,11 @@ def _presence_table(study: Study, sample: Sample) -> DataTable | None:
         if found.family and found.label != learner_on(sample, found.family):
             continue  # of what explores less over all families
         name, label = _SIGN_NAMES[found.sign], short_name(found.label)
-        family = found.family.partition("/")[0] or ALL
+        family = _named(found.family)
         row = layout.row(
             f"{name}, {label}, {family}",
             found,
-            _cells(sample, (found.label,), families=[found.family] if found.family else ()),
+            _cells(sample, (found.label,), found.family),
             signature=name,
             condition=label,
             family=family,
@@ -243,31 +230,24 @@ def _presence_table(study: Study, sample: Sample) -> DataTable | None:
 
 
 def _hands_table(study: Study, sample: Sample) -> DataTable | None:
-    layout = LAYOUTS["family-hands"]
-    rows = [
-        layout.row(
-            f"{short_name(found.label)}, {found.family.partition('/')[0]}",
-            found,
-            _cells(sample, (found.label,), families=[found.family]),
-            condition=short_name(found.label),
-            family=found.family.partition("/")[0],
-        )
-        for found in recruitment(sample, study.signs)
-    ]
+    layout, rows = LAYOUTS["family-hands"], []
+    for found in recruitment(sample, study.signs):
+        condition, family = short_name(found.label), _named(found.family)
+        cells = _cells(sample, (found.label,), found.family)
+        of = {"condition": condition, "family": family}
+        rows.append(layout.row(f"{condition}, {family}", found, cells, **of))
     return layout.table(rows)
 
 
 def _properties_table(sample: Sample) -> DataTable | None:
     layout, rows = LAYOUTS["family-properties"], []
     for found in what_pays(sample):
-        effect = found.effect
         row = layout.row(
             f"{found.name}, {found.outcome}",
             found,
-            _cells(sample, (ONE_ARMED, CONDITIONS[-1]), joined=True),
+            _cells(sample, (LEARNER,)),
             property=PROPERTIES[found.name],
-            outcome=found.outcome,
-            effect=with_interval(*(100 * v for v in (effect.slope, effect.low, effect.high))),
+            effect=_shown(found.effect, 100),
         )
         rows.append(row)
     return layout.table(rows, **OUTCOMES)
@@ -276,19 +256,15 @@ def _properties_table(sample: Sample) -> DataTable | None:
 def _scaling_table(study: Study, sample: Sample) -> DataTable | None:
     layout, rows = LAYOUTS["family-scaling"], []
     for found in study.growth:
-        scale, name = 100.0 if found.what == "gap" else 1.0, short_name(found.label)
-        goals, joints = (
-            with_interval(*(scale * v for v in (effect.slope, effect.low, effect.high)))
-            for effect in (found.goals, found.joints)
-        )
+        scale = 100.0 if found.what == "gap" else 1.0
         row = layout.row(
             f"{found.what}, {found.label}",
             found,
             _cells(sample, (found.label,)),
-            method=name,
+            method=short_name(found.label),
             grows=GROWING[found.what],
-            goals=goals,
-            joints=joints,
+            goals=_shown(found.goals, scale),
+            joints=_shown(found.joints, scale),
         )
         rows.append(row)
     return layout.table(rows)
@@ -297,18 +273,11 @@ def _scaling_table(study: Study, sample: Sample) -> DataTable | None:
 def _variance_table(sample: Sample) -> DataTable | None:
     layout, rows = LAYOUTS["family-variance"], []
     for found in variance_shares(sample):
-        name, shares = found.family.partition("/")[0], found.components.shares()
-        known = {of: None if math.isnan(share) else share for of, share in shares.items()}
-        cells = _cells(sample, [n for n in sample.labels if " " not in n], families=[found.family])
-        row = layout.row(
-            f"{name}, {found.of}",
-            found,
-            cells,
-            family=name,
-            sd=math.sqrt(found.components.total),
-            **known,
-        )
-        rows.append(row)
+        name, shares = _named(found.family), found.components.shares()
+        known = {of: finite(share) for of, share in shares.items()}
+        cells = _cells(sample, [n for n in sample.labels if " " not in n], found.family)
+        own = {"family": name, "sd": math.sqrt(found.components.total), **known}
+        rows.append(layout.row(f"{name}, {found.of}", found, cells, **own))
     return layout.table(rows)
 
 
@@ -329,27 +298,24 @@ def _references_table(sample: Sample) -> DataTable | None:
     layout, rows = LAYOUTS["family-references"], []
     for family, names in sample.families.items():
         known = [sample.references[name] for name in names]
-        open_ = [r for r in known if r.bound is not None and not r.proven]
+        left = [
+            (r.bound - r.best) / abs(r.best) for r in known if r.bound is not None and not r.proven
+        ]
         beaten = [r.best - r.searched for r in known if r.searched is not None]
         over_ = [ticks for ticks in beaten if ticks > 0]
-        short = family.partition("/")[0]
         splits = dict.fromkeys(str(sample.tasks[name].split) for name in names)
         row = layout.row(
-            short,
+            _named(family),
             None,
-            _cells(sample, sample.searches, families=[family]),
-            family=short,
+            _cells(sample, sample.searches, family),
+            family=_named(family),
             split=", ".join(splits),
             instances=len(names),
             proven=sum(r.proven for r in known),
             bounded=sum(r.bound is not None for r in known),
-            left=float(np.median([_left(r.best, r.bound) for r in open_])) if open_ else None,
+            left=float(np.median(left)) if left else None,
             beaten=len(over_),
             by=max(over_, default=None),
         )
         rows.append(row)
     return layout.table(rows)
-
-
-def _left(best: int, bound: int | None) -> float:
-    return math.nan if bound is None else (bound - best) / abs(best)
