@@ -6,19 +6,27 @@ A row of ``methods.toml`` for each; methods of others have none.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
+from coartic import Task, exploration
 from coartic.analysis.references import Key
+from coartic.analysis.words import stated
 from coartic.learning import METHOD_PREFIX
 from coartic.text import one_line
 
 LEARNER = METHOD_PREFIX
 """The paper's learner: the name begins so, and its exploration condition follows."""
+CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in exploration.CONDITIONS)
+"""Labels of the learner under the paper's conditions: the first with one arm, the others with two,
+what explores more behind."""
+TWO_ARMED = CONDITIONS[1:]
+TOGETHER = f"{LEARNER.rstrip('/')} ("
+"""So begins the label of several conditions together, each on the tasks that it is for."""
+INITIAL = "corrective-alone/given"
+"""Whose solution is the initial one."""
 
 
 Color = Literal["blue", "sky", "green", "orange", "vermillion", "purple", "grey", "ink"]
@@ -42,12 +50,9 @@ class KnownMethod(BaseModel):
     """Keys of the works behind what poses and solves its programmes."""
 
 
-def _read() -> Mapping[str, KnownMethod]:
-    text = (Path(__file__).parent / "methods.toml").read_text(encoding="utf-8")
-    return TypeAdapter(dict[str, KnownMethod]).validate_python(tomllib.loads(text))
-
-
-METHODS = _read()
+METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).validate_python(
+    stated(__file__)
+)
 """Rows of the built-in methods by id, in the order of lists and figures."""
 _PARAMETERS = {
     "other_arm=": "other arm ",
@@ -69,6 +74,11 @@ FAMILIES: Mapping[str, str] = {
     "optimum": "search for the optimum",
 }
 """What the built-in methods of one family are called together."""
+
+
+def most_exploring(task: Task) -> str:
+    """Label of the learner under the condition that explores most on a task."""
+    return EC4 if len(task.hands) > 1 else EC1
 
 
 def family_of(label: str) -> str:
@@ -96,7 +106,7 @@ def short_name(label: str) -> str:
     ``dual-process (EC1, EC4)``, are ``learner (EC1, EC4)``.
     """
     label = one_line(label)
-    if label.startswith(f"{LEARNER.rstrip('/')} ("):
+    if label.startswith(TOGETHER):
         return label.replace(LEARNER.rstrip("/"), FAMILIES["dual-process"], 1)
     method, _, variant = label.partition(" ")
     name = METHODS[method].short if method in METHODS else method

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 from coartic.analysis.printed import (
     ENTRIES,
@@ -70,11 +70,22 @@ class PublishedCell:
     remark: str = ""
 
 
-def published_initial(task: str) -> tuple[str, float, bool] | None:
-    """Hands, reward and whether derived, of a task's initial solution."""
+class InitialSolution(NamedTuple):
+    """What the paper prints of a task's initial solution."""
+
+    hands: str
+    reward: float
+    derived: bool
+    """Whether the reward is computed from other printed numbers."""
+    place: str
+    """Section of the paper."""
+
+
+def published_initial(task: str) -> InitialSolution | None:
+    """Of a task; None where the paper prints nothing of it."""
     for entry in _said(task, InitialHands):
         reward = _corrective_reward(task, entry.hands)
-        return entry.hands, reward.number, reward.derived
+        return InitialSolution(entry.hands, reward.number, reward.derived, reward.place)
     return None
 
 

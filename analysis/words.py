@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,6 +20,16 @@ MINUS, NARROW_SPACE, TIMES = "−", "\N{NARROW NO-BREAK SPACE}", "×"
 LONGEST_SLUG = 80
 """Characters of a slug before its number; names of files must not be too long."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def stated(module: str, name: str = "") -> dict[str, Any]:
+    """What the TOML file beside a module says, of the module's name or another.
+
+    ``module``: its ``__file__``.
+    """
+    path = Path(module)
+    file = path.with_name(f"{name}.toml") if name else path.with_suffix(".toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def short(value: float) -> str:

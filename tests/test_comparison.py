@@ -42,8 +42,8 @@ def test_published_numbers():
     assert published_cell("descending", "EC1").summary.digits == (0, 2)
     assert published_cell("two-armed-2", "EC3").summary.digits == (1, 1)
     assert published_cell("two-armed-1", "EC2").summary.digits is None  # derived
-    assert published_initial("descending") == ("RRR", -333, True)
-    assert published_initial("two-armed-1") == ("RRRR", -675, False)
+    assert published_initial("descending")[:3] == ("RRR", -333, True)
+    assert published_initial("two-armed-1")[:3] == ("RRRR", -675, False)
     assert published_exhaustive("two-armed-1") == ("LRLR", -532)
     assert published_exhaustive("two-armed-2") == ("RRRR", -357)
     assert published_cell("two-armed-2", "EC4").summary is None

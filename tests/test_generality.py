@@ -14,12 +14,12 @@ from coartic.analysis.claims.catalogue import family_sizes
 from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.power import seen_over_instances
 from coartic.analysis.generality import sample
-from coartic.analysis.generality.exploration import EC2, EC3, EC4, budgets, contrasts
+from coartic.analysis.generality.exploration import budgets, contrasts
 from coartic.analysis.generality.precision import RUNS, needed, variance_shares
 from coartic.analysis.generality.presence import Signs, presence, recruitment
 from coartic.analysis.generality.properties import properties, what_pays
-from coartic.analysis.generality.sample import INITIAL, ONE_ARMED
 from coartic.analysis.generality.scaling import scaling, size
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.report.build import build
 from coartic.analysis.report.formats.markdown import markdown
 from coartic.analysis.results.folder import Results
@@ -64,7 +64,7 @@ def study_of(
             tasks.append(load_task(name))
             known[name, "free"] = Optimum(BEST, hands_of(name), BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
-                if (label == ONE_ARMED) == (family in ONE) or label == INITIAL:
+                if (label == EC1) == (family in ONE) or label == INITIAL:
                     value = centre(number) if callable(centre) else centre
                     noise = (0,) if label == INITIAL else NOISE
                     rows += runs_of(name, label, value, noise=noise)
@@ -76,7 +76,7 @@ def study_of(
     return MadeUp(results, **({"optima": known} if optima else {}), **parts)
 
 
-RISING = {INITIAL: ALONE, ONE_ARMED: -540, EC2: -560, EC3: -550, EC4: -540}
+RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}
 
 
 def test_gaps_are_between_the_best_known_and_the_bound(tmp_path):
@@ -86,7 +86,7 @@ def test_gaps_are_between_the_best_known_and_the_bound(tmp_path):
     np.testing.assert_allclose(sample.gap(name, EC4, to_bound=True).mean(), 90 / 450)
     assert not sample.references[name].proven
     assert sample.references["two-armed/v1/i001"].proven
-    assert sample.gap(name, ONE_ARMED) is None
+    assert sample.gap(name, EC1) is None
     assert sample.splits == {"test": 25}
     assert list(sample.families) == [*ONE, *TWO]
 
@@ -115,7 +115,7 @@ def test_planted_contrasts(tmp_path):
     rising = found[EC3, EC2, ""]
     assert rising.difference.estimate == pytest.approx(0.02)
     assert (rising.instances, rising.better) == (20, 20)
-    assert found[ONE_ARMED, INITIAL, "one-armed/v1"].difference.estimate == pytest.approx(0.12)
+    assert found[EC1, INITIAL, "one-armed/v1"].difference.estimate == pytest.approx(0.12)
     assert (EC3, EC2, "one-armed/v1") not in found
 
 
@@ -222,7 +222,7 @@ def test_joints_are_those_that_move_one_hand():
 def made_up_signs(study, hand=1.0, waiting=0.3):
     found = {}
     for name in study.tasks:
-        for label in (ONE_ARMED, EC2, EC3, EC4):
+        for label in (EC1, EC2, EC3, EC4):
             if (name, label) in study.cells:
                 number = int(name[-3:])
                 values = {
@@ -230,7 +230,7 @@ def made_up_signs(study, hand=1.0, waiting=0.3):
                     "first": np.array([5.0, 6.0 + 0.1 * number]),
                     "whole": np.array([9.0, 8.0 + 0.1 * number]),
                 }
-                if label != ONE_ARMED:
+                if label != EC1:
                     values["hand"] = np.array([hand, hand, hand - 0.1 * (number == 0)])
                     values["other arm"] = np.array([waiting + 0.01 * number])
                 own = hands_of(name)
@@ -247,7 +247,7 @@ def test_presence_and_hands(tmp_path):
     assert waiting.value.estimate == pytest.approx(0.09)
     assert (waiting.instances, waiting.there) == (5, 1)  # the last beyond a tenth of the way
     assert found["hand", EC4, ""].there == 20
-    assert ("hand", ONE_ARMED, "one-armed/v1") not in found
+    assert ("hand", EC1, "one-armed/v1") not in found
     hands = {(r.label, r.family): r for r in recruitment(study.instances, signs)}
     own = hands[EC3, "aligned/v1"]
     assert (own.leaves_initial, own.as_corrective, own.consistent, own.both_hands) == (

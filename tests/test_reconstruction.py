@@ -24,11 +24,16 @@ from coartic import (
 )
 from coartic.analysis.reconstruction import targets
 from coartic.analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
-from coartic.analysis.reconstruction.ensemble import features, spread_out
 from coartic.analysis.reconstruction.layout import Layout, layouts
 from coartic.analysis.reconstruction.likelihood import likelihoods, together
 from coartic.analysis.reconstruction.lines import lines
-from coartic.analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
+from coartic.analysis.reconstruction.reconstruct import (
+    Effort,
+    features,
+    reconstruct,
+    search_for,
+    spread_out,
+)
 from coartic.analysis.reconstruction.scoring import (
     FARTHEST,
     Figure,

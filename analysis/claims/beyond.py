@@ -7,13 +7,14 @@ import math
 from dataclasses import replace
 
 from coartic.analysis.claims.data import BEST, CELLS, Data, MissingError, rewards_of
-from coartic.analysis.claims.evidence import by_optimum, estimate_of, layout, measured
+from coartic.analysis.claims.evidence import by_optimum, layout, measured
 from coartic.analysis.claims.one_armed import CONTROLS, context_distance, sacrifice
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.claims.statements import decides
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.methods import EC1, LEARNER
 from coartic.analysis.published import Summary, published_cell
 from coartic.analysis.report.document import Estimate, RestsOn
+from coartic.analysis.report.tables.layout import estimated
 from coartic.analysis.results.optima import OtherArm
 from coartic.analysis.statistics.equivalence import MARGIN, difference
 from coartic.analysis.statistics.estimates import difference_of_means, mean
@@ -45,7 +46,7 @@ def _as_printed(data: Data) -> Finding:
                 printed_runs=summary.runs,
                 ours=float(own.mean()),
                 our_runs=len(own),
-                difference=estimate_of(apart),
+                difference=estimated(apart),
                 share=apart.estimate / -summary.mean,
                 verdict=verdict,
             )
@@ -75,7 +76,7 @@ def _to_the_optimum(data: Data) -> Finding:
             high=best.reward - reward.low,
         )
         share = gap.estimate / -best.reward
-        values = by_optimum(arm, optimum=best.reward, gap=estimate_of(gap), gap_share=share)
+        values = by_optimum(arm, optimum=best.reward, gap=estimated(gap), gap_share=share)
         cells = [(task, LEARNER + condition)]
         row = layout("distance-to-optimum").row(
             f"{task} {condition}", cells=cells, task=task, condition=condition, **values
@@ -106,7 +107,7 @@ def _proposals(data: Data) -> Finding:
             task=task,
             condition=condition,
             change=change,
-            gain=estimate_of(gain),
+            gain=estimated(gain),
         )
         rows.append(row)
         gains.append(f"{task} {change.split()[0]} {interval(gain)}")
@@ -116,7 +117,7 @@ def _proposals(data: Data) -> Finding:
 @decides("absent-without-looking-ahead")
 def _absent_without_looking_ahead(data: Data) -> Finding:
     parts = []
-    for method in (f"{LEARNER}EC1", *CONTROLS):
+    for method in (EC1, *CONTROLS):
         try:
             apart, (first, total) = context_distance(data, method), sacrifice(data, method)
         except MissingError:

@@ -16,7 +16,7 @@ from coartic.analysis.comparisons.methods import TOLD, MethodRow
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import TRIALS, published_cells
 from coartic.analysis.signatures.rows import SignatureRow
-from coartic.analysis.signatures.trajectories import Trajectories, best_sequences
+from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST
 from coartic.method import Information
 from coartic.robot import Array
@@ -168,7 +168,7 @@ class Data:
 
     def initial(self, name: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
-        execution = Trajectories(self.task(name), "", "", (), model=self.study.model).initial
+        execution = initial_solution(self.task(name), self.study.model)
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
         self.others.append(f"the corrective process on {name}")

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from coartic.analysis.claims.register import Finding
-from coartic.analysis.report.document import DataTable, Estimate, Row, Value
+from coartic.analysis.report.document import DataTable, Row, Value
 from coartic.analysis.report.tables.layout import LAYOUTS, Layout
 from coartic.analysis.results.optima import ARMS, OtherArm
 from coartic.analysis.statistics.estimates import Inference, mean
@@ -57,13 +56,6 @@ def measured(claim: str, evidence: str, rows: Sequence[Row], **facts: float) -> 
 def layout(claim: str) -> Layout:
     """What the table of its evidence says."""
     return LAYOUTS[f"evidence-{claim}"]
-
-
-def estimate_of(found: Inference) -> Estimate:
-    """An estimate with its interval, where it has one."""
-    if math.isnan(found.low):
-        return Estimate(found.estimate)
-    return Estimate(found.estimate, None, found.low, found.high)
 
 
 def by_optimum(arm: OtherArm, **values: Value) -> dict[str, Value]:

@@ -16,8 +16,8 @@ from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.evidence import all_hold, exceeds, shown
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.claims.statements import STATEMENTS, decides
-from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.generality.sample import Sample
+from coartic.analysis.methods import CONDITIONS, INITIAL, LEARNER, most_exploring
 from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import FEWEST
@@ -55,8 +55,7 @@ def _over(data: Data, family: str, values: Sequence[float | None]) -> Array:
 
 def _learner(data: Data, name: str) -> str:
     """Of the paper's conditions the one that explores most."""
-    label = CONDITIONS[-1] if len(data.task(name).hands) > 1 else ONE_ARMED
-    return label.removeprefix(LEARNER)
+    return most_exploring(data.task(name)).removeprefix(LEARNER)
 
 
 def _reward(data: Data, name: str, side: str) -> float | None:
@@ -121,11 +120,6 @@ def _learned_sign(data: Data, sign: str, name: str) -> float | None:
     return _mean_sign(data, name, _learner(data, name), sign)
 
 
-def _families(claim: str) -> Sequence[str]:
-    found: Sequence[str] = STATEMENTS[claim]["families"]
-    return found
-
-
 Parts = tuple[list[Array], list[str]]
 """Values of instances by family, less their bound, and what was seen of each."""
 
@@ -135,7 +129,7 @@ def _beyond(
 ) -> Parts:
     """By how much what is measured of an instance is beyond a bound, in every family."""
     samples, parts = [], []
-    for family in _families(claim):
+    for family in STATEMENTS[claim]["families"]:
         own = _over(data, family, [of(name) for name in _judged(data, family)])
         samples.append(own - bound)
         parts.append(f"{family} {shown(own, '.2f')} {unit} on {len(own)} instances")
@@ -167,28 +161,27 @@ def _more_hands(data: Data, name: str) -> float | None:
     return None if learned is None or closest is None else 100 * (learned - closest)
 
 
-@decides("arm-coarticulation-in-general")
-def _arm(data: Data) -> Finding:
-    claim = "arm-coarticulation-in-general"
-    return _held(*_beyond(data, claim, partial(_learned_sign, data, "arm"), "ticks"))
+def _arm(data: Data, claim: str, sign: str, unit: str) -> Finding:
+    return _held(*_beyond(data, claim, partial(_learned_sign, data, sign), unit))
 
 
-@decides("other-arm-coarticulation-in-general")
-def _other_arm(data: Data) -> Finding:
-    claim = "other-arm-coarticulation-in-general"
-    return _held(*_beyond(data, claim, partial(_learned_sign, data, "other arm"), "of the way"))
+for _name, _sign, _unit in (
+    ("arm-coarticulation-in-general", "arm", "ticks"),
+    ("other-arm-coarticulation-in-general", "other arm", "of the way"),
+):
+    decides(_name, claim=_name, sign=_sign, unit=_unit)(_arm)
 
 
 @decides("corrective-ensures-in-general")
 def _ensures(data: Data) -> Finding:
     failed: dict[str, int] = {}
     trials = 0
-    for family in _families("corrective-ensures-in-general"):
+    for family in STATEMENTS["corrective-ensures-in-general"]["families"]:
         names = _judged(data, family)
         if not names:
             raise MissingError(f"this folder has no instances of {family} that can be judged")
         for name in names:
-            for label in (ONE_ARMED, *CONDITIONS):
+            for label in CONDITIONS:
                 if (name, label) in data.study.cells:
                     runs = data.learned(name, label.removeprefix(LEARNER))
                     trials += int(runs.trials.sum())

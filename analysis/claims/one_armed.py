@@ -11,16 +11,15 @@ from coartic.analysis.claims.data import ASCENDING, DESCENDING, Data, MissingErr
 from coartic.analysis.claims.evidence import all_hold, exceeds, shown
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.claims.statements import MARGINS, decides
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.methods import EC1, INITIAL
 from coartic.analysis.signatures.context import dependence_below
 from coartic.analysis.signatures.subtasks import ROUNDING, change_from, sacrifices
 from coartic.analysis.signatures.trajectories import postures
 from coartic.analysis.statistics.estimates import SEED, Inference
 from coartic.robot import Array
 
-CONTROLS = ("posture-based/one-goal", "corrective-alone/given")
+CONTROLS = ("posture-based/one-goal", INITIAL)
 """Methods that do not look beyond the current goal."""
-_EC1 = f"{LEARNER}EC1"
 SHARE = MARGINS["halfway"]
 RATIO_TEST = (
     "one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to the "
@@ -33,7 +32,7 @@ _OPTIMUM = "optimum/dynamic-programming"
 def _first_movement_sacrificed(data: Data) -> Finding:
     tests, parts = [], []
     for task in (ASCENDING, DESCENDING):
-        cell, initial = data.cell(task, _EC1), data.initial(task)
+        cell, initial = data.cell(task, EC1), data.initial(task)
         before = initial.ticks_by_goal()[0]
         first = np.array([float(run.execution.ticks_by_goal()[0]) for run in cell.runs])
         total = np.array([float(run.execution.ticks) for run in cell.runs])
@@ -66,12 +65,12 @@ def sacrifice(data: Data, method: str) -> tuple[float, float]:
 @decides("overall-reward")
 def _overall_reward(data: Data) -> Finding:
     tests, parts = [], []
-    alone = f"{_EC1}-subtask"
+    alone = f"{EC1}-subtask"
     for task in (ASCENDING, DESCENDING):
         replays = data.replays(task, "EC1"), data.replays(task, "EC1-subtask")
         first = [
             np.array([float(run.execution.ticks_by_goal()[0]) for run in data.cell(task, m).runs])
-            for m in (_EC1, alone)
+            for m in (EC1, alone)
         ]
         tests += [exceeds(*replays), exceeds(*first)]
         initial = data.initial(task)
@@ -81,7 +80,7 @@ def _overall_reward(data: Data) -> Finding:
             f"(initial {initial.ticks_by_goal()[0]})"
         )
     with suppress(MissingError):
-        apart = [context_distance(data, method) for method in (_EC1, alone)]
+        apart = [context_distance(data, method) for method in (EC1, alone)]
         parts.append(
             f"postures at goal 1 before different successors {apart[0]:.2f} and {apart[1]:.2f} "
             "apart in the best trials, which are chosen by the whole reward"
@@ -91,10 +90,10 @@ def _overall_reward(data: Data) -> Finding:
 
 @decides("context")
 def _context_matters(data: Data) -> Finding:
-    distance = context_distance(data, _EC1)
-    row = data.signature(ASCENDING, _EC1, "context dependence", 1)
-    equivalent = data.signature(ASCENDING, _EC1, "motor-equivalent part", 1).value
-    other = data.signature(ASCENDING, _EC1, "non-motor-equivalent part", 1).value
+    distance = context_distance(data, EC1)
+    row = data.signature(ASCENDING, EC1, "context dependence", 1)
+    equivalent = data.signature(ASCENDING, EC1, "motor-equivalent part", 1).value
+    other = data.signature(ASCENDING, EC1, "non-motor-equivalent part", 1).value
     test = Inference(row.value, (int(row.n),), "permutation test over runs", p=row.p, seed=SEED)
     parts = [
         f"postures at goal 1 lie {distance:.2f} apart, {row.value:.1f} pooled SDs; per dimension "
@@ -103,7 +102,7 @@ def _context_matters(data: Data) -> Finding:
     for method in CONTROLS:
         with suppress(MissingError):
             parts.append(f"{method}: {context_distance(data, method):.2f} apart")
-    first, second = (postures(data.cell(t, _EC1).runs, 1) for t in (ASCENDING, DESCENDING))
+    first, second = (postures(data.cell(t, EC1).runs, 1) for t in (ASCENDING, DESCENDING))
     spread = MARGINS["spread"]
     p = dependence_below(first, second, spread, np.random.default_rng(SEED))
     contrary = replace(test, estimate=spread - row.value, method="bootstrap over runs", p=p)
@@ -123,7 +122,7 @@ def _resembles(data: Data, cost: str) -> Finding:
     """Whether learned postures resemble the plan of one smoothness cost."""
     tests, parts = [], []
     for task in (ASCENDING, DESCENDING):
-        learner, initial = data.cell(task, _EC1), data.initial(task)
+        learner, initial = data.cell(task, EC1), data.initial(task)
         (plan,) = data.cell(task, f"trajectory-optimisation/{cost}").runs
         planned = plan.execution.configurations
         before = _apart(initial.configurations, planned)

@@ -9,9 +9,7 @@ from __future__ import annotations
 import itertools
 import sys
 import textwrap
-import tomllib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from coartic.analysis.claims.catalogue import CLAIMS, family_sizes
@@ -21,10 +19,9 @@ from coartic.analysis.claims.statements import REASONS
 from coartic.analysis.published import RUNS
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.power import POWER, smallest_difference
+from coartic.analysis.words import stated
 
-SENTENCES: list[dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("sentences.toml").read_text(encoding="utf-8")
-)["sentence"]
+SENTENCES: list[dict[str, Any]] = stated(__file__, "sentences")["sentence"]
 """Testable sentences of the paper: ``place``, ``quote``, and ``claims``, ``held`` or ``open``."""
 
 

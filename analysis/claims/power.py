@@ -39,7 +39,7 @@ from coartic.analysis.methods import LEARNER
 from coartic.analysis.printed import ENTRIES, Order
 from coartic.analysis.published import RUNS, published_cell
 from coartic.analysis.statistics.estimates import FEWEST, LEVEL, SEED
-from coartic.analysis.statistics.hypotheses import independence_test, share_p
+from coartic.analysis.statistics.hypotheses import holm_rows, independence_test, share_p
 from coartic.analysis.statistics.instances import chance
 from coartic.analysis.statistics.power import POWER
 from coartic.analysis.statistics.spread import sd
@@ -89,7 +89,7 @@ def powers(claims: Iterable[Claim], runs: Sizes) -> dict[str, Chances]:
         known = {name: p for name, p in drawn.items() if p is not None}
         if not known:
             continue
-        passed = _holm(np.column_stack([p[0] for p in known.values()]), len(family)) < LEVEL
+        passed = holm_rows(np.column_stack([p[0] for p in known.values()]), len(family)) < LEVEL
         for place, (name, (_, contrary)) in enumerate(known.items()):
             p, weights = contrary
             refuted = min(1.0, float(weights[p * len(family) < LEVEL].sum()))
@@ -302,12 +302,3 @@ def _printed_bound(task: str, first: Side, second: Side) -> float | None:
 
 def _rng(*of: object) -> np.random.Generator:
     return np.random.default_rng([SEED, zlib.crc32(" ".join(map(str, of)).encode())])
-
-
-def _holm(p: Array, size: int) -> Array:
-    """Adjusted p-values of every row of ``p``, (simulations, claims), in a family of ``size``."""
-    order = np.argsort(p, axis=1, kind="stable")
-    steps = np.take_along_axis(p, order, axis=1) * (size - np.arange(p.shape[1]))
-    adjusted = np.empty_like(p)
-    np.put_along_axis(adjusted, order, np.maximum.accumulate(steps, axis=1), axis=1)
-    return adjusted

@@ -13,14 +13,14 @@ from coartic.analysis.claims.evidence import measured
 from coartic.analysis.claims.one_armed import context_distance, sacrifice
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.claims.statements import MARGINS, decides
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.methods import EC1, EC4, INITIAL
 from coartic.analysis.report.document import CellKey, Row, Value
 from coartic.analysis.statistics.estimates import LEVEL
 
 _PLAN, _POSTURES = "trajectory-optimisation/", "posture-based/"
 _FREE = " hands=every, other_arm=free"
 REPRESENTATIVES = (
-    ("learner", f"{LEARNER}EC1", f"{LEARNER}EC4"),
+    ("learner", EC1, EC4),
     ("CMA-ES", "cma-es/bandit", "cma-es/bandit"),
     ("shortest path", f"{_PLAN}path-length", f"{_PLAN}path-length"),
     ("least squared changes", f"{_PLAN}squared-changes", f"{_PLAN}squared-changes"),
@@ -28,12 +28,10 @@ REPRESENTATIVES = (
     ("two-goal planning", f"{_POSTURES}two-goals", f"{_POSTURES}two-goals{_FREE}"),
     ("one-goal planning", f"{_POSTURES}one-goal", f"{_POSTURES}one-goal{_FREE}"),
     ("nullspace control", "nullspace-qp/next-goal", "nullspace-qp/next-goal"),
-    ("corrective alone", "corrective-alone/given", "corrective-alone/every"),
+    ("corrective alone", INITIAL, "corrective-alone/every"),
 )
 """Name, label on the one-armed tasks, label on the two-armed ones."""
 STEP_APART, TURN_APART = MARGINS["steps"], MARGINS["turn"]
-_INITIAL = "corrective-alone/given"
-"""Whose solution of the one-armed tasks is the initial one."""
 
 Seen = tuple[bool, tuple[float, ...]]
 """Whether a method shows a signature, and the numbers that say so."""
@@ -85,7 +83,7 @@ def _lead(data: Data, label: str) -> Seen:
 def _turning(data: Data, label: str) -> Seen:
     own, initial = (
         sum(data.signature(ASCENDING, name, "turning angle", goal).value for goal in (1, 2))
-        for name in (label, _INITIAL)
+        for name in (label, INITIAL)
     )
     return own <= initial - TURN_APART, (own,)
 
@@ -118,8 +116,8 @@ _SIGNS = (
 @decides("shared-signatures")
 def _shared_signatures(data: Data) -> Finding:
     """Every representative that the folder has, with every signature."""
-    data.runs(ASCENDING, f"{LEARNER}EC1")
-    data.runs(DESCENDING, f"{LEARNER}EC1")
+    data.runs(ASCENDING, EC1)
+    data.runs(DESCENDING, EC1)
     rows = []
     shown: dict[str, list[str]] = {}
     for name, one, two in REPRESENTATIVES:

@@ -85,7 +85,7 @@ def _as_printed(task: str, side: Side) -> str | None:
     """Mean reward of one side as the paper has it, in words."""
     if side.known:
         initial = published_initial(task)
-        derived = side.name == "initial" and initial is not None and initial[2]
+        derived = side.name == "initial" and initial is not None and initial.derived
         value = printed_known(task, side)
     else:
         cell = published_cell(task, side.name)
@@ -193,26 +193,16 @@ def _about(data: Data, claim: Claim) -> Finding:
     )
     low, high = stats.binomtest(count, total).proportion_ci()
     share = count / total
+    within = f"two one-tailed exact binomial tests, {FEW:.0%} and {MOST:.0%}"
+    room, p = min(share - FEW, MOST - share), float(half_p(count, total))
+    unlike = "Fisher's exact test, two-tailed, against the printed counts"
+    apart, contrary_p = share - printed[0] / printed[1], unlike_p((count, total), printed)
     return Finding(
         FEW < share < MOST,
         f"{words} in {count} of {total} runs ({tally(found)}), {low:.0%} to {high:.0%} of all "
         f"(95 %); published {printed[0]} of {printed[1]}{' (derived)' * derived}",
-        (
-            Inference(
-                min(share - FEW, MOST - share),
-                (total,),
-                f"two one-tailed exact binomial tests, {FEW:.0%} and {MOST:.0%}",
-                p=float(half_p(count, total)),
-            ),
-        ),
-        (
-            Inference(
-                share - printed[0] / printed[1],
-                (total, printed[1]),
-                "Fisher's exact test, two-tailed, against the printed counts",
-                p=unlike_p((count, total), printed),
-            ),
-        ),
+        (Inference(room, (total,), within, p=p),),
+        (Inference(apart, (total, printed[1]), unlike, p=contrary_p),),
     )
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import sys
-import tomllib
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any, TypeVar
 
 from coartic.analysis.claims.data import Cells
 from coartic.analysis.claims.register import Claim, Finding
 from coartic.analysis.printed import ENTRIES
+from coartic.analysis.words import stated
 
 _APART = ("one-armed", "two-armed")
-_REGISTER = tomllib.loads((Path(__file__).parent / "claims.toml").read_text(encoding="utf-8"))
+_REGISTER = stated(__file__, "claims")
 REASONS: dict[str, dict[str, Any]] = _REGISTER.pop("margins")
 """Every margin with its value and the reason for it, by name."""
 MARGINS: dict[str, float] = {name: float(said["value"]) for name, said in REASONS.items()}

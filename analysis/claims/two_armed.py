@@ -27,7 +27,7 @@ def _right_hand_better(data: Data) -> Finding:
         raise MissingError("the corrective process alone has no reward with RRRR or LLLL")
     printed = published_initial(ONE)
     assert printed is not None
-    return Finding(right > left, f"RRRR {right:.0f} (published {printed[1]}), LLLL {left:.0f}")
+    return Finding(right > left, f"RRRR {right:.0f} (published {printed.reward}), LLLL {left:.0f}")
 
 
 def _base_steps(start: Array, configurations: Array) -> Array:

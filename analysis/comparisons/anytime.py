@@ -32,15 +32,13 @@ def anytime_curves(study: Study) -> pd.DataFrame:
     ``runs``, ``solved`` (runs that have a solution within the budget), ``mean`` reward with
     the interval ``low`` to ``high``, and ``median`` reward.
 
-    A curve starts where the first run has a solution and ends where the first run ends, so
-    that nothing is extrapolated. The mean is missing until every run has a solution, never
-    one of the faster runs alone; the median counts a run without one as worse than any.
-    Intervals are those of :func:`coartic.analysis.statistics.intervals.mean_interval`, pointwise,
-    not
-    a band around the whole curve; they are missing for a single run. A cell's rows do not depend
-    on other cells. Runs whose time is not taken
-    (:func:`coartic.analysis.comparisons.methods.solve_times`) have no part in the curve over
-    time, nor methods with a base that a parameter locks in any.
+    A curve starts where the first run has a solution and ends where the first run ends, so that
+    nothing is extrapolated. The mean is missing until every run has a solution, never one of the
+    faster runs alone; the median counts a run without one as worse than any. Intervals are those
+    of :func:`coartic.analysis.statistics.intervals.mean_interval`, pointwise, not a band around
+    the whole curve; they are missing for a single run. A cell's rows do not depend on other cells.
+    Runs whose time is not taken (:func:`coartic.analysis.comparisons.methods.solve_times`) have no
+    part in the curve over time, nor methods with a base that a parameter locks in any.
     """
     parts = []
     for cell, spend, runs in cells_by_spend(study):

@@ -47,9 +47,8 @@ def areas(study: Study) -> pd.DataFrame:
     Columns: those of :class:`Area`. ``other_arm``: which optimum; ``area`` is the mean over
     ``runs`` with its interval ``low`` to ``high``
     (:func:`coartic.analysis.statistics.intervals.mean_interval`). Tasks without a known optimum,
-    spends
-    without a run that learns, and methods with a base that a parameter locks have no rows; of
-    the optimum with the other arm still neither have methods that move that arm.
+    spends without a run that learns, and methods with a base that a parameter locks have no rows;
+    of the optimum with the other arm still neither have methods that move that arm.
     """
     ends: dict[tuple[str, str], float] = {}
     for cell, spend, runs in cells_by_spend(study):

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.methods import LEARNER, TOGETHER
 from coartic.analysis.statistics.across_tasks import (
     Reached,
     gap_share,
@@ -74,12 +74,12 @@ def variant(label: str) -> bool:
 def normalised_scores(study: Study) -> pd.DataFrame:
     """One row a run of every task whose optimum and initial solution are known.
 
-    Columns ``task``, ``method`` (with its variant), ``label`` (the cell's, whatever becomes
-    of ``method``), ``run``, ``seed``, ``reward``;
-    ``score`` (:func:`~coartic.analysis.statistics.across_tasks.normalised`) and ``gap``
-    (:func:`~coartic.analysis.statistics.across_tasks.gap_share`), both against the optimum
-    with all joints free and the corrective process alone with the task's initial hands. A
-    run without a solution has NaN for all three.
+    Columns ``task``, ``method`` (with its variant), ``label`` (the cell's, whatever becomes of
+    ``method``), ``run``, ``seed``, ``reward``; ``score``
+    (:func:`~coartic.analysis.statistics.across_tasks.normalised`) and ``gap``
+    (:func:`~coartic.analysis.statistics.across_tasks.gap_share`), both against the optimum with
+    all joints free and the corrective process alone with the task's initial hands. A run without a
+    solution has NaN for all three.
     """
     parts, known = [], ends(study)
     for cell in study.cells.values():
@@ -113,9 +113,9 @@ def by_task(scores: pd.DataFrame, method: str, column: str = "score") -> dict[st
 def combined(scores: pd.DataFrame) -> pd.DataFrame:
     """``scores`` with rows of the learner over one-armed and two-armed tasks.
 
-    ``scores`` is of :func:`normalised_scores`. Where EC4 (likewise
-    EC3) ran, its runs, elsewhere those of EC1, both as method ``dual-process (EC1, EC4)``;
-    likewise variants of the two with the same name and parameters.
+    ``scores`` is of :func:`normalised_scores`. Where EC4 (likewise EC3) ran, its runs, elsewhere
+    those of EC1, both as method ``dual-process (EC1, EC4)``; likewise variants of the two with the
+    same name and parameters.
     """
     parts = [scores]
     for label in sorted(set(scores.method)):
@@ -127,7 +127,7 @@ def combined(scores: pd.DataFrame) -> pd.DataFrame:
         one_armed = scores[scores.method == f"{LEARNER}{_ONE_ARMED}{variant}"]
         elsewhere = one_armed[~one_armed.task.isin(two_armed.task)]
         if len(elsewhere):
-            name = f"{LEARNER.rstrip('/')} ({_ONE_ARMED}{variant}, {condition}{variant})"
+            name = f"{TOGETHER}{_ONE_ARMED}{variant}, {condition}{variant})"
             parts.append(pd.concat([elsewhere, two_armed]).assign(method=name))
     return pd.concat(parts, ignore_index=True)
 

@@ -51,7 +51,7 @@ class PaperRow:
         initial, summary = published_initial(self.cell.task), self.paper.summary
         if self.margin is None or initial is None or summary is None:
             return None
-        gain = summary.mean - initial[1]
+        gain = summary.mean - initial.reward
         return self.margin / gain if gain > 0 else None
 
 

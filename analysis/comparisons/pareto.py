@@ -32,16 +32,15 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 def pareto_sets(study: Study) -> pd.DataFrame:
     """Mean reward against spend: one row per task, method and spend, best reward first.
 
-    A method is on the front if no other has a mean reward as high for as little spend, with
-    either one better; ties are all on it. Times within :data:`TIME_TOLERANCE` of each other
-    are ties: they vary between machines and between runs. Columns: ``task``, ``method``,
-    ``told`` (a letter for each kind of information,
-    :data:`coartic.analysis.comparisons.methods.TOLD`), ``runs``,
+    A method is on the front if no other has a mean reward as high for as little spend, with either
+    one better; ties are all on it. Times within :data:`TIME_TOLERANCE` of each other are ties:
+    they vary between machines and between runs. Columns: ``task``, ``method``, ``told`` (a letter
+    for each kind of information, :data:`coartic.analysis.comparisons.methods.TOLD`), ``runs``,
     ``solved``, mean ``reward``, ``spend`` (:data:`~coartic.analysis.comparisons.progress.LABELS`;
     ``information`` is the number of kinds of information told, which does not weigh them),
     ``amount`` (median over runs), ``front``, ``front_share`` (of
-    :data:`~coartic.analysis.statistics.intervals.RESAMPLES` bootstrap resamples, in how many it
-    is on the front), and ``front_told`` and ``told_share``: the same among methods that were told
+    :data:`~coartic.analysis.statistics.intervals.RESAMPLES` bootstrap resamples, in how many it is
+    on the front), and ``front_told`` and ``told_share``: the same among methods that were told
     nothing that it was not.
 
     Runs are resampled within their cell, reward and spend of a run together, by run number:

@@ -15,7 +15,8 @@ import pandas as pd
 
 from coartic.analysis.comparisons.overall import ends, variant
 from coartic.analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
-from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS
+from coartic.analysis.statistics.across_tasks import band
+from coartic.analysis.statistics.estimates import FEWEST
 from coartic.record import SEARCH
 from coartic.robot import Array
 
@@ -52,9 +53,8 @@ def reached(study: Study) -> pd.DataFrame:
     """Rows as :class:`Reached`, where a share changes, of all methods without their variants.
 
     Of the tasks that have a scale (:func:`~coartic.analysis.comparisons.overall.ends`); a run
-    whose
-    steps are not known, such as the time of a cold one, has no part. A method has rows over all
-    tasks if it ran on every one of them.
+    whose steps are not known, such as the time of a cold one, has no part. A method has rows over
+    all tasks if it ran on every one of them.
     """
     scale = ends(study)
     curves: dict[tuple[str, str, str], Array] = {}
@@ -114,24 +114,13 @@ def _rows(
 ) -> Iterator[Reached]:
     """One where the mean over ``parts`` changes, of the first budget and of the last."""
     share = np.mean([runs.mean(axis=0) for runs in parts], axis=0)
-    low, high = _band(parts)
+    low = high = np.full(len(share), math.nan)
+    if min(map(len, parts)) >= FEWEST:
+        low, high = band(parts, resamples=_RESAMPLES)
     count = sum(len(runs) for runs in parts)
     for place, budget in enumerate(budgets):
         inner = 0 < place < len(budgets) - 1
         if inner and share[place] == share[place - 1]:
             continue
-        ends_here = low[place], high[place]
+        ends_here = float(low[place]), float(high[place])
         yield Reached(task, label, spend, float(budget), float(share[place]), *ends_here, count)
-
-
-def _band(parts: Sequence[Array]) -> tuple[list[float], list[float]]:
-    if min(map(len, parts)) < FEWEST:
-        none = [math.nan] * parts[0].shape[1]
-        return none, none
-    rng = np.random.default_rng(SEED)
-    drawn = np.zeros((_RESAMPLES, parts[0].shape[1]))
-    for runs in parts:
-        counts = rng.multinomial(len(runs), np.full(len(runs), 1 / len(runs)), size=_RESAMPLES)
-        drawn += counts @ runs / len(runs)
-    low, high = np.quantile(drawn / len(parts), TAILS, axis=0)
-    return low.tolist(), high.tolist()

@@ -53,16 +53,15 @@ def targets(study: Study, *, shares: Sequence[float] = SHARES) -> pd.DataFrame:
     Clopper & Pearson, 1934), ``median`` spend to reach it with the interval ``low`` to ``high``
     (:func:`coartic.analysis.statistics.intervals.kaplan_meier_median`), and ``horizon``.
 
-    The median is over all runs, infinite where half of them did not reach the target; so
-    are limits that the runs do not bound. Runs that could have gone on are right-censored,
-    all at the horizon: the least spend at which one of them ended. (Each at its own end
-    would make censoring depend on the outcome: worse trials take more ticks. Lin et al.,
-    1997, on costs.) What was reached behind the horizon counts in ``reached`` only. A run
-    could have gone on if its budget of trials stopped it (:attr:`BestSoFar.stopped
+    The median is over all runs, infinite where half of them did not reach the target; so are
+    limits that the runs do not bound. Runs that could have gone on are right-censored, all at the
+    horizon: the least spend at which one of them ended. (Each at its own end would make censoring
+    depend on the outcome: worse trials take more ticks. Lin et al., 1997, on costs.) What was
+    reached behind the horizon counts in ``reached`` only. A run could have gone on if its budget
+    of trials stopped it (:attr:`BestSoFar.stopped
     <coartic.analysis.comparisons.progress.BestSoFar.stopped>`). Runs that ended by themselves
-    never
-    reach a target that they missed: a planner's, an exhaustive search's that tried all it had,
-    one without a solution. The horizon is infinite where all runs ended by themselves. Runs
+    never reach a target that they missed: a planner's, an exhaustive search's that tried all it
+    had, one without a solution. The horizon is infinite where all runs ended by themselves. Runs
     whose time is not taken have no part in those over time.
 
     Tasks without a known optimum have no rows, nor have methods with a base that a parameter

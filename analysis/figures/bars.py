@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from scipy import stats
 
 from coartic.analysis.comparisons.paper import published_of
 from coartic.analysis.figures import style
 from coartic.analysis.figures.configurations import initial_solution
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import CONDITIONS, has, missing, solved
-from coartic.analysis.methods import LEARNER, short_name
+from coartic.analysis.figures.selection import has, missing, solved
+from coartic.analysis.methods import CONDITIONS, LEARNER, short_name
 from coartic.analysis.published import Summary, published_cell, published_initial
 from coartic.analysis.statistics.estimates import CONFIDENCE, RESAMPLES, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
@@ -49,10 +48,9 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]
     width = style.column_width(0.5 + 0.58 * sum(counts))
-    rows, columns = style.row(len(labels))
-    figure = Figure(figsize=(width, 2.6 * rows), layout="constrained")
+    rows, columns = style.grid(len(labels), len(labels))
     ratios = counts if columns > 1 else None
-    panels = figure.subplots(rows, columns, width_ratios=ratios, squeeze=False).ravel()
+    figure, panels = style.figure_of((rows, columns), (width, 2.6 * rows), width_ratios=ratios)
     for axes, name in zip(panels, labels, strict=True):
         runs = {label: study.cells[name, label].rewards for label in labels[name]}
         _panel(axes, data[data.task == name], runs)
@@ -79,7 +77,7 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     """The initial solution, then the methods, each tested against the row before."""
     initial = float(-initial_solution(study, task).execution.ticks)
     printed = published_initial(task)
-    published = float(printed[1]) if printed else math.nan
+    published = float(printed.reward) if printed else math.nan
     rows: list[dict[str, Any]] = [
         {"task": task, "method": "initial", "reward": initial, "published": published}
     ]

@@ -16,9 +16,9 @@ from coartic import Execution, Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from coartic.analysis.figures.selection import CONDITIONS, missing, solved
-from coartic.analysis.methods import short_name
-from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.figures.selection import missing, solved
+from coartic.analysis.methods import CONDITIONS, short_name
+from coartic.analysis.signatures import trajectories
 from coartic.analysis.study import Study
 from coartic.robot import Array
 from coartic.task import hands_of
@@ -72,7 +72,7 @@ def initial_solution(study: Study, task: str) -> Solution:
 
     Raises CoarticError where that does not complete the task.
     """
-    execution = Trajectories(study.tasks[task], "", "", (), model=study.model).initial
+    execution = trajectories.initial_solution(study.tasks[task], study.model)
     if execution is None:
         raise missing(study, f"the corrective process alone does not complete {task}")
     return Solution(study.tasks[task], "", "", execution)
@@ -195,29 +195,18 @@ def _draw(shown: Sequence[Solution]) -> Figure:
         title = f"{task.label}: {solution.name}" if len(extents) > 1 else solution.name
         figure.text(0.004, (top - 0.03) / height, title, **bold)
         top -= head + tall
-        panels = [
-            figure.add_axes(
-                (
-                    (k * wide + gap / 2) / style.widest(),
-                    top / height,
-                    width / style.widest(),
-                    tall / height,
-                )
-            )
-            for k in range(len(task.goals))
-        ]
+        across, up = width / style.widest(), tall / height
+        lefts = ((k * wide + gap / 2) / style.widest() for k in range(len(task.goals)))
+        panels = [figure.add_axes((left, top / height, across, up)) for left in lefts]
         _panels(panels, solution, *corners[task.name])
         total = f"total\n{style.number(-solution.execution.ticks)}"
         place = 1 - 0.02 / style.widest(), (top + tall / 2) / height
         figure.text(*place, total, ha="right", va="center", fontsize=style.NORMAL)
     before = style.entry("before", color=style.GREY, linewidth=0.9)
     handles = legend_entries(hand for solution in shown for hand in solution.task.hands)
-    figure.legend(
-        handles=[*handles, before],
-        loc="lower center",
-        ncols=2 if style.narrow() else 4,
-        borderaxespad=0.2,
-    )
+    columns = 2 if style.narrow() else 4
+    place_of: Any = {"loc": "lower center", "ncols": columns, "borderaxespad": 0.2}
+    figure.legend(handles=[*handles, before], **place_of)
     bar = np.array([0.08, 0.08 + scale]) / style.widest()
     figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=style.INK, linewidth=1.2))
     figure.text(bar[1] + 0.04 / style.widest(), 0.13 / height, "1 length unit", va="center")

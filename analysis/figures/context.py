@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.bars import stars
@@ -38,13 +37,9 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     if len(places) > MOST:
         raise missing(study, f"{len(places)} pairs of tasks share a goal, more than {MOST}")
     rows = sum(len(group) + 4 for _, group in places)
-    figure = Figure(
-        figsize=(style.ONE, min(0.5 + 0.16 * rows, style.TALLEST)), layout="constrained"
-    )
+    size = style.ONE, min(0.5 + 0.16 * rows, style.TALLEST)
     heights = [len(group) + 1 for _, group in places]
-    panels = figure.subplots(
-        len(places), squeeze=False, sharex=True, height_ratios=heights
-    ).ravel()
+    figure, panels = style.figure_of((len(places), 1), size, sharex=True, height_ratios=heights)
     farthest = float(data[["equivalent", "other"]].max().max()) or 1.0  # all the same: any scale
     for axes, ((task, where), group) in zip(panels, places, strict=True):
         _panel(axes, group)

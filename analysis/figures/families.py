@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, spoken, worded
 from coartic.analysis.figures.selection import missing
 from coartic.analysis.generality.exploration import CONTRASTS, gains
-from coartic.analysis.generality.sample import INITIAL, Sample
-from coartic.analysis.methods import short_name
-from coartic.analysis.statistics.instances import RESAMPLES, other_tasks, value
+from coartic.analysis.generality.sample import Sample
+from coartic.analysis.methods import INITIAL, short_name
+from coartic.analysis.statistics.instances import RESAMPLES, Runs, other_tasks, value
 from coartic.analysis.study import Study
 
 _FARTHEST = 1.0
@@ -51,22 +52,18 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
     looks = style.looks(order)
     families = list(sample.families)
-    rows, columns = style.row(len(families))
+    rows, columns = style.grid(len(families), len(families))
     size = style.widest(), (0.9 + 0.19 * len(order)) * rows
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    dot: Any = {"markersize": 2.4, "alpha": 0.5, "markeredgewidth": 0, "linestyle": ""}
-    mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
+    figure, panels = style.figure_of((rows, columns), size, sharey=True)
     for axes, family in zip(panels, families, strict=True):
         for place, label in enumerate(order):
             own = data[(data.method == label) & (data.family == family)].gap.to_numpy()
             if not len(own):
                 continue
-            heights = -place + 0.12 * (np.arange(len(own)) % 3 - 1)
-            axes.plot(np.minimum(own, _FARTHEST), heights, "o", color=looks[label].color, **dot)
             row = ends[(ends.method == label) & (ends.family == family)].iloc[0]
-            axes.plot([row.low, row.high], [-place, -place], color=style.INK, linewidth=1)
-            axes.plot(row["mean"], -place, "D", color=style.INK, **mean)
+            dot = {"color": looks[label].color, "markersize": 2.4, "alpha": 0.5}
+            heights = -place + 0.12 * (np.arange(len(own)) % 3 - 1)
+            _instances(axes, -place, row, (np.minimum(own, _FARTHEST), heights), dot)
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
         axes.set_xlim(-0.004, _FARTHEST * 1.15)
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"], minor=False)
@@ -80,22 +77,30 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
     return worded("gaps-by-family", figure, joined, resamples=RESAMPLES, means=told)
 
 
+def _instances(
+    axes: Axes, y: float, row: pd.Series, places: tuple[ArrayLike, ArrayLike], dot: dict[str, Any]
+) -> None:
+    """Dots at their places about a height, and on it their mean with its interval."""
+    axes.plot(*places, "o", markeredgewidth=0, linestyle="", **dot)
+    axes.plot([row.low, row.high], [y, y], color=style.INK, linewidth=1)
+    mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
+    axes.plot(row["mean"], y, "D", color=style.INK, **mean)
+
+
+def _mean(family: str, own: Sequence[Runs]) -> dict[str, float]:
+    """Over the instances of a family, with its interval."""
+    found = other_tasks({family: own})
+    return {"mean": found.estimate, "low": found.low, "high": found.high}
+
+
 def _means(sample: Sample, labels: Sequence[str]) -> pd.DataFrame:
-    rows = []
-    for label in labels:
-        for family, own in sample.gaps(label).items():
-            found = other_tasks({family: own})
-            rows.append(
-                {
-                    "method": label,
-                    "family": family,
-                    "mean": found.estimate,
-                    "low": found.low,
-                    "high": found.high,
-                    "instances": len(own),
-                }
-            )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        [
+            {"method": label, "family": family, **_mean(family, own), "instances": len(own)}
+            for label in labels
+            for family, own in sample.gaps(label).items()
+        ]
+    )
 
 
 @style.styled
@@ -106,23 +111,15 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
     against the initial solution. Raises CoarticError where the folder has no such pairs.
     """
     sample = _sample(study)
-    pairs = [pair for pair in CONTRASTS if pair[1] != INITIAL]
     rows = []
-    for first, second in pairs:
+    for first, second in (pair for pair in CONTRASTS if pair[1] != INITIAL):
         names = sample.shared(first, second)
         scores = gains(sample, first, second, names)
         for family, own in scores.items():
-            found = other_tasks({family: own})
+            pair = f"{short_name(first)} over {short_name(second)}"
+            found = _mean(family, own)
             rows += [
-                {
-                    "method": f"{short_name(first)} over {short_name(second)}",
-                    "family": family,
-                    "task": name,
-                    "gain": value(runs),
-                    "mean": found.estimate,
-                    "low": found.low,
-                    "high": found.high,
-                }
+                {"method": pair, "family": family, "task": name, "gain": value(runs), **found}
                 for name, runs in zip(names[family], own, strict=True)
             ]
     if not rows:
@@ -130,11 +127,9 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
     data = pd.DataFrame(rows)
     families = list(dict.fromkeys(data.family))
     order = list(dict.fromkeys(data.method))
-    shape = style.row(len(order))
-    figure = Figure(figsize=(style.widest(), 2.0 * shape[0]), layout="constrained")
-    panels = figure.subplots(*shape, sharey=True, sharex=True, squeeze=False).ravel()
-    dot: Any = {"markersize": 2.6, "alpha": 0.55, "markeredgewidth": 0, "linestyle": ""}
-    mean: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
+    shape = style.grid(len(order), len(order))
+    size = style.widest(), 2.0 * shape[0]
+    figure, panels = style.figure_of(shape, size, sharey=True, sharex=True)
     for axes, pair in zip(panels, order, strict=True):
         axes.axvline(0, **style.INITIAL)
         for place, family in enumerate(families):
@@ -143,10 +138,8 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
                 continue
             color = style.PALETTE[place % len(style.PALETTE)]
             heights = -place + 0.1 * (np.arange(len(own)) % 5 - 2)
-            axes.plot(own.gain, heights, "o", color=color, **dot)
-            row = own.iloc[0]
-            axes.plot([row.low, row.high], [-place, -place], color=style.INK, linewidth=1)
-            axes.plot(row["mean"], -place, "D", color=style.INK, **mean)
+            dot = {"color": color, "markersize": 2.6, "alpha": 0.55}
+            _instances(axes, -place, own.iloc[0], (own.gain.to_numpy(), heights), dot)
         axes.set_xscale("symlog", linthresh=0.05, linscale=1.0)
         axes.minorticks_off()
         axes.set_xticks([-0.5, -0.1, 0, 0.1, 0.5], ["−50", "−10", "0", "10", "50"])

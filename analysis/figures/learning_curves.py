@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import CONDITIONS, has, missing
-from coartic.analysis.methods import short_name
-from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.figures.selection import has, missing
+from coartic.analysis.methods import CONDITIONS, EC1, short_name
+from coartic.analysis.signatures.trajectories import initial_solution
 from coartic.analysis.study import Study
 from coartic.robot import Array
 
@@ -66,7 +66,7 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
 def _default(study: Study, task: str) -> list[str]:
     """EC1 stands for the learner on one-armed tasks, the others on two-armed ones."""
     labels = [label for label in _DEFAULT if has(study, task, label)]
-    others = [label for label in labels if label != CONDITIONS[0]]
+    others = [label for label in labels if label != EC1]
     two = set(CONDITIONS) & set(others)
     return others if two else labels
 
@@ -130,7 +130,7 @@ def _panel(
         axes.plot(rows.trial, rows.best, linewidth=1.3, **look.line)
         axes.plot(rows.trial, rows.trials, linewidth=0.6, **look.line)
     floor, top = data.best.min(), data.best_high.max()
-    initial = Trajectories(task, "", "", (), model=study.model).initial
+    initial = initial_solution(task, study.model)
     if initial is not None:
         axes.axhline(-initial.ticks, **style.INITIAL)
         floor, top = -initial.ticks, max(top, -initial.ticks)

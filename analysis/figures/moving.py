@@ -1,8 +1,7 @@
 """Movements tick by tick as one SVG that moves by itself, wherever pictures are shown.
 
 By the conventions of the films of :mod:`coartic.analysis.figures.animation`, in SVG's own
-animation
-(SMIL), without a script. What does not move shows the end of each movement.
+animation (SMIL), without a script. What does not move shows the end of each movement.
 """
 
 from __future__ import annotations

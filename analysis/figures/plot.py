@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import io
 import re
-import tomllib
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from coartic.analysis.figures.style import CONFIDENCE, GREY, INK, PAPER, RC, dag
 from coartic.analysis.figures.svg import compact
 from coartic.analysis.methods import short_name
 from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.words import stated
 from coartic.files import write_atomically
 from coartic.text import one_line, printed
 
@@ -35,9 +35,7 @@ _NO_DATE = {
 }
 _COLOURS = 256
 _FAMILY = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
-_WORDS: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
-)
+_WORDS: dict[str, dict[str, str]] = stated(__file__, "words")
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 

@@ -17,8 +17,8 @@ from coartic import Hand, Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.robot import MARKERS, box
-from coartic.analysis.figures.selection import CONDITIONS, chosen, missing
-from coartic.analysis.methods import spoken_name
+from coartic.analysis.figures.selection import chosen, missing
+from coartic.analysis.methods import CONDITIONS, spoken_name
 from coartic.analysis.study import Study
 from coartic.robot import Array
 from coartic.task import hands_of
@@ -103,16 +103,8 @@ def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
     figure = Figure(figsize=(style.ONE, 1.6), layout="constrained")
     _draw(figure.subplots(), found)
-    first, second = found.tasks
-    facts: dict[str, Any] = {
-        "method": spoken_name(found.method),
-        "goal": found.goal,
-        "first": first.label,
-        "second": second.label,
-        "apart": f"{found.apart:.2f}",
-        "hands": f"{found.hands_apart:.2f}",
-    }
-    return worded("postures", figure, _data(found), found.tasks, **facts)
+    method = spoken_name(found.method)
+    return worded("postures", figure, _data(found), found.tasks, found=found, method=method)
 
 
 def _draw(axes: Axes, found: Contexts) -> None:

@@ -7,14 +7,13 @@ from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from coartic.analysis.comparisons.reached import WAY
 from coartic.analysis.figures import style
 from coartic.analysis.figures.frontier import NAMES
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import CONDITIONS, HEADLINES, missing
-from coartic.analysis.methods import LEARNER, short_name
+from coartic.analysis.figures.selection import HEADLINES, missing
+from coartic.analysis.methods import CONDITIONS, LEARNER, TOGETHER, short_name
 from coartic.analysis.study import Study
 
 SHOWN = ("trials", "forward_kinematics")
@@ -25,7 +24,13 @@ _BAND: Any = {"step": "post", "alpha": 0.15, "linewidth": 0}
 def look_alike(label: str) -> str:
     """Whose look a method has: the learner over all tasks that of its two-armed condition."""
     ends = (name for name in reversed(CONDITIONS) if name.removeprefix(LEARNER) in label)
-    return next(ends, label) if label.startswith(f"{LEARNER.rstrip('/')} (") else label
+    return next(ends, label) if label.startswith(TOGETHER) else label
+
+
+def look_of(label: str) -> style.Look:
+    """The look of :func:`look_alike`."""
+    alike = look_alike(label)
+    return style.looks([alike])[alike]
 
 
 def main_methods(data: pd.DataFrame) -> list[str]:
@@ -53,14 +58,13 @@ def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     labels = list(methods or main_methods(shown))
     spends = [spend for spend in SHOWN if (shown.spend == spend).any()]
     rows = -(-len(labels) // 4)
-    figure = Figure(figsize=(style.TWO, 2.2 + 0.15 * rows), layout="constrained")
-    panels = figure.subplots(1, len(spends), squeeze=False, sharey=True).ravel()
+    size = style.TWO, 2.2 + 0.15 * rows
+    figure, panels = style.figure_of((1, len(spends)), size, sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
         _panel(axes, shown[shown.spend == spend], labels, NAMES[spend])
     panels[0].set_ylabel("levels of reward reached (%)")
     style.letters(panels)
-    looks = {label: style.looks([look_alike(label)])[look_alike(label)] for label in labels}
-    handles = [style.entry(short_name(label), **look.line) for label, look in looks.items()]
+    handles = [style.entry(short_name(label), **look_of(label).line) for label in labels]
     style.legend(figure, handles, 4)
     ends = shown[(shown.spend == spends[0]) & shown.method.isin(labels)]
     ends = ends.groupby("method", sort=False).tail(1)
@@ -81,7 +85,7 @@ def _panel(axes: Axes, data: pd.DataFrame, labels: Sequence[str], name: str) -> 
     edge = least / 2
     for label in labels:
         own = data[data.method == label]
-        look = style.looks([look_alike(label)])[look_alike(label)]
+        look = look_of(label)
         x = own.budget.clip(lower=edge)
         axes.step(x, 100 * own.share, where="post", **look.line)
         axes.fill_between(x, 100 * own.low, 100 * own.high, color=look.color, **_BAND)

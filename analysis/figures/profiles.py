@@ -13,13 +13,12 @@ from coartic.analysis.comparisons.overall import REACHED, by_task, normalised_sc
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.selection import (
-    CONDITIONS,
     HEADLINES,
     chosen,
     known_methods,
     missing,
 )
-from coartic.analysis.methods import short_name
+from coartic.analysis.methods import EC4, most_exploring, short_name
 from coartic.analysis.statistics.across_tasks import profile
 from coartic.analysis.study import Study
 
@@ -50,9 +49,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     scores = normalised_scores(study)
     tasks = list(scores.task.unique())
     known = study.results.tasks
-    learners = {
-        name: CONDITIONS[0] if len(known[name].hands) == 1 else CONDITIONS[3] for name in tasks
-    }
+    learners = {name: most_exploring(known[name]) for name in tasks}
     joined = scores[scores.method == scores.task.map(learners)].assign(method=LEARNER)
     scores = pd.concat([joined, scores], ignore_index=True)
     known_methods(study, [label for label in methods or () if label != LEARNER])
@@ -95,17 +92,16 @@ def _name(label: str) -> str:
 
 def _draw(data: pd.DataFrame, labels: Sequence[str]) -> Figure:
     # The learner looks as its fourth condition does.
-    alike = {label: CONDITIONS[3] if label == LEARNER else label for label in labels}
+    alike = {label: EC4 if label == LEARNER else label for label in labels}
     looks = style.looks(alike.values())
     lines: dict[str, Any] = {
         label: {**looks[like].line, "linewidth": 1.6 if label == LEARNER else 0.9}
         for label, like in alike.items()
     }
     rows = -(-len(labels) // 3)
-    up, across = style.row(2)
-    size = style.widest(), 2.35 * up + 0.15 * rows * up
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(up, across, sharey=True)
+    shape = style.grid(2, 2)
+    size = style.widest(), 2.35 * shape[0] + 0.15 * rows * shape[0]
+    figure, panels = style.figure_of(shape, size, sharey=True)
     for axes, (kind, curves) in zip(panels, data.groupby("kind", sort=False), strict=True):
         for label, own in curves.groupby("method", sort=False):
             line = lines[str(label)]

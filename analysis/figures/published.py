@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from coartic.analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, worded
-from coartic.analysis.figures.selection import CONDITIONS, missing
-from coartic.analysis.methods import short_name
+from coartic.analysis.figures.selection import missing
+from coartic.analysis.methods import CONDITIONS, short_name
 from coartic.analysis.published import TRIALS, Summary
 from coartic.analysis.statistics.equivalence import MARGIN, Equivalence
 from coartic.analysis.study import Study

@@ -8,16 +8,15 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from coartic.analysis.comparisons.methods import INFORMED, UNTOLD, informed
 from coartic.analysis.comparisons.overall import variant
 from coartic.analysis.comparisons.reached import ALL_TASKS
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.price import look_alike
+from coartic.analysis.figures.price import look_of
 from coartic.analysis.figures.selection import missing
-from coartic.analysis.methods import LEARNER, family_of, short_name
+from coartic.analysis.methods import LEARNER, TOGETHER, family_of, short_name
 from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.study import Study
 from coartic.record import SEARCH
@@ -103,12 +102,11 @@ def ranking(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     shown = data[data.task == data.task.iloc[0]]
     groups = [(told, shown[shown.told == told]) for told in GROUPS if (shown.told == told).any()]
     rows = len(shown) + len(groups)
-    figure = Figure(figsize=(style.TWO, 0.5 + 0.145 * rows), layout="constrained")
-    heights = [len(own) + 0.8 for _, own in groups]
-    panels = figure.subplots(len(groups), squeeze=False, sharex=True, height_ratios=heights)
-    for axes, (told, own) in zip(panels.ravel(), groups, strict=True):
+    size, heights = (style.TWO, 0.5 + 0.145 * rows), [len(own) + 0.8 for _, own in groups]
+    figure, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
+    for axes, (told, own) in zip(panels, groups, strict=True):
         _panel(axes, told, own)
-    last = panels.ravel()[-1]
+    last = panels[-1]
     last.set_xlim(-0.02 * shown.gap.max(), 1.05 * shown[["gap", "high"]].max(axis=None))
     last.set_xlabel("gap to the optimum (%), nearer 0 is better")
     over = "mean over all tasks" if shown.task.iloc[0] == ALL_TASKS else f"on {shown.task.iloc[0]}"
@@ -126,8 +124,7 @@ def _panel(axes: Axes, told: str, own: pd.DataFrame) -> None:
     axes.set_title(told)
     for place, values in enumerate(own.itertuples(index=False, name=None)):
         row = Standing(*values)
-        alike = look_alike(row.method)
-        color = style.looks([alike])[alike].color
+        color = look_of(row.method).color
         mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
         end = row.gap
         if not math.isnan(row.low):
@@ -145,4 +142,4 @@ def _panel(axes: Axes, told: str, own: pd.DataFrame) -> None:
 
 def learner(label: str) -> bool:
     """Whether it is the paper's learner under its own conditions."""
-    return label.startswith(LEARNER.rstrip("/")) and not variant(label)
+    return label.startswith((LEARNER, TOGETHER)) and not variant(label)

@@ -7,7 +7,6 @@ from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from coartic import Task
@@ -43,10 +42,9 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     common = shares.sort_values(ascending=False, kind="stable").index
     order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
     bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
-    rows, columns = style.row(len(found))
-    size = style.widest(), (0.75 + 0.155 * max(bars)) * rows
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    shape = style.grid(len(found), len(found))
+    size = style.widest(), (0.75 + 0.155 * max(bars)) * shape[0]
+    figure, panels = style.figure_of(shape, size)
     colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
     for axes, task in zip(panels, found.values(), strict=True):
         _panel(axes, task, data[data.task == task.name], order, colors)

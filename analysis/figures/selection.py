@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coartic import CoarticError
-from coartic.analysis.methods import LEARNER, METHODS
+from coartic.analysis.methods import METHODS
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.study import Study
 from coartic.text import did_you_mean
 
-CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in range(1, 5))
 HEADLINES = tuple(name for name, row in METHODS.items() if row.headline)
 """Methods that stand for their families where none are named, in the order of figures."""
 

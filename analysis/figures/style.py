@@ -148,15 +148,21 @@ def number(value: float, digits: int = 0) -> str:
     return f"{value:.{digits}f}".replace("-", "−")
 
 
-def grid(panels: int) -> tuple[int, int]:
-    """Rows and columns of so many panels."""
-    columns = 1 if narrow() else min(2 if panels <= 6 else 3, panels)
+def grid(panels: int, columns: int | None = None) -> tuple[int, int]:
+    """Rows and columns of so many panels: one column where a figure is narrow.
+
+    ``columns``: where there is room for more; two or three by default.
+    """
+    columns = 1 if narrow() else min(columns or (2 if panels <= 6 else 3), panels)
     return -(-panels // columns), columns
 
 
-def row(panels: int) -> tuple[int, int]:
-    """Rows and columns of so many panels that stand side by side where there is room."""
-    return (panels, 1) if narrow() else (1, panels)
+def figure_of(
+    shape: tuple[int, int], size: tuple[float, float], **subplots: Any
+) -> tuple[Figure, list[Axes]]:
+    """A figure with so many rows and columns of panels, in inches, and its panels row by row."""
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
 
 
 def task_panels(
@@ -168,8 +174,7 @@ def task_panels(
     """
     rows, columns = grid(len(tasks))
     height = tall * rows + legend * (1 if columns > 1 else 2)
-    figure = Figure(figsize=(widest(), min(height, TALLEST)), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, **subplots).ravel().tolist()
+    figure, panels = figure_of((rows, columns), (widest(), min(height, TALLEST)), **subplots)
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from coartic import Task
 from coartic.analysis.figures import style
@@ -37,8 +36,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         0.42,
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    figure = Figure(figsize=(style.column_width(size[0]), size[1]), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure, panels = style.figure_of((rows, columns), (style.column_width(size[0]), size[1]))
     for axes, task, corners in zip(panels, tasks, boxes, strict=False):
         draw_robot(axes, task, task.q0, marked=task.hands)
         draw_goals(axes, task)

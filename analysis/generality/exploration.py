@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.generality.sample import Sample
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.statistics.estimates import LEVEL, Inference
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Scores, other_tasks, value
@@ -14,10 +15,9 @@ from coartic.robot import Array
 
 BUDGETS = (1_000, 10_000, 100_000)
 """Trials at which learning curves are read, as far as the runs went."""
-EC2, EC3, EC4 = CONDITIONS
 CONTRASTS = (
     (EC2, INITIAL),
-    (ONE_ARMED, INITIAL),
+    (EC1, INITIAL),
     (EC3, EC2),
     (EC4, EC3),
     (EC4, EC2),
@@ -85,16 +85,13 @@ def _contrast(
         for family, own in names.items()
     }
     return Contrast(
-        first,
-        second,
-        next(iter(names)) if len(names) == 1 else "",
-        len(values),
-        other_tasks(scores),
-        float(np.median(values)),
-        other_tasks(hands),
-        int((values > 0).sum()),
-        int((values < 0).sum()),
-        sum(_apart(*runs) for own in scores.values() for runs in own),
+        *(first, second, next(iter(names)) if len(names) == 1 else "", len(values)),
+        difference=other_tasks(scores),
+        median=float(np.median(values)),
+        hands=other_tasks(hands),
+        better=int((values > 0).sum()),
+        worse=int((values < 0).sum()),
+        told=sum(_apart(*runs) for own in scores.values() for runs in own),
     )
 
 
@@ -107,15 +104,10 @@ def _by_hands(sample: Sample, name: str, label: str) -> Array:
 
 def _apart(first: Array, second: Array) -> bool:
     """Whether runs on one instance tell two methods apart, at 5 % and by itself."""
-    if len(second) == 1:
-        first, other = first, float(second[0])
-        if not np.ptp(first):
-            return bool(first[0] != other)
-        return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
     if not np.ptp(first) and not np.ptp(second):
         return bool(first[0] != second[0])
-    test = bootstrap_test(first, second, "two-sided", resamples=999)
-    return bool(test.p < LEVEL)
+    other = second if len(second) > 1 else float(second[0])
+    return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
 
 
 class Budget(NamedTuple):

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coartic.analysis.generality.sample import CONDITIONS, INITIAL, Sample
+from coartic.analysis.generality.sample import Sample
+from coartic.analysis.methods import INITIAL, TWO_ARMED
 from coartic.analysis.statistics.instances import Components, Paired, components, paired
 
 DIFFERENCE = 0.01
@@ -33,7 +34,7 @@ def variance_shares(sample: Sample) -> list[Shares]:
     But for the initial solution, which is far behind all; then of the paper's conditions alone.
     """
     learned = [label for label in sample.labels if " " not in label and label != INITIAL]
-    parts = {"all methods": learned, "EC2 to EC4": [n for n in learned if n in CONDITIONS]}
+    parts = {"all methods": learned, "EC2 to EC4": [n for n in learned if n in TWO_ARMED]}
     found = []
     for family, (of, labels) in itertools.product(sample.families, parts.items()):
         # Methods that failed an instance would leave it out for all others.
@@ -87,15 +88,8 @@ def needed(sample: Sample) -> list[Needed]:
         within = tuple(float(np.mean([pair.within[k] for pair in own])) for k in (0, 1))
         mean = float(np.mean([pair.mean for pair in own]))
         pooled = Paired(mean, between, (within[0], within[1]))
-        found.append(
-            Needed(
-                first,
-                second,
-                sum(map(len, scores.values())),
-                mean,
-                between**0.5,
-                sum(within) ** 0.5,
-                tuple(pooled.needed(DIFFERENCE, runs) for runs in RUNS),
-            )
-        )
+        instances = sum(map(len, scores.values()))
+        counts = tuple(pooled.needed(DIFFERENCE, runs) for runs in RUNS)
+        sds = between**0.5, sum(within) ** 0.5
+        found.append(Needed(first, second, instances, mean, *sds, counts))
     return found

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coartic import Trajectory
-from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
+from coartic.analysis.generality.sample import Sample
+from coartic.analysis.methods import CONDITIONS, TWO_ARMED
 from coartic.analysis.signatures.other_arm import preshaping
 from coartic.analysis.signatures.subtasks import isolated_agreement, served
 from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, trajectories_of
@@ -30,7 +31,6 @@ SIGNS = {
     "whole": "ticks by which the whole is shorter than it",
 }
 """What is measured of every run, by name."""
-LEARNERS = (ONE_ARMED, *CONDITIONS)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def signs(sample: Sample) -> dict[tuple[str, str], Signs]:
     """Of every instance and condition of the learner, by name and label."""
     found = {}
     for name in sample.references:
-        for label in LEARNERS:
+        for label in CONDITIONS:
             cell = sample.study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = trajectories_of(sample.study, (name, label))
@@ -107,7 +107,7 @@ rounding can make."""
 def presence(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Presence]:
     """Every signature by condition and family, and over all families."""
     rows = []
-    for label in LEARNERS:
+    for label in CONDITIONS:
         for sign in SIGNS:
             scores = {}
             for family, names in sample.families.items():
@@ -121,16 +121,10 @@ def presence(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Presen
             parts = [{family: own} for family, own in scores.items()]
             for part in [*parts, scores] if len(parts) > 1 else parts:
                 means = [float(spread.mean(runs[0])) for own in part.values() for runs in own]
-                rows.append(
-                    Presence(
-                        next(iter(part)) if len(part) == 1 else "",
-                        label,
-                        sign,
-                        len(means),
-                        other_tasks(part),
-                        sum(value > THERE[sign] for value in means),
-                    )
-                )
+                family = next(iter(part)) if len(part) == 1 else ""
+                there = sum(value > THERE[sign] for value in means)
+                found_in = other_tasks(part)
+                rows.append(Presence(family, label, sign, len(means), found_in, there))
     return rows
 
 
@@ -155,27 +149,23 @@ class Recruitment(NamedTuple):
 def recruitment(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Recruitment]:
     """Of each condition with two arms in each family."""
     rows = []
-    for label in CONDITIONS:
+    for label in TWO_ARMED:
         for family, names in sample.families.items():
             own = [(name, found[name, label]) for name in names if (name, label) in found]
             if own:
                 most = {name: Counter(signs.hands).most_common(1)[0] for name, signs in own}
-                known = {name: sample.by_hands[name] for name in most}
-                rows.append(
-                    Recruitment(
-                        family,
-                        label,
-                        len(own),
-                        sum(most[name][0] != signs.initial for name, signs in own),
-                        sum(most[name][0] in signs.best for name, signs in own),
-                        sum(
-                            known[name][hands] == sample.references[name].best
-                            for name, (hands, _) in most.items()
-                        ),
-                        sum(most[name][1] > 0.75 * len(signs.hands) for name, signs in own),
-                        float(
-                            np.mean([np.mean([len(set(h)) > 1 for h in s.hands]) for _, s in own])
-                        ),
-                    )
+                best = {name: sample.references[name].best for name in most}
+                both = [np.mean([len(set(h)) > 1 for h in signs.hands]) for _, signs in own]
+                row = Recruitment(
+                    *(family, label, len(own)),
+                    leaves_initial=sum(most[name][0] != signs.initial for name, signs in own),
+                    as_corrective=sum(most[name][0] in signs.best for name, signs in own),
+                    as_best_known=sum(
+                        sample.by_hands[name][hands] == best[name]
+                        for name, (hands, _) in most.items()
+                    ),
+                    consistent=sum(most[name][1] > 0.75 * len(s.hands) for name, s in own),
+                    both_hands=float(np.mean(both)),
                 )
+                rows.append(row)
     return rows

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coartic import Task
-from coartic.analysis.generality.sample import CONDITIONS, ONE_ARMED, Sample
+from coartic.analysis.generality.sample import Sample
+from coartic.analysis.methods import most_exploring
 from coartic.analysis.signatures.trajectories import best_sequences
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import regression
@@ -68,8 +69,7 @@ def outcomes(sample: Sample, name: str) -> dict[str, float]:
     own = sequences[(sequences.task == name) & (sequences.hands == best[0])]
     alone, reference = float(own.reward.iloc[0]), sample.references[name].best
     found = {"worth": (reference - alone) / abs(reference)}
-    label = CONDITIONS[-1] if len(sample.tasks[name].hands) > 1 else ONE_ARMED
-    gap = sample.gap(name, label)
+    gap = sample.gap(name, most_exploring(sample.tasks[name]))
     if gap is not None:
         found["learned"] = found["worth"] - float(np.mean(gap))
     return found

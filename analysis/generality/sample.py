@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.methods import LEARNER
 from coartic.analysis.results.optima import locks_base
 from coartic.analysis.statistics.across_tasks import gap_share
 from coartic.analysis.statistics.instances import Runs, Scores
@@ -22,11 +21,6 @@ if TYPE_CHECKING:
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
-INITIAL = "corrective-alone/given"
-"""Whose solution is the initial one."""
-CONDITIONS = tuple(f"{LEARNER}EC{number}" for number in (2, 3, 4))
-"""The learner's with two arms, those that explore more behind."""
-ONE_ARMED = f"{LEARNER}EC1"
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import MotionModel, Task
+from coartic.robot import Array
 from coartic.sequences import CorrectiveTrials, corrective_trials
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 _BLOCK = 500  # sets of goals a thread is given at once
 
@@ -38,18 +38,24 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class RewardIs:
-    """The reward of a hand sequence is a printed integer."""
+class _OfHands:
+    """Something that is said of a hand sequence."""
 
     hands: str
-    value: float
-    within: float = 0.0
-    """Ticks, where the printed value is derived from rounded ones."""
 
     @property
     def sequences(self) -> tuple[str, ...]:
         """Hand sequences it needs."""
         return (self.hands,)
+
+
+@dataclass(frozen=True)
+class RewardIs(_OfHands):
+    """The reward of a hand sequence is a printed integer."""
+
+    value: float
+    within: float = 0.0
+    """Ticks, where the printed value is derived from rounded ones."""
 
     def holds(self, tried: Tried) -> Flags:
         """Where it does, ``(N,)``."""
@@ -60,10 +66,9 @@ class RewardIs:
 
 
 @dataclass(frozen=True)
-class Above:
+class Above(_OfHands):
     """A hand sequence earns more than each of some others."""
 
-    hands: str
     than: tuple[str, ...]
 
     @property
@@ -83,18 +88,12 @@ class Above:
 
 
 @dataclass(frozen=True)
-class BaseMoves:
+class BaseMoves(_OfHands):
     """The base moves to one side between two goals (0 is the start)."""
 
-    hands: str
     first: int
     last: int
     side: Literal["left", "right"]
-
-    @property
-    def sequences(self) -> tuple[str, ...]:
-        """Hand sequences it needs."""
-        return (self.hands,)
 
     def holds(self, tried: Tried) -> Flags:
         """Where it does, ``(N,)``."""

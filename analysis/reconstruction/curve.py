@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -19,7 +17,6 @@ _COLORS = {
     "not supported": style.VERMILLION,
 }
 _MARKS = {"supported": "o", "cannot tell": ".", "not supported": "X"}
-_HATCHES = {"supported": "", "cannot tell": "", "not supported": "////"}
 _COLUMNS = 3
 _HEIGHT = 1.9  # of a panel, inches
 _LEAST = 2  # specifications that make a curve
@@ -37,8 +34,8 @@ def verdicts(table: pd.DataFrame) -> Plot:
     tasks = sorted({task for task in table.task if task})
     claims = list(dict.fromkeys(table.claim))
     widths = [max(0.14 * len(sets), 0.4), *(0.9 for _ in tasks)]
-    figure = Figure(figsize=(style.TWO, 1.1 + 0.14 * len(claims)), layout="constrained")
-    panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths, squeeze=False)[0]
+    size = style.TWO, 1.1 + 0.14 * len(claims)
+    figure, panels = style.figure_of((1, len(widths)), size, sharey=True, width_ratios=widths)
     height = {claim: -number for number, claim in enumerate(claims)}
     for number, words in enumerate(sets):
         own = plain[plain.readings == words]
@@ -55,13 +52,13 @@ def verdicts(table: pd.DataFrame) -> Plot:
         for verdict, color in _COLORS.items():
             width = shares[verdict].to_numpy()
             rows = [height[claim] for claim in shares.index]
-            axes.barh(rows, width, 0.7, left, color=color, hatch=_HATCHES[verdict])
+            hatch = "////" * (verdict == "not supported")
+            axes.barh(rows, width, 0.7, left, color=color, hatch=hatch)
             left += width
         axes.set(xlim=(0, 1), xticks=[0, 1], xticklabels=["0", "all"])
         axes.set_title(f"members of\n{task}")
         axes.tick_params(left=False)
-    handles = [_dot(verdict) for verdict in _COLORS]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    _legend(figure)
     members = counted(len(table[table.member != ""].member.unique()), "member")
     return Plot(
         "verdicts",
@@ -102,8 +99,7 @@ def specification_curve(table: pd.DataFrame) -> Plot:
         own = data[data.claim == claim].sort_values("effect", kind="stable")
         _effects(above, own, claim)
         _matrix(below, own, choices, named=column == 0)
-    handles = [_dot(verdict) for verdict in _COLORS]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    _legend(figure)
     said = counted(len(table.groupby(["readings", "member"])), "specification")
     return Plot(
         "specification-curve",
@@ -151,10 +147,12 @@ def _matrix(axes: Axes, own: pd.DataFrame, choices: list[str], *, named: bool) -
     axes.set_xticks([])
 
 
-def _dot(verdict: str) -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], ls="", marker=_MARKS[verdict], color=_COLORS[verdict], label=verdict)
+def _legend(figure: Figure) -> None:
+    handles = [
+        style.entry(verdict, linestyle="", marker=_MARKS[verdict], color=color)
+        for verdict, color in _COLORS.items()
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 
 def _spoken(data: pd.DataFrame, claim: str) -> str:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from coartic.analysis.words import stated
+from coartic.robot import Array
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,6 @@ class Layout:
 
 def layouts() -> dict[str, Layout]:
     """The layouts by task."""
-    content = tomllib.loads(Path(__file__).with_name("layouts.toml").read_text("utf-8"))
     return {
         task: Layout(
             task,
@@ -96,5 +94,5 @@ def layouts() -> dict[str, Layout]:
             float(entry["apart"]),
             {name: tuple(map(tuple, goals)) for name, goals in entry["known"].items()},
         )
-        for task, entry in content.items()
+        for task, entry in stated(__file__, "layouts").items()
     }

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from coartic import CoarticError, load_task
-from coartic.analysis.reconstruction.ensemble import features, spread_out
+from coartic.analysis.reconstruction.constraints import Tried
 from coartic.analysis.reconstruction.layout import layouts
 from coartic.analysis.reconstruction.scoring import Figure
 from coartic.analysis.reconstruction.search import Search
@@ -28,9 +28,9 @@ from coartic.analysis.reconstruction.waves import (
     scored,
 )
 from coartic.readings import load_readings, task_under
+from coartic.robot import Array
 from coartic.text import did_you_mean
 
-Array = NDArray[np.float64]
 DECIMALS = 3
 """Of coordinates."""
 _MOST_NEAR = 20_000  # points of the grid, drawn at random, that are moved into the region
@@ -113,7 +113,9 @@ def reconstruct(
     compete = search.admitted(compete[layout.allowed(compete)], "known")
     pool = _pool(search, report)
     pool = np.concatenate([compete[:1], _without(pool, compete[:1])])
-    spread = pool[_apart(search, pool, effort.members, first=0 if len(compete) else None)]
+    hands = tuple(sorted({c.hands for c in search.printed}))
+    apart = features(search.every_sequence(pool), hands)
+    spread = pool[spread_out(apart, effort.members, 0 if len(compete) else None)]
     scores: dict[bytes, Scored] = {}
 
     def score(places: Array) -> list[Scored]:
@@ -153,10 +155,38 @@ def reconstruct(
     return Reconstruction(search, results[0], pd.DataFrame(rows), len(pool))
 
 
-def _apart(search: Search, points: Array, count: int, first: int | None) -> NDArray[np.int64]:
-    """Indices of points that are far from each other in what the corrective process does."""
-    hands = tuple(sorted({c.hands for c in search.printed}))
-    return spread_out(features(search.every_sequence(points), hands), count, first)
+def features(tried: Tried, hands: tuple[str, ...]) -> Array:
+    """What members are told apart by, ``(N, F)``, each of unit variance.
+
+    The reward of every hand sequence by the corrective process alone, and the postures in
+    which some ``hands`` hit the goals; both groups weigh the same.
+    """
+    rewards = _standard(np.nan_to_num(tried.trials.rewards, nan=-2e3))
+    chosen = [tried.sequences.index(name) for name in hands]
+    postures = tried.trials.reached[:, chosen].reshape(len(rewards), -1)
+    return np.hstack([_standard(values) for values in (rewards, postures)])
+
+
+def _standard(values: Array) -> Array:
+    spread = values.std(axis=0)
+    varying = spread > 1e-9
+    scaled = (values - values.mean(axis=0))[:, varying] / spread[varying]
+    return np.asarray(scaled / np.sqrt(max(scaled.shape[1], 1)))
+
+
+def spread_out(points: Array, count: int, first: int | None = None) -> NDArray[np.int64]:
+    """Indices of ``count`` points, each as far as possible from those before it.
+
+    They begin with ``first``, or with the one nearest to the mean; then greedily the farthest
+    (Gonzalez 1985, doi:10.1016/0304-3975(85)90224-5), so that the first k are spread for every k.
+    """
+    if first is None:
+        first = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+    chosen, gap = [first], np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        gap = np.minimum(gap, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(np.argmax(gap)))
+    return np.array(chosen, dtype=np.int64)
 
 
 def _pool(search: Search, report: Callable[[str], None]) -> Array:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coartic import MotionModel, Task, hand_sequences
 from coartic.analysis.reconstruction.constraints import (
@@ -24,8 +23,8 @@ from coartic.analysis.reconstruction.constraints import (
 )
 from coartic.analysis.reconstruction.layout import Layout
 from coartic.readings import ChosenReading, model_under
+from coartic.robot import Array
 
-Array = NDArray[np.float64]
 _DIFFERENCE = 0.1  # of the finite differences: rewards are whole ticks, some 100 a length unit
 _STEPS = 12
 _LONGEST = 0.5  # of a step, length unit

@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
 from coartic.analysis.claims.catalogue import CLAIMS, judge
-from coartic.analysis.claims.register import Claim, Judged
+from coartic.analysis.claims.register import Claim, Judged, Verdict
 from coartic.analysis.claims.rules import of_task
 from coartic.analysis.reconstruction.constraints import sequences_of, try_sequences
 from coartic.analysis.reconstruction.reconstruct import search_for
@@ -30,7 +30,7 @@ from coartic.tables import variant_of
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
 PAPERS = tuple(claim for claim in CLAIMS if claim.rule != "measured")
-VERDICTS = ("supported", "not supported", "cannot tell")
+VERDICTS = get_args(Verdict)[:3]
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ from coartic.analysis.reconstruction.scoring import (
 )
 from coartic.analysis.reconstruction.search import Search
 from coartic.readings import condition_under
+from coartic.robot import Array
 
-Array = NDArray[np.float64]
 _SEEDS = 1_000_000  # of a wave begin at a multiple of this
 ENSEMBLE, LAST = 0, 99
 """Waves that score the members of the ensemble, and the nearest point beside one that stands."""

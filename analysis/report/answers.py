@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -23,18 +21,15 @@ from coartic.analysis.markup import escaped
 from coartic.analysis.methods import LEARNER, spoken_name
 from coartic.analysis.published import published_cells
 from coartic.analysis.report.document import Block, Bullets, Prose, Section, Strip, Verdict
-from coartic.analysis.report.summary import best_condition, unlike_printed
+from coartic.analysis.report.summary import learned, unlike_printed
 from coartic.analysis.report.text import tone_of
-from coartic.analysis.results.optima import Optimum
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study
-from coartic.analysis.words import typographic
+from coartic.analysis.words import stated, typographic
 from coartic.method import Information
 
-_SAID: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)
+_SAID: dict[str, dict[str, str]] = stated(__file__)
 _IN_WORDS = {
     "equivalent": ("is equivalent", "are equivalent"),
     "undecided": ("is undecided", "are undecided"),
@@ -84,30 +79,26 @@ def coarticulation(study: Study) -> str:
         return _played(study)
     first, second = found.tasks
     most = most_learned(study)
-    task = None if most is None else escaped(study.tasks[most].label)
+    task = escaped(study.tasks[most[0]].label) if most else ""
     facts = {
-        "goal": found.goal,
+        "found": found,
         "method": escaped(spoken_name(found.method)),
         "first": escaped(f"goal {found.goal + 1} of {first.label.lower()}"),
         "second": escaped(f"that of {second.label.lower()}"),
         "runs": sum(map(len, found.postures)),
-        "apart": f"{found.apart:.2f}",
-        "hands": f"{found.hands_apart:.2f}",
         "spreads": "" if math.isnan(found.spreads) else f"; {found.spreads:.1f} SD of the runs",
         "p": "" if math.isnan(found.p) else f", p {_p(found.p)}",
-        "played": "" if task is None else _said("coarticulation", "played", task=task),
+        "played": _said("coarticulation", "played", task=task) if task else "",
     }
     differs = found.apart > 0 and not found.p >= LEVEL
     return _said("coarticulation", "seen" if differs else "same", **facts)
 
 
 def _played(study: Study) -> str:
-    task = most_learned(study)
-    if task is None:
+    most = most_learned(study)
+    if most is None:
         return ""
-    label = best_condition(study, task)
-    assert label is not None  # of what was learned
-    good = study.cells[task, label].good
+    task, label, good = most
     return _said(
         "coarticulation",
         "sacrifice",
@@ -122,43 +113,37 @@ def _played(study: Study) -> str:
 def given_up(study: Study) -> str:
     """Whether the learner is slower to the first goal and faster to the last, by the task it
     improves most on; empty where that was not measured."""
-    task = most_learned(study)
-    found = study.signatures
-    found = found[(found.task == task) & found.value.notna()]
-    label = None if task is None else best_condition(study, task)
-    of = found[found.label == label].drop_duplicates("signature").set_index("signature")
-    names = [f"{part} against the same hands" for part in ("first subtask", "total")]
-    if task is None or not set(names) <= set(of.index):
+    most, found = most_learned(study), study.signatures
+    if most is None:
         return ""
-    first: Any = of.loc[names[0]]
-    whole: Any = of.loc[names[1]]
+    task, label, _ = most
+    found = found[(found.task == task) & found.value.notna() & (found.label == label)]
+    of = found.drop_duplicates("signature").set_index("signature")
+    names = [f"{part} against the same hands" for part in ("first subtask", "total")]
+    if not set(names) <= set(of.index):
+        return ""
+    rows: list[Any] = [of.loc[name] for name in names]
+    first, whole = rows
     least = first.value if math.isnan(first.low) else first.low
+    changes = (typographic(f"{row.value:+.1f}") for row in rows)
     return _said(
         "coarticulation",
         "given_up" if least > 0 > whole.value else "not_given_up",
         task=escaped(study.tasks[task].label),
-        method=escaped(spoken_name(str(label))),
-        first=_change(first.value),
+        method=escaped(spoken_name(label)),
         interval=_interval(first),
-        whole=_change(whole.value),
+        **dict(zip(("first", "whole"), changes, strict=True)),
     )
 
 
-def _change(ticks: float) -> str:
-    return typographic(f"{ticks:+.1f}")
-
-
-def most_learned(study: Study) -> str | None:
-    """The task on which the learner's best condition gained the largest share; None for none."""
-    gains = {}
-    for task in study.tasks:
-        label = best_condition(study, task)
-        if label is not None:
-            good = study.cells[task, label].good
-            initial = good.initial_reward.mean()
-            if initial < 0:
-                gains[task] = float((good.reward.mean() - initial) / -initial)
-    return max(gains, key=lambda task: gains[task]) if gains else None
+def most_learned(study: Study) -> tuple[str, str, pd.DataFrame] | None:
+    """Of :func:`~coartic.analysis.report.summary.learned` where the largest share was gained."""
+    gains: dict[float, tuple[str, str, pd.DataFrame]] = {}
+    for found in learned(study):
+        reward, initial = found[2].reward.mean(), found[2].initial_reward.mean()
+        if initial < 0:
+            gains.setdefault(float((reward - initial) / -initial), found)
+    return gains[max(gains)] if gains else None
 
 
 def reproduced(study: Study) -> str:
@@ -297,7 +282,10 @@ def winners(study: Study) -> str:
         return ""
     shown = found[found.task == found.task.iloc[0]].reset_index(drop=True)
     by_trial = shown[shown.told == INFORMED[Information.REWARD_BY_TRIAL]].reset_index(drop=True)
-    said = ""
+    said, (proven, known) = "", _proven(study)
+    sure_of = f" (proven on {proven} of {known} tasks)"
+    if proven == known:
+        sure_of = ", which is proven"
     if len(by_trial):
         best, sure = by_trial.iloc[0], _sure(by_trial)
         said = _said(
@@ -305,8 +293,8 @@ def winners(study: Study) -> str:
             "learners",
             best=escaped(spoken_name(best.method)),
             leads="is ahead" if sure.startswith(", not") else "wins",
-            gap=f"{best.gap:.1f}",
-            known="optimum" if _mostly_proven(study) else "best known reward",
+            row=best,
+            known="optimum" if 2 * proven > known else "best known reward",
             interval=_interval(best, about=_SAID["methods"]["about"]),
             sure=sure,
             learner=_place_of_learner(by_trial),
@@ -316,27 +304,23 @@ def winners(study: Study) -> str:
         own = shown[shown.told == told]
         if len(own):
             best = own.iloc[0]
-            facts = {"best": escaped(spoken_name(best.method)), "gap": f"{best.gap:.1f}"}
-            said += _said("methods", sentence, proven=_proven(study), **facts)
+            name = escaped(spoken_name(best.method))
+            said += _said("methods", sentence, proven=sure_of, best=name, row=best)
     return said
 
 
 def _interval(row: Any, about: str = "") -> str:
     if math.isnan(row.low):
         return ""
-    return _said("methods", "interval", low=f"{row.low:.1f}", high=f"{row.high:.1f}", about=about)
+    return _said("methods", "interval", row=row, about=about)
 
 
 def _sure(rows: pd.DataFrame) -> str:
     """Whether the first is apart from the second by their intervals."""
     if len(rows) < 2 or rows.low[:2].isna().any():
         return ""
-    second = escaped(spoken_name(rows.method[1]))
-    return (
-        f", surely before {second}"
-        if rows.high[0] < rows.low[1]
-        else f", not surely before {second}"
-    )
+    surely = "surely" if rows.high[0] < rows.low[1] else "not surely"
+    return f", {surely} before {escaped(spoken_name(rows.method[1]))}"
 
 
 def _place_of_learner(rows: pd.DataFrame) -> str:
@@ -345,33 +329,14 @@ def _place_of_learner(rows: pd.DataFrame) -> str:
         return ""
     row = own.iloc[0]
     name = escaped(spoken_name(row.method).removeprefix("learner"))
-    return _said(
-        "methods",
-        "learner",
-        name=name,
-        place=f"place {own.index[0] + 1}",
-        count=len(rows),
-        gap=f"{row.gap:.1f}",
-        interval=_interval(row),
-    )
+    of = {"name": name, "place": own.index[0] + 1, "count": len(rows)}
+    return _said("methods", "learner", row=row, interval=_interval(row), **of)
 
 
-def _known(study: Study) -> list[Optimum]:
-    return [best for (_, arm), best in study.optima.items() if arm == "free"]
-
-
-def _mostly_proven(study: Study) -> bool:
-    """Whether the best known is the optimum on most tasks."""
-    known = _known(study)
-    return 2 * sum(best.proven for best in known) > len(known)
-
-
-def _proven(study: Study) -> str:
-    known = _known(study)
-    proven = sum(best.proven for best in known)
-    if proven == len(known):
-        return ", which is proven"
-    return f" (proven on {proven} of {len(known)} tasks)"
+def _proven(study: Study) -> tuple[int, int]:
+    """Tasks whose best known reward is proven to be the optimum, and those that have one."""
+    known = [best for (_, arm), best in study.optima.items() if arm == "free"]
+    return sum(best.proven for best in known), len(known)
 
 
 def price(study: Study) -> str:
@@ -414,23 +379,20 @@ def _learns(trials: pd.DataFrame, method: str) -> bool:
 
 def _plan(shown: pd.DataFrame, labels: Iterable[str], own: str, rival: str | None) -> str:
     """What makes no trials and reaches half of the levels with the least kinematics."""
-    trials = shown[shown.spend == "trials"].groupby("method").budget
     none = shown[(shown.spend == "trials") & (shown.budget == 0) & (shown.share >= 0.5)].method
-    known = shown[(shown.spend == "forward_kinematics") & shown.method.isin(set(none))]
-    halves = {m: _half(known[known.method == m]) for m in labels if (known.method == m).any()}
+    kinematics = shown[shown.spend == "forward_kinematics"]
+    halves = {m: _half(kinematics[kinematics.method == m]) for m in labels if m in set(none)}
     cheap = {m: half for m, half in halves.items() if half is not None}
-    if not cheap or not len(trials):
+    if not cheap:
         return ""
     best = min(cheap, key=lambda m: cheap[m])
     name = spoken_name(best)
-    kinematics = shown[shown.spend == "forward_kinematics"]
     half, other = (_half(kinematics[kinematics.method == m]) for m in (own, rival))
     beside = ""
     if half is not None:
         spent = "" if other is None else _amount(other)
-        also = spent and _said(
-            "price", "rival", name=escaped(spoken_name(str(rival))), spent=spent
-        )
+        named = escaped(spoken_name(str(rival)))
+        also = spent and _said("price", "rival", name=named, spent=spent)
         beside = _said("price", "beside", spent=_amount(half), rival=also)
     name = escaped(name[0].upper() + name[1:])
     return _said("price", "plans", name=name, spent=_amount(cheap[best]), beside=beside)
@@ -452,40 +414,30 @@ def _p(value: float) -> str:
 
 def hands_found(study: Study) -> str:
     """Where the learner's best condition ends with other hands than it began with."""
-    other, learned = [], False
-    for task in study.tasks:
-        label = best_condition(study, task)
-        if label is None:
-            continue
-        learned, good = True, study.cells[task, label].good
+    every, other = list(learned(study)), []
+    for task, _, good in every:
         hands = str(good.hands.mode().iloc[0])
         first = good.initial_hands.dropna()
         if len(first) and hands != first.iloc[0]:
             other.append(escaped(f"{study.tasks[task].label} ({first.iloc[0]} to {hands})"))
-    if not learned:
-        return ""
-    return (
-        _said("findings", "hands", tasks=" and ".join(other))
-        if other
-        else _SAID["findings"]["same_hands"]
-    )
+    if other:
+        return _said("findings", "hands", tasks=" and ".join(other))
+    return _SAID["findings"]["same_hands"] if every else ""
 
 
 def pace_found(study: Study) -> str:
     """After how many trials half of the learner's gain is there, by task."""
     parts = []
-    for task in study.tasks:
-        label = best_condition(study, task)
-        halves = [] if label is None else list(_halves(study, task, label))
+    for task, _, good in learned(study):
+        halves = list(_halves(study, good))
         if halves:
             median = float(pd.Series(halves).median())
             parts.append(escaped(f"{_amount(median)} trials on {study.tasks[task].label.lower()}"))
     return _said("findings", "learning", trials=", ".join(parts)) if parts else ""
 
 
-def _halves(study: Study, task: str, label: str) -> Iterable[float]:
+def _halves(study: Study, good: pd.DataFrame) -> Iterable[float]:
     """Of each run the trial that had half of its whole gain."""
-    good = study.cells[task, label].good
     for run_id, initial in zip(good.run_id, good.initial_reward, strict=True):
         run = study.best_so_far[str(run_id)]
         if run.learns and not pd.isna(initial) and run.rewards[-1] > initial:

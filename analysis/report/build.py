@@ -39,7 +39,6 @@ from coartic.analysis.report.document import (
     Section,
 )
 from coartic.analysis.report.formats.csv import table_csv
-from coartic.analysis.report.glossary import glossary
 from coartic.analysis.report.headlines import headline_numbers
 from coartic.analysis.report.limitations import limitations
 from coartic.analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
@@ -66,6 +65,7 @@ from coartic.analysis.report.write import check_report_folder, write_report
 from coartic.analysis.results.folder import Results
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.study import Study
+from coartic.analysis.words import stated
 from coartic.task import address_of
 from coartic.text import counted
 
@@ -142,6 +142,8 @@ def _sections(study: Study, pictures: Pictures | None) -> Iterator[Section]:
         ]
 
     limits = limitations(study)
+    words_said = stated(__file__, "glossary").items()
+    glossary = tuple(f"**{word}**: {meaning}" for word, meaning in words_said)
     first = {picture.id: picture for picture in drawn("answers")}
     played = bool(one_by_one(study))  # of many instances alone there is too much to be played
     player = _player(study) if pictures is not None and played else None
@@ -163,7 +165,7 @@ def _sections(study: Study, pictures: Pictures | None) -> Iterator[Section]:
         _cost(study, drawn("cost")),
         _signatures(study, drawn("coarticulation")),
         Section("limitations", "Limitations", (), _limits(limits), finding=limits_found(limits)),
-        Section("glossary", "Glossary", (Bullets(glossary()),), folded=True),
+        Section("glossary", "Glossary", (Bullets(glossary),), folded=True),
     )
     return (section for section in sections if section.blocks or section.sections)
 
@@ -246,9 +248,14 @@ def _limits(items: Sequence[str]) -> tuple[Section, ...]:
 
 
 def _by_task(
-    study: Study, name: str, what: str, blocks_of: Callable[[str], Sequence[Block]]
+    study: Study,
+    name: str,
+    what: str,
+    blocks_of: Callable[[str], Sequence[Block]],
+    read: tuple[str, tuple[str, ...]],
 ) -> Iterator[Section]:
-    """A folded section a task, where there is something to show of it."""
+    """How it is ``read``, then a folded section a task where there is something to show of it."""
+    yield Section(f"{name}-read", read[0], (Bullets(read[1]),), folded=True)
     alone = one_by_one(study)
     for task, slug in table_ids(study).items():
         if task not in alone:
@@ -272,12 +279,8 @@ def _methods(study: Study, figures: Sequence[Block]) -> Section:
     if study.pair_rows and pairs:
         reading += reading_of_pairs(study)
     overall = overall_table(study)
-    below = (
-        Section(
-            "methods-read", "How the tables of methods are read", (Bullets(reading),), folded=True
-        ),
-        *_by_task(study, "methods", "every method", of),
-    )
+    read = "How the tables of methods are read", reading
+    below = _by_task(study, "methods", "every method", of, read)
     tables = (main_methods(study), *(without_variants(overall) if overall else ()))
     return _section("methods", "Methods", figures, tables, winners(study), below)
 
@@ -291,15 +294,8 @@ def _cost(study: Study, figures: Sequence[Block]) -> Section:
         found = list(cost_tables(study, task))
         return [optima_known(study, task), *_tables(*found)] if found else []
 
-    below = (
-        Section(
-            "cost-read",
-            "How the tables of cost are read",
-            (Bullets(reading_of_cost()),),
-            folded=True,
-        ),
-        *_by_task(study, "cost", "reward and cost", of),
-    )
+    read = "How the tables of cost are read", reading_of_cost()
+    below = _by_task(study, "cost", "reward and cost", of, read)
     return _section("cost", title, figures, (), price(study), below)
 
 
@@ -310,27 +306,18 @@ def _signatures(study: Study, figures: Sequence[Block]) -> Section:
         return _tables(*signatures_tables(study, task, short=short))
 
     between = (contexts_table(study), *slopes_tables(study))
-    meanings = Bullets(tuple(f"**{escaped(s.name)}**: {s.meaning}" for s in REGISTER.values()))
-    below = (
-        Section("signatures-read", "What each signature says", (meanings,), folded=True),
-        *_by_task(study, "signatures", "signatures", of),
-    )
+    meanings = tuple(f"**{escaped(s.name)}**: {s.meaning}" for s in REGISTER.values())
+    read = "What each signature says", meanings
+    below = _by_task(study, "signatures", "signatures", of, read)
     title = "Signatures"
     return _section("coarticulation", title, figures, between, context_found(study), below)
 
 
 def _claims(study: Study, figures: Mapping[str, str]) -> Section:
-    found = [claim_section(entry, figures) for entry in study.judged]
-    counts = verdicts(study.judged)
-    each = Section("claims-evidence", "Evidence, claim by claim", (), tuple(found), folded=True)
-    table = claims_table(study)
-    return Section(
-        CLAIMS,
-        "Claims",
-        (counts, *_tables(main_verdicts(study), table)),
-        (each,),
-        finding=claims_found(study),
-    )
+    found = tuple(claim_section(entry, figures) for entry in study.judged)
+    each = Section("claims-evidence", "Evidence, claim by claim", (), found, folded=True)
+    blocks = verdicts(study.judged), *_tables(main_verdicts(study), claims_table(study))
+    return Section(CLAIMS, "Claims", blocks, (each,), finding=claims_found(study))
 
 
 def _about(
@@ -376,16 +363,11 @@ def _section(
     below: Iterable[Section] = (),
 ) -> Section:
     """What was found, one figure, then folded: further figures, tables and what is below."""
-    more: list[Section] = []
-    if figures[1:]:
-        titles = "; ".join(
-            figure.title for figure in figures[1:] if isinstance(figure, FigureBlock)
-        )
-        more = [
-            Section(f"{name}-figures", f"More figures: {titles}", tuple(figures[1:]), folded=True)
-        ]
-    blocks = (*figures[:1], *_tables(*tables))
-    return Section(name, title, blocks, (*more, *below), finding=finding)
+    first, more = figures[:1], tuple(figures[1:])
+    titles = "; ".join(figure.title for figure in more if isinstance(figure, FigureBlock))
+    below = [Section(f"{name}-figures", f"More figures: {titles}", more, folded=True), *below]
+    blocks = (*first, *_tables(*tables))
+    return Section(name, title, blocks, tuple(below[not more :]), finding=finding)
 
 
 def _tables(*found: DataTable | None) -> list[Block]:

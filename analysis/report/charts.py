@@ -64,6 +64,7 @@ def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
 def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     """Gap of every method with its interval; by task, by family, by what a method is told."""
     tasks = list(dict.fromkeys(map(str, data.task)))
+    rows = list(map(Standing._make, data.itertuples(index=False, name=None)))
     values = [
         {
             **{"task": row.task, "name": spoken_name(row.method), "id": row.method},
@@ -72,16 +73,14 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
             **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
             **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
         }
-        for row in map(Standing._make, data.itertuples(index=False, name=None))
+        for row in rows
     ]
-    rows = map(Standing._make, data.itertuples(index=False, name=None))
-    groups = dict.fromkeys((str(row.task), row.told, row.family) for row in rows)
     values += [  # a row above each group, with its name
         {
             **{"task": task, "told": told, "family": family, "name": told},
             **{"heading": True, "place": 1000 * GROUPS.index(told) - 1},
         }
-        for task, told, family in groups
+        for task, told, family in dict.fromkeys((row.task, row.told, row.family) for row in rows)
     ]
     chosen = _choices(tasks, data.told, data.family)
     every = _filtered(_chart(values), chosen)
@@ -96,12 +95,7 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     y: Any = alt.Y("name:N", sort=order, title=None, axis=axis)
     labels = list(dict.fromkeys(map(str, data.method)))
     color = _colors(labels, style.looks([look_alike(label) for label in labels]))
-    tips = [
-        alt.Tooltip("name:N", title="method"),
-        alt.Tooltip("gap:Q", title="gap to the optimum (%)", format=".2f"),
-        alt.Tooltip("interval:N", title="95 % interval"),
-        *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
-    ]
+    tips = _tips(alt.Tooltip("gap:Q", title="gap to the optimum (%)", format=".2f"))
     x: Any = alt.X("gap:Q", scale=alt.Scale(padding=24), title="gap to the optimum (%)")
     lines = base.mark_rule(strokeWidth=2.5).encode(x=alt.X("low:Q"), x2="high:Q", y=y, color=color)
     marks = base.mark_point(filled=True, size=45, opacity=1).encode(
@@ -123,19 +117,15 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     zero = _chart([{"x": 0}]).mark_rule(strokeDash=[2, 3], color=_INK)
     parts = alt.layer(zero.encode(x=alt.X("x:Q")), lines, marks, text, heading)
     told_first = [told for told in GROUPS if (data.told == told).any()]
-    return _finished(
-        parts.properties(width="container", height=alt.Step(_ROW)),
-        *chosen,
-    ).properties(description=f"Gap to the optimum by method; {'; '.join(told_first)}.")
+    said = f"Gap to the optimum by method; {'; '.join(told_first)}."
+    return _finished(parts, alt.Step(_ROW), said, *chosen)
 
 
 def price_chart(study: Study, data: pd.DataFrame) -> Any:
     """Levels of reward reached within a budget; by task, family, what is told, and spend."""
     told_of = _told(study)
     tasks = list(dict.fromkeys(map(str, data.task)))
-    if ALL_TASKS in tasks:
-        tasks.remove(ALL_TASKS)
-        tasks.insert(0, ALL_TASKS)
+    tasks.sort(key=lambda task: task != ALL_TASKS)
     main = _main(data)
     labels = list(dict.fromkeys(map(str, data.method)))
     looks = style.looks([look_alike(label) for label in labels])
@@ -161,13 +151,9 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     for place in {(value["task"], value["spend"]) for value in values}:
         _placed([v for v in values if (v["task"], v["spend"]) == place and v["main"]])
     spends = [spend for spend in SPENDS if (data.spend == spend).any()]
-    spend = alt.param(
-        name="spend",
-        value=spends[0],
-        bind=alt.binding_select(
-            options=spends, labels=[NAMES[name] for name in spends], name="Against "
-        ),
-    )
+    names = [NAMES[name] for name in spends]
+    against = alt.binding_select(options=spends, labels=names, name="Against ")
+    spend = alt.param(name="spend", value=spends[0], bind=against)
     chosen = (*_choices(tasks, told_of.values(), map(family_of, labels)), spend)
     every = alt.param(name="every", value=False, bind=alt.binding_checkbox(name="All methods "))
     near = alt.selection_point(
@@ -184,19 +170,11 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     )
     names = [spoken_name(label) for label in labels]
     color = _colors(labels, looks)
-    dash: Any = alt.StrokeDash(
-        "name:N",
-        scale=alt.Scale(
-            domain=names, range=[_dash(looks[look_alike(label)].dash) for label in labels]
-        ),
-        legend=None,
-    )
-    x: Any = alt.X(
-        "budget:Q",
-        scale=alt.Scale(type="log", nice=False),
-        title=None,
-        axis=alt.Axis(format="~s", tickCount=6, grid=False),
-    )
+    dashes = (looks[look_alike(label)].dash for label in labels)
+    lines = [[1, 0] if dash == style.SOLID else list(dash[1]) for dash in dashes]
+    dash: Any = alt.StrokeDash("name:N", scale=alt.Scale(domain=names, range=lines), legend=None)
+    axis = alt.Axis(format="~s", tickCount=6, grid=False)
+    x: Any = alt.X("budget:Q", scale=alt.Scale(type="log", nice=False), title=None, axis=axis)
     y: Any = alt.Y(
         "share:Q", title="levels of reward reached (%)", scale=alt.Scale(domain=[0, 100])
     )
@@ -208,13 +186,10 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
         x=x, y=y, color=color, strokeDash=dash,
         strokeWidth=alt.condition(near, alt.value(4), alt.value(1.8)),
     )  # fmt: skip
-    tips = [
-        alt.Tooltip("name:N", title="method"),
+    tips = _tips(
         alt.Tooltip("budget:Q", title="spent", format=".3~s"),
         alt.Tooltip("share:Q", title="levels of reward reached (%)", format=".0f"),
-        alt.Tooltip("interval:N", title="95 % interval"),
-        *map(alt.Tooltip, ("runs:Q", "told:N", "id:N")),
-    ]
+    )
     points = base.mark_point(size=90, opacity=0, filled=True).encode(
         x=x, y=y, color=color, tooltip=tips
     ).add_params(near)  # fmt: skip
@@ -225,18 +200,16 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     )
     half = _chart([{"y": 50}]).mark_rule(strokeDash=[2, 3], color=_INK, opacity=0.6)
     named = json_text(NAMES)
-    title = _chart([{}]).transform_calculate(
-        words=f"({named})[spend] + ' (logarithmic; left edge: none)'"
-    )
+    words = f"({named})[spend] + ' (logarithmic; left edge: none)'"
+    title = _chart([{}]).transform_calculate(words=words)
     title = title.mark_text(
         x=alt.expr("width / 2"), y=_TALL + 30, color=_INK, fontSize=11, limit=0
     )
     layers = alt.layer(
         half.encode(y=alt.Y("y:Q")), band, line, points, last, title.encode(text="words:N")
     )
-    return _finished(
-        layers.properties(width="container", height=_TALL), *chosen, every
-    ).properties(description="Share of levels of reward reached within a budget, by method.")
+    said = "Share of levels of reward reached within a budget, by method."
+    return _finished(layers, _TALL, said, *chosen, every)
 
 
 def _main(data: pd.DataFrame) -> set[str]:
@@ -251,7 +224,8 @@ def _main(data: pd.DataFrame) -> set[str]:
 
 def _colors(labels: Sequence[str], looks: Mapping[str, Any]) -> Any:
     """A colour a method, by its spoken name."""
-    paints = [_paint(looks[look_alike(label)].color) for label in labels]
+    colors = (looks[look_alike(label)].color for label in labels)
+    paints = [_INK if color == style.INK else color for color in colors]
     scale = alt.Scale(domain=[spoken_name(label) for label in labels], range=paints)
     return alt.Color("name:N", scale=scale, legend=None)
 
@@ -271,18 +245,15 @@ def _placed(values: list[dict[str, Any]]) -> None:
 def _choices(tasks: list[str], told: Iterable[str], families: Iterable[str]) -> tuple[Any, ...]:
     known = set(told)
     groups = [words for words in (*INFORMED.values(), UNTOLD) if words in known]
-    return (
+    choices = {"task": tasks, "told": [_ANY, *groups], "family": [_ANY, *dict.fromkeys(families)]}
+    return tuple(
         alt.param(
-            name="task", value=tasks[0], bind=alt.binding_select(options=tasks, name="Task ")
-        ),
-        _any("told", "Told ", groups),
-        _any("family", "Family ", list(dict.fromkeys(families))),
+            name=name,
+            value=options[0],
+            bind=alt.binding_select(options=options, name=f"{name.capitalize()} "),
+        )
+        for name, options in choices.items()
     )
-
-
-def _any(name: str, words: str, options: list[str]) -> Any:
-    bound = alt.binding_select(options=[_ANY, *options], name=words)
-    return alt.param(name=name, value=_ANY, bind=bound)
 
 
 def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
@@ -299,8 +270,17 @@ def _chart(values: list[dict[str, Any]]) -> Any:
     return alt.Chart(alt.InlineData(values=values))
 
 
-def _finished(chart: Any, *params: Any) -> Any:
-    return chart.add_params(*params).configure(**_CONFIG)
+def _finished(chart: Any, height: Any, said: str, *params: Any) -> Any:
+    """As wide as there is room, with what can be chosen and a description."""
+    chart = chart.properties(width="container", height=height)
+    return chart.add_params(*params).configure(**_CONFIG).properties(description=said)
+
+
+def _tips(*own: Any) -> list[Any]:
+    """What is said of a mark: its method, its own values, and what is behind them."""
+    interval = alt.Tooltip("interval:N", title="95 % interval")
+    behind = map(alt.Tooltip, ("runs:Q", "told:N", "id:N"))
+    return [alt.Tooltip("name:N", title="method"), *own, interval, *behind]
 
 
 def _told(study: Study) -> dict[str, str]:
@@ -318,11 +298,3 @@ def _number(value: float) -> float | None:
 
 def _interval(low: float, high: float) -> str:
     return "none: run once" if math.isnan(low) else f"{low:.2f} to {high:.2f}"
-
-
-def _paint(color: str) -> str:
-    return _INK if color == style.INK else color
-
-
-def _dash(dash: Any) -> list[float]:
-    return [1, 0] if dash == style.SOLID else list(dash[1])

@@ -1,10 +1,9 @@
 """What a report consists of: sections of prose, tables, figures and a player.
 
 A document holds content and raw values, no presentation:
-:mod:`coartic.analysis.report.formats.html`,
-``markdown`` and ``latex`` decide how it looks, and CSV files hold the raw values. Every
-number of a table names the cells (task, label) it was computed from, and the document
-knows the run ids of every cell, so each number leads to its runs.
+:mod:`coartic.analysis.report.formats.html`, ``markdown`` and ``latex`` decide how it looks, and
+CSV files hold the raw values. Every number of a table names the cells (task, label) it was
+computed from, and the document knows the run ids of every cell, so each number leads to its runs.
 
 Strings of prose, items, captions and notes have inline markup (:mod:`coartic.analysis.markup`).
 Titles, headers and values are plain text.
@@ -13,20 +12,19 @@ Titles, headers and values are plain text.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 from pydantic import ConfigDict
 
+from coartic.analysis.results.folder import CellKey as CellKey
 from coartic.analysis.results.optima import OtherArm
 
 RestsOn = Literal["runs", "optimum", "paper", "derived", "ours", "text", "simulation"]
 """What a value comes from: runs of the folder, the optimum of their tasks, what the paper prints,
 what follows from that, a choice or an assumption of ours, words of ours, or a simulation that
 needs no runs."""
-CellKey = tuple[str, str]
-"""Name of a task and label of a method with its variant, as the keys of a Study."""
 
 _ID = re.compile(r"[a-z0-9]+([.-][a-z0-9]+)*")
 
@@ -158,6 +156,12 @@ class DataTable:
         for row in self.rows:
             for problem in self._problems(row):
                 raise ValueError(f"table {self.id}, row {row.key!r}: {problem}")
+
+    def only(self, shown: Callable[[Column], bool]) -> DataTable:
+        """With some of its columns alone."""
+        kept = [place for place, column in enumerate(self.columns) if shown(column)]
+        rows = (replace(row, values=tuple(row.values[k] for k in kept)) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[k] for k in kept), rows=tuple(rows))
 
     def _problems(self, row: Row) -> Iterator[str]:
         names = [column.name for column in self.columns]

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from coartic.analysis.comparisons.methods import solve_times
@@ -32,14 +29,11 @@ from coartic.analysis.statistics.estimates import (
 )
 from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study
+from coartic.analysis.words import stated
 
-_INITIAL = {"ascending": 1, "descending": 1, "two-armed-1": 2, "two-armed-2": 3}
-"""Exploration condition under which the paper speaks of a task's initial solution."""
 Kind = tuple[str, int, str]
 """Meaning, decimals and unit."""
-_KINDS = TypeAdapter(dict[str, Kind]).validate_python(
-    tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-)
+_KINDS = TypeAdapter(dict[str, Kind]).validate_python(stated(__file__))
 """By the end of the macro's name."""
 
 
@@ -106,13 +100,12 @@ def _tasks(study: Study, names: Names) -> Iterator[Number]:
                 yield about.value(what, best.reward, how=best.how, cells=best.cells, origin=origin)
         printed = published_initial(task)
         if printed is not None:
-            source = _published(_INITIAL[task], "derived" if printed[2] else "paper")
-            yield about.value("PublishedInitialReward", printed[1], **source)
+            source = _published(printed.place, "derived" if printed.derived else "paper")
+            yield about.value("PublishedInitialReward", printed.reward, **source)
 
 
-def _published(condition: int, source: Literal["paper", "derived"]) -> dict[str, Any]:
+def _published(place: str, source: Literal["paper", "derived"]) -> dict[str, Any]:
     """How the paper gives a number, and its place there."""
-    place = f"Results, Exploration Condition {condition}"
     origin = f"{ORIGINS[source]}; {place}"
     return {"how": origin, "origin": origin, "cells": ()}
 
@@ -132,11 +125,10 @@ def _cells(study: Study, names: Names) -> Iterator[Number]:
 
 
 def _reward(about: _About, cell: CellRuns) -> Number:
-    rewards = cell.good.reward.to_numpy(dtype=np.float64)
     solved = "" if len(cell.good) == len(cell.runs) else f" ({len(cell.runs)} runs, some failed)"
-    found = mean(rewards)
+    found = mean(cell.rewards)
     kind = (f"mean learned reward{solved}", 1, "ticks")
-    return about.inferred("Reward", found, kind, sd=sd(rewards))
+    return about.inferred("Reward", found, kind, sd=sd(cell.rewards))
 
 
 def _gaps(study: Study, about: _About, reward: Number) -> Iterator[Number]:
@@ -190,7 +182,8 @@ def _learner(about: _About, cell: CellRuns) -> Iterator[Number]:
     printed = published_cell(cell.task, condition)
     if printed is not None and printed.summary is not None:
         summary = printed.summary
-        source = _published(int(condition.removeprefix("EC")), summary.source)
+        place = f"Results, Exploration Condition {condition.removeprefix('EC')}"
+        source = _published(place, summary.source)
         if summary.source_of_runs == "ours":
             source["how"] += f"; its {summary.runs} runs are an assumption of ours"
         source |= {"sd": math.nan if summary.sd is None else summary.sd, "n": summary.runs}
@@ -206,7 +199,7 @@ def _conditions(study: Study, names: Names) -> Iterator[Number]:
         labels = [label for label in conditions if (task, label) in study.cells]
         for lower, higher in itertools.combinations(labels, 2):
             cells = ((task, higher), (task, lower))
-            a, b = (study.cells[key].good.reward.to_numpy(dtype=np.float64) for key in cells)
+            a, b = (study.cells[key].rewards for key in cells)
             if not len(a) or not len(b):
                 continue
             stem = f"{names.tasks[task]}{names.labels[higher]}Minus{names.labels[lower]}"

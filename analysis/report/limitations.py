@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import tomllib
+import itertools
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.markup import code, escaped
@@ -15,17 +12,16 @@ from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import RUNS, TRIALS
 from coartic.analysis.report.document import CellKey
 from coartic.analysis.report.summary import unlike_printed
+from coartic.analysis.results.optima import ARMS
 from coartic.analysis.statistics.estimates import FEWEST
 from coartic.analysis.statistics.power import POWER, smallest_difference
 from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study
-from coartic.analysis.words import typographic
+from coartic.analysis.words import stated, typographic
 from coartic.exploration import CONDITIONS
 from coartic.text import counted
 
-_SENTENCES: dict[str, str] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)
+_SENTENCES: dict[str, str] = stated(__file__)
 
 
 def limitations(study: Study) -> tuple[str, ...]:
@@ -162,7 +158,7 @@ def _detectable(study: Study, key: CellKey) -> Iterator[str]:
     """The difference that as many runs of one of the paper's conditions would show."""
     task, condition = key[0], key[1].removeprefix(LEARNER)
     best = study.optima.get((task, "free"))
-    rewards = study.cells[key].good.reward.to_numpy(dtype=np.float64)
+    rewards = study.cells[key].rewards
     if len(rewards) < 2 or best is None or not best.reward or sd(rewards) == 0:
         return
     if condition in CONDITIONS:
@@ -185,15 +181,12 @@ def _optima(study: Study) -> Iterator[str]:
         bounded = sum(best.bound is not None for best in others)
         drawn = len(study.tasks) - len(alone)
         yield _said("unproven_instances", count=len(others), drawn=drawn, bounded=bounded)
-    for task in study.results.tasks:
-        for arm in ("free", "still"):
-            if task not in alone:
-                continue
-            best = study.optima.get((task, arm))
-            if best is not None and not best.proven:
-                bound = "" if best.bound is None else f"; none above {best.bound} is proven"
-                facts = {"arm": arm, "reward": best.reward, "bound": bound}
-                yield _said("unproven", task=escaped(task), **facts)
+    for task, arm in itertools.product(study.results.tasks, ARMS):
+        best = study.optima.get((task, arm)) if task in alone else None
+        if best is not None and not best.proven:
+            bound = "" if best.bound is None else f"; none above {best.bound} is proven"
+            facts = {"arm": arm, "reward": best.reward, "bound": bound}
+            yield _said("unproven", task=escaped(task), **facts)
 
 
 def _timing_and_model(study: Study) -> Iterator[str]:

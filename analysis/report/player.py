@@ -8,7 +8,6 @@ where it was at every control tick; hits are kept by tick, exactly.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -20,14 +19,13 @@ from coartic import (
     Robot,
     Task,
     Trajectory,
-    corrective_trial,
     initial_hands,
     trajectory,
 )
 from coartic.analysis.figures.robot import numbered_below
-from coartic.analysis.methods import LEARNER, spoken_name
+from coartic.analysis.methods import CONDITIONS, spoken_name
 from coartic.analysis.report.document import CellKey
-from coartic.analysis.signatures.trajectories import Trajectories
+from coartic.analysis.signatures.trajectories import Trajectories, corrective
 from coartic.analysis.study import Study
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS
@@ -35,7 +33,6 @@ from coartic.text import json_text
 
 TOLERANCE = 0.005
 """Length unit by which a joint may be off at any tick."""
-_CONDITION = re.compile(rf"{LEARNER}EC\d")
 
 
 def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
@@ -59,7 +56,7 @@ def _first(tasks: list[dict[str, Any]]) -> dict[str, Any]:
         ((task["initials"][0]["ticks"] - movement["ticks"]) / task["initials"][0]["ticks"], at, k)
         for at, task in enumerate(tasks)
         for k, movement in enumerate(task["movements"])
-        if task["initials"] and _CONDITION.fullmatch(movement["label"])
+        if task["initials"] and movement["label"] in CONDITIONS
     ]
     _, task, movement = max(gains, default=(0.0, 0, 0), key=lambda found: found[0])
     return {"task": task, "movement": movement}
@@ -129,8 +126,8 @@ def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
             "runs": len(cell.runs),
         }
         if hands and hands not in initials:
-            execution = corrective_trial(task, hands, model=study.model)
-            if execution.completed:
+            execution = corrective(task, hands, study.model)
+            if execution is not None:
                 initials[hands] = trajectory(task, execution.movements, study.model)
         if hands in initials:
             head["initial"] = hands

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import get_args
+
+import pandas as pd
 
 from coartic.analysis.claims.register import Judged, Verdict
 from coartic.analysis.comparisons.overall import variant
 from coartic.analysis.comparisons.paper import paper_rows
 from coartic.analysis.generality.sample import one_by_one
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.published import published_cell
 from coartic.analysis.report.document import Bullets, DataTable
 from coartic.analysis.report.tables.common import estimate_as_printed, marked, mean_of
@@ -22,30 +24,31 @@ from coartic.analysis.words import typographic
 from coartic.record import Environment
 from coartic.text import counted
 
-_CONDITION = re.compile(rf"{LEARNER}EC[1-4]")
-_VERDICTS: tuple[Verdict, ...] = ("supported", "not supported", "cannot tell", "measured")
-
 
 def best_condition(study: Study, task: str) -> str | None:
     """Label of the learner's own condition (no variant) with the highest mean reward."""
     rewards = {
         label: row.reward
         for (name, label), row in study.method_rows.items()
-        if name == task and _CONDITION.fullmatch(label) and not math.isnan(row.reward)
+        if name == task and label in CONDITIONS and not math.isnan(row.reward)
     }
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
+
+
+def learned(study: Study) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Tasks that the learner did, with the label of its best condition and its solved runs."""
+    for task in study.tasks:
+        label = best_condition(study, task)
+        if label is not None:
+            yield task, label, study.cells[task, label].good
 
 
 def tasks_table(study: Study) -> DataTable | None:
     """One row a task: initial, learned, published and best possible reward."""
     layout, rows = LAYOUTS["tasks-in-short"], []
-    for name in study.results.tasks:
-        label = best_condition(study, name)
-        if label is None:
-            continue
-        good, condition = study.cells[name, label].good, label.removeprefix(LEARNER)
-        learned = mean_of(good.reward)
-        assert learned is not None  # of the best of all means
+    for name, label, good in learned(study):
+        condition, reward = label.removeprefix(LEARNER), mean_of(good.reward)
+        assert reward is not None  # of the best of all means
         initial = good.initial_reward.dropna()
         paper, best = published_cell(name, condition), study.optima.get((name, "free"))
         printed = paper.summary if paper else None
@@ -55,11 +58,11 @@ def tasks_table(study: Study) -> DataTable | None:
             task=marked(study, name),
             initial=float(initial.iloc[0]) if len(initial) else None,
             condition=condition,
-            learned=replace(learned, sd=None),
+            learned=replace(reward, sd=None),
             published=estimate_as_printed(printed),
             optimum=best.reward if best else None,
             proof=("proven" if best.proven else "best known") if best else None,
-            gap=(best.reward - learned.value) / -best.reward if best and best.reward else None,
+            gap=(best.reward - reward.value) / -best.reward if best and best.reward else None,
         )
         searches = dict.fromkeys(("optimum", "proof"), best.cells) if best else {}
         sources = {"published": (printed.source,)} if printed else {}
@@ -70,21 +73,22 @@ def tasks_table(study: Study) -> DataTable | None:
 
 def verdicts(judged: Sequence[Judged]) -> Bullets:
     """The paper's claims counted by verdict."""
-    paper = [entry for entry in judged if entry.claim.place]
-    items = []
+
+    def counts(entries: Iterable[Judged], thing: str, name: str) -> str:
+        found = Counter(entry.verdict for entry in entries)
+        by_verdict = ", ".join(f"{found[verdict]} {verdict}" for verdict in get_args(Verdict))
+        return f"{counted(found.total(), thing)} {name}: {by_verdict}."
+
+    paper, items = [entry for entry in judged if entry.claim.place], []
     for fitted, name in (
         (False, "on what is printed: independent tests, but of no number that choices rest on"),
         (True, "no independent tests, as they rest on reconstructed tasks †"),
     ):
-        found = Counter(entry.verdict for entry in paper if entry.claim.fitted == fitted)
-        counts = ", ".join(f"{found[verdict]} {verdict}" for verdict in _VERDICTS)
-        items.append(f"{counted(found.total(), 'claim')} of the paper, {name}: {counts}.")
-    beyond = Counter(entry.verdict for entry in judged if not entry.claim.place)
+        own = (entry for entry in paper if entry.claim.fitted == fitted)
+        items.append(counts(own, "claim", f"of the paper, {name}"))
+    beyond = [entry for entry in judged if not entry.claim.place]
     if beyond:
-        counts = ", ".join(f"{beyond[verdict]} {verdict}" for verdict in _VERDICTS)
-        items.append(
-            f"{counted(beyond.total(), 'comparison')} that the paper does not make: {counts}."
-        )
+        items.append(counts(beyond, "comparison", "that the paper does not make"))
     return Bullets(tuple(items))
 
 

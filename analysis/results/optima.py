@@ -1,8 +1,7 @@
 """The optimum of each task: the best reward known, what is proven about it, and by which runs.
 
-``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids
-and the solutions; ``python -m coartic.analysis.results.optima FOLDER`` makes it from the results
-folder of
+``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids and the
+solutions; ``python -m coartic.analysis.results.optima FOLDER`` makes it from the results folder of
 that suite. Searches for the optimum in a results folder of the user's own count as well, so a
 table for the user's own task has gaps as soon as the task's optimum is among its runs.
 """

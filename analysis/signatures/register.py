@@ -8,13 +8,11 @@ in the order of ``signatures.csv``.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from itertools import groupby
 from operator import attrgetter
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pandas as pd
@@ -26,6 +24,7 @@ from coartic.analysis.signatures.context import context_pairs
 from coartic.analysis.signatures.locus import LEAST, families, variants
 from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
 from coartic.analysis.signatures.trajectories import Trajectories, trajectories_of
+from coartic.analysis.words import stated
 from coartic.robot import HANDS
 
 if TYPE_CHECKING:
@@ -38,9 +37,7 @@ IN_FAMILY = "the tasks that share its first goals are variants of it: see the lo
 NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
 
 
-_KINDS = TypeAdapter(dict[str, tuple[Signature, ...]]).validate_python(
-    tomllib.loads(Path(__file__).with_name("register.toml").read_text(encoding="utf-8"))
-)
+_KINDS = TypeAdapter(dict[str, tuple[Signature, ...]]).validate_python(stated(__file__))
 WITHIN = _KINDS["within"]
 """Of one method's runs on one task."""
 CONTEXTS = _KINDS["contexts"]

@@ -52,15 +52,7 @@ class Trajectories:
 
         None where it completes the task with none.
         """
-        try:
-            return self.corrective(initial_hands(self.task, model=self.model))
-        except NotApplicableError:
-            return None
-
-    def corrective(self, hands: str) -> Execution | None:
-        """The corrective process alone with these hands; None where it fails the task."""
-        execution = corrective_trial(self.task, hands, model=self.model)
-        return execution if execution.completed else None
+        return initial_solution(self.task, self.model)
 
     @cached_property
     def sequences(self) -> list[str]:
@@ -88,7 +80,8 @@ class Trajectories:
 
         Shape ``(n, G)``: runs whose hands it completes the task with.
         """
-        return self._changes({hands: self.corrective(hands) for hands in set(self.sequences)})
+        hands = set(self.sequences)
+        return self._changes({own: corrective(self.task, own, self.model) for own in hands})
 
     def _changes(self, references: Mapping[str, Execution | None]) -> NDArray[np.int64]:
         """From the solution that each hand sequence is compared with."""
@@ -98,6 +91,20 @@ class Trajectories:
             if (reference := references[run.execution.hands]) is not None
         ]
         return np.array(rows, dtype=np.int64).reshape(-1, len(self.task.goals))
+
+
+def corrective(task: Task, hands: str, model: MotionModel) -> Execution | None:
+    """The corrective process alone with these hands; None where it fails the task."""
+    execution = corrective_trial(task, hands, model=model)
+    return execution if execution.completed else None
+
+
+def initial_solution(task: Task, model: MotionModel) -> Execution | None:
+    """The corrective process alone with the task's hands; None where it completes it with none."""
+    try:
+        return corrective(task, initial_hands(task, model=model), model)
+    except NotApplicableError:
+        return None
 
 
 def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:

@@ -11,7 +11,7 @@ E. D. Dolan & J. J. Moré (2002), Mathematical Programming 91 (performance profi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -127,11 +127,20 @@ def profile(
         raise ValueError("a profile needs a vector of at least one run for every task")
     reaches = [beyond.outer(runs, levels).astype(np.float64) for runs in each]
     share = np.mean([runs.mean(axis=0) for runs in reaches], axis=0)
+    low, high = band(reaches, seed=seed, resamples=resamples)
+    return Profile(levels, share, low, high, tuple(map(len, reaches)))
+
+
+def band(strata: Sequence[Array], *, seed: int = SEED, resamples: int) -> tuple[Array, Array]:
+    """Ends (k,) of the pointwise intervals of the mean over strata of the mean over runs (n, k).
+
+    Percentiles of the stratified bootstrap.
+    """
     rng = np.random.default_rng(seed)
-    drawn = np.zeros((resamples, len(levels)))
-    for runs in reaches:
+    drawn = np.zeros((resamples, strata[0].shape[1]))
+    for runs in strata:
         # How often each run is drawn, times what it reaches.
         counts = rng.multinomial(len(runs), np.full(len(runs), 1 / len(runs)), size=resamples)
         drawn += counts @ runs / len(runs)
-    low, high = np.quantile(drawn / len(reaches), TAILS, axis=0)
-    return Profile(levels, share, low, high, tuple(map(len, reaches)))
+    low, high = np.quantile(drawn / len(strata), TAILS, axis=0)
+    return low, high

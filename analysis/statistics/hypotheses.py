@@ -215,13 +215,18 @@ def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     p = np.asarray(p_values, dtype=np.float64)
     if ((p < 0) | (p > 1)).any():
         raise ValueError("a p-value lies between 0 and 1")
-    known = np.flatnonzero(~np.isnan(p))
-    order = known[np.argsort(p[known], kind="stable")]
-    adjusted = np.full(p.shape, math.nan)
-    size = len(order) if family is None else family
-    steps = p[order] * (size - np.arange(len(order)))
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(steps))
-    return [float(value) for value in adjusted]
+    made = int((~np.isnan(p)).sum())
+    adjusted: list[float] = holm_rows(p, made if family is None else family).tolist()
+    return adjusted
+
+
+def holm_rows(p: Array, family: int) -> Array:
+    """:func:`holm` of every row of p-values (..., tests), each of a family of so many."""
+    order = np.argsort(p, axis=-1, kind="stable")  # NaN last
+    steps = np.take_along_axis(p, order, axis=-1) * (family - np.arange(p.shape[-1]))
+    adjusted = np.empty_like(p)
+    np.put_along_axis(adjusted, order, np.maximum.accumulate(steps, axis=-1), axis=-1)
+    return np.minimum(1.0, adjusted)
 
 
 def standard_error(samples: tuple[Array, ...]) -> float:

@@ -217,11 +217,10 @@ def _width(figure: FigureBlock, svg: str) -> float:
 def inlined_svg(figure: FigureBlock, narrow: bool = False) -> Markup:
     """A figure's SVG for use inside HTML: named for who cannot see it, its ids its own.
 
-    Prologue and metadata go, and ids get the figure's id before them where they have not,
-    since those of several SVGs would meet in one page. ``narrow``: the one drawn for a narrow
-    page. It is shown up to half as large again
-    as on paper; a wide one never so small that it cannot be read.
-    Raises ValueError where there is no SVG with a ``viewBox``.
+    Prologue and metadata go, and ids get the figure's id before them where they have not, since
+    those of several SVGs would meet in one page. ``narrow``: the one drawn for a narrow page. It
+    is shown up to half as large again as on paper; a wide one never so small that it cannot be
+    read. Raises ValueError where there is no SVG with a ``viewBox``.
     """
     svg = figure.narrow if narrow else figure.svg
     width, root = _width(figure, svg), re.search(r"<svg\b([^>]*)>", svg)

@@ -11,9 +11,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-import tomllib
 from collections.abc import Sequence
-from pathlib import Path
 
 from coartic.analysis.markup import inline
 from coartic.analysis.methods import short_name
@@ -21,10 +19,10 @@ from coartic.analysis.report.document import DataTable, Document, Value
 from coartic.analysis.report.formats.templates import LATEX, template
 from coartic.analysis.report.tables.main import MAIN
 from coartic.analysis.report.text import METHOD_COLUMNS, Part, parts
-from coartic.analysis.words import NO_SPREAD, NONE
+from coartic.analysis.words import NO_SPREAD, NONE, stated
 from coartic.text import one_line
 
-_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_TABLE = stated(__file__)
 _ESCAPES: dict[str, str] = _TABLE["characters"] | {
     character: form.replace("@", said)
     for form, pairs in _TABLE["forms"].items()

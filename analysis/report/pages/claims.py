@@ -8,11 +8,20 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from coartic.analysis.claims.catalogue import family_sizes
-from coartic.analysis.claims.register import CHOSEN, FITTED, RULES, Judged
+from coartic.analysis.claims.register import CHOSEN, FITTED, RULES, Claim, Judged
 from coartic.analysis.markup import code, escaped
-from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
+from coartic.analysis.report.document import (
+    Block,
+    Bullets,
+    DataTable,
+    Document,
+    Prose,
+    Section,
+    Value,
+)
 from coartic.analysis.report.summary import verdicts
 from coartic.analysis.report.tables.layout import LAYOUTS, with_legends
+from coartic.analysis.report.tables.main import verdict_rows
 from coartic.analysis.statistics.power import POWER
 from coartic.analysis.study import Study
 from coartic.analysis.words import NONE, slugs
@@ -20,23 +29,17 @@ from coartic.analysis.words import NONE, slugs
 
 def claims_table(study: Study) -> DataTable | None:
     """Every claim with its verdict, p-values and place; rows lead to the claims' sections."""
-    layout, rows, sizes = LAYOUTS["claims"], [], family_sizes()
-    by_run = {str(run): key for key, cell in study.cells.items() for run in cell.runs.run_id}
-    for entry in study.judged:
-        row = layout.row(
-            entry.claim.id,
-            entry,
-            dict.fromkeys(by_run[run] for run in entry.run_ids),
-            claim=entry.claim.id,
-            statement=entry.claim.statement,
-            verdict=entry.marked,
-            reconstructions=entry.claim.reconstructions or None,
-            place=", ".join(filter(None, (entry.claim.place, entry.claim.figure))) or None,
-        )
-        family = entry.claim.id if math.isnan(entry.p) else entry.claim.correction
-        rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
+    layout, sizes = LAYOUTS["claims"], family_sizes()
+    own: list[dict[str, Value]] = [
+        {
+            "claim": claim.id,
+            "reconstructions": claim.reconstructions or None,
+            "place": _place(claim) or None,
+        }
+        for claim in (entry.claim for entry in study.judged)
+    ]
     return layout.table(
-        rows,
+        verdict_rows(study, layout, study.judged, own),
         rules=RULES,
         paper=sizes["paper"],
         beside=sizes["beside"],
@@ -51,7 +54,8 @@ def claims_document(study: Study) -> Document:
     """The register as a document: counts, a table of verdicts, then claim by claim."""
     specification = study.results.manifest.specification
     table = claims_table(study)
-    shown = [_as_printed(table)] if table else []
+    # The claims' own sections say the rest.
+    shown = [table.only(lambda column: column.printed)] if table else []
     groups = [
         (title, list(own))
         for title, own in itertools.groupby(study.judged, key=lambda entry: entry.claim.section)
@@ -77,7 +81,7 @@ def claims_document(study: Study) -> Document:
 def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Section:
     """All that is known of a claim; ``figures``: ids of ours by the paper's that they are like."""
     claim = entry.claim
-    where = ", ".join(filter(None, (claim.place, claim.figure))) or "not in the paper"
+    where = _place(claim) or "not in the paper"
     quote = f": “{claim.quote}”" if claim.quote else ""
     ours = (figures or {}).get(claim.figure)
     see = f" Ours: [figure {ours}](#{ours})." if ours else ""
@@ -115,11 +119,8 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
     return Section(f"claim-{claim.id}", title, tuple(blocks), folded=True)
 
 
-def _as_printed(table: DataTable) -> DataTable:
-    """Without what the claims' own sections say."""
-    kept = [place for place, column in enumerate(table.columns) if column.printed]
-    rows = [replace(row, values=tuple(row.values[place] for place in kept)) for row in table.rows]
-    return replace(table, columns=tuple(table.columns[place] for place in kept), rows=tuple(rows))
+def _place(claim: Claim) -> str:
+    return ", ".join(filter(None, (claim.place, claim.figure)))
 
 
 def _basis(entry: Judged) -> str:

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from coartic.analysis.generality.exploration import EC2, EC3, EC4, Contrast
+from coartic.analysis.generality.exploration import Contrast
 from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed
-from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.generality.sample import Sample
 from coartic.analysis.markup import escaped
-from coartic.analysis.methods import short_name
+from coartic.analysis.methods import CONDITIONS, EC2, EC3, EC4, INITIAL, short_name
 from coartic.analysis.report.document import Block, Bullets, Section
 from coartic.analysis.report.tables.families import (
     family_tables,
@@ -53,7 +53,7 @@ def _in_a_sentence(sample: Sample) -> str:
     others = []
     for label in sample.labels:
         own = sample.gaps(label)
-        if " " not in label and label not in (ONE_ARMED, *CONDITIONS):
+        if " " not in label and label not in CONDITIONS:
             found = over(own, list(sample.families))
             if found is not None:
                 others.append((found.estimate, f"{short_name(label)} {_share(found)}"))

@@ -29,7 +29,7 @@ from coartic.analysis.report.document import (
 )
 from coartic.analysis.report.tables.common import marked, table_ids
 from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
-from coartic.analysis.results.optima import OtherArm
+from coartic.analysis.results.optima import ARMS, OtherArm
 from coartic.analysis.study import Study
 from coartic.analysis.words import typographic
 from coartic.record import SEARCH
@@ -93,7 +93,7 @@ def reading_of_cost() -> tuple[str, ...]:
 
 def other_arms(study: Study, task: str) -> tuple[OtherArm, ...]:
     """The optima that a task has: with one arm there is none to keep still."""
-    return ("free", "still") if len(study.tasks[task].hands) > 1 else ("free",)
+    return ARMS if len(study.tasks[task].hands) > 1 else ARMS[:1]
 
 
 def targets_table(

@@ -12,19 +12,19 @@ from coartic.analysis.generality.exploration import Budget, budgets
 from coartic.analysis.generality.precision import DIFFERENCE, RUNS, needed, variance_shares
 from coartic.analysis.generality.presence import SIGNS, THERE, presence, recruitment
 from coartic.analysis.generality.properties import OUTCOMES, PROPERTIES, what_pays
-from coartic.analysis.generality.sample import CONDITIONS, INITIAL, ONE_ARMED, Sample
+from coartic.analysis.generality.sample import Sample
 from coartic.analysis.generality.scaling import GROWING
 from coartic.analysis.markup import escaped
-from coartic.analysis.methods import short_name
-from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
-from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from coartic.analysis.methods import FAMILIES, INITIAL, most_exploring, short_name
+from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row
+from coartic.analysis.report.tables.layout import LAYOUTS, estimated, finite
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import Runs, Scores, other_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.words import slugs
 from coartic.text import counted
 
-LEARNER = "learner"
+LEARNER = FAMILIES["dual-process"]
 """Condition 1 on one arm and 4 on two."""
 ALL = "all"
 """Of families, each counting alike."""
@@ -64,7 +64,7 @@ def two_armed(sample: Sample) -> tuple[str, ...]:
 
 def learner_on(sample: Sample, family: str) -> str:
     """Label of the learner on a family: what explores most."""
-    return CONDITIONS[-1] if family in two_armed(sample) else ONE_ARMED
+    return most_exploring(sample.tasks[sample.families[family][0]])
 
 
 def learner_gaps(sample: Sample, *, to_bound: bool = False) -> Scores:
@@ -81,11 +81,6 @@ def over(scores: Scores, families: Sequence[str]) -> Inference | None:
     if not families or not set(families) <= scores.keys():
         return None
     return other_tasks({family: scores[family] for family in families})
-
-
-def _shown(found: Inference | None, scale: float = 1.0) -> Value:
-    ends = found and (found.estimate, found.low, found.high)
-    return with_interval(*(scale * v for v in ends)) if ends else None
 
 
 def gaps_table(sample: Sample) -> DataTable | None:
@@ -110,12 +105,12 @@ def gaps_table(sample: Sample) -> DataTable | None:
             _cells(sample, (label,)),
             method=short_name(label),
             instances=len(means),
-            two_arms=_shown(over(scores, both)),
-            to_bound=_shown(over(to_bound, both)),
+            two_arms=estimated(over(scores, both)),
+            to_bound=estimated(over(to_bound, both)),
             median=float(np.median(means)),
             worst=float(np.quantile(means, 0.9)),
             better_on=found,
-            **{columns[family]: _shown(over(scores, [family])) for family in columns},
+            **{columns[family]: estimated(over(scores, [family])) for family in columns},
         )
         rows.append(row)
     rows[1:] = sorted(rows[1:], key=_gap_of)
@@ -170,8 +165,8 @@ def exploration_table(study: Study, sample: Sample) -> DataTable | None:
             _cells(sample, (found.first, found.second), found.family),
             contrast=pair,
             family=family,
-            gain=_shown(found.difference),
-            by_hands=_shown(found.hands),
+            gain=estimated(found.difference),
+            by_hands=estimated(found.hands),
             by_joints=gain - found.hands.estimate,
         )
         rows.append(row)
@@ -202,7 +197,7 @@ def _budget_table(sample: Sample) -> DataTable | None:
             method=name,
             family=_named(family),
             instances=max(r.instances for r in own.values()),
-            **{f"after_{n}": _shown(own[n].value) if n in own else None for n in trials},
+            **{f"after_{n}": estimated(own[n].value) if n in own else None for n in trials},
         )
         rows.append(row)
     return layout.table(rows) if len(trials) > 1 else None
@@ -222,7 +217,7 @@ def _presence_table(study: Study, sample: Sample) -> DataTable | None:
             signature=name,
             condition=label,
             family=family,
-            mean=_shown(found.value),
+            mean=estimated(found.value),
         )
         rows.append(row)
     there = ", ".join(f"{THERE[sign]:g} ({name})" for sign, name in _SIGN_NAMES.items())
@@ -247,7 +242,7 @@ def _properties_table(sample: Sample) -> DataTable | None:
             found,
             _cells(sample, (LEARNER,)),
             property=PROPERTIES[found.name],
-            effect=_shown(found.effect, 100),
+            effect=estimated(found.effect, 100),
         )
         rows.append(row)
     return layout.table(rows, **OUTCOMES)
@@ -263,8 +258,8 @@ def _scaling_table(study: Study, sample: Sample) -> DataTable | None:
             _cells(sample, (found.label,)),
             method=short_name(found.label),
             grows=GROWING[found.what],
-            goals=_shown(found.goals, scale),
-            joints=_shown(found.joints, scale),
+            goals=estimated(found.goals, scale),
+            joints=estimated(found.joints, scale),
         )
         rows.append(row)
     return layout.table(rows)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
 from coartic.analysis.comparisons.methods import TOLD
 from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
+from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.words import stated
 
 _LETTERS = {"told", "told_more", "told_less"}  # columns with letters of information
 _MARKS = {
@@ -95,15 +95,21 @@ def with_interval(value: float, low: float, high: float) -> Value:
     return None if math.isnan(value) else Estimate(float(value), None, *ends)
 
 
+def estimated(found: Inference | None, scale: float = 1.0) -> Value:
+    """An estimate times ``scale`` with its interval where it has one; None for none."""
+    if found is None:
+        return None
+    return with_interval(*(scale * value for value in (found.estimate, found.low, found.high)))
+
+
 def finite(value: float) -> float | None:
     """None for NaN."""
     return None if math.isnan(value) else float(value)
 
 
 def _read() -> dict[str, Layout]:
-    text = (Path(__file__).parent / "tables.toml").read_text(encoding="utf-8")
     found = {}
-    for name, said in tomllib.loads(text).items():
+    for name, said in stated(__file__, "tables").items():
         columns = [_column(*column) for column in said["columns"].items()]
         found[name] = {**said, "name": name, "columns": columns}
     return TypeAdapter(dict[str, Layout]).validate_python(found)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import pandas as pd
 
+from coartic.analysis.claims.register import Judged
 from coartic.analysis.comparisons.methods import median
 from coartic.analysis.comparisons.reached import ALL_TASKS
 from coartic.analysis.figures.ranking import GROUPS, learner, standings
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report.document import Column, DataTable, Row, Value
-from coartic.analysis.report.tables.layout import LAYOUTS, finite, with_interval
+from coartic.analysis.report.tables.layout import LAYOUTS, Layout, finite, with_interval
 from coartic.analysis.study import Study
 from coartic.analysis.words import slugs
 
@@ -31,24 +32,14 @@ def main_methods(study: Study) -> DataTable | None:
     names = {task: slug.replace("-", "_") for task, slug in slugs(study.tasks).items()}
     alone = one_by_one(study)
     shown = [task for task in study.tasks if task in alone and (found.task == task).any()]
-    over_all = (found.task == ALL_TASKS).any()
+    over_all = bool((found.task == ALL_TASKS).any())
     rows = []
     for method, own in sorted(found.groupby("method", sort=False), key=_order):
         if over_all and ALL_TASKS not in set(own.task) and not learner(str(method)):
             continue
         rows.append(_row(study, str(method), own, shown))
-    layout = _METHODS.plus(_columns(study, shown, names))
-    if not over_all:
-        layout = layout.model_copy(
-            update={"columns": tuple(c for c in layout.columns if c.name != "all_tasks")}
-        )
-        rows = [_without_third(row) for row in rows]
-    return layout.table(rows)
-
-
-def _without_third(row: Row) -> Row:
-    first, second, _, *rest = row.values  # noqa: PD011
-    return replace(row, values=(first, second, *rest))
+    table = _METHODS.plus(_columns(study, shown, names)).table(rows)
+    return table and table.only(lambda column: over_all or column.name != "all_tasks")
 
 
 def _order(item: tuple[object, pd.DataFrame]) -> tuple[int, float]:
@@ -106,18 +97,20 @@ def _cells(study: Study, method: str, own: pd.DataFrame) -> tuple[tuple[str, str
 
 def main_verdicts(study: Study) -> DataTable | None:
     """Every claim of the paper in words, with its verdict."""
-    by_run = {str(run): key for key, cell in study.cells.items() for run in cell.runs.run_id}
-    rows = []
     judged = [entry for entry in study.judged if entry.claim.place]
-    for number, entry in enumerate(judged, 1):
-        row = _VERDICTS.row(
-            entry.claim.id,
-            entry,
-            dict.fromkeys(by_run[run] for run in entry.run_ids),
-            number=number,
-            statement=entry.claim.statement,
-            verdict=entry.marked,
-        )
-        family = entry.claim.id if math.isnan(entry.p) else entry.claim.correction
-        rows.append(replace(row, link=f"#claim-{entry.claim.id}", family=family))
-    return _VERDICTS.table(rows)
+    own: list[dict[str, Value]] = [{"number": number} for number in range(1, len(judged) + 1)]
+    return _VERDICTS.table(verdict_rows(study, _VERDICTS, judged, own))
+
+
+def verdict_rows(
+    study: Study, layout: Layout, judged: Iterable[Judged], own: Iterable[Mapping[str, Value]]
+) -> Iterator[Row]:
+    """A row a claim, which leads to its section, with what is the table's ``own``."""
+    by_run = {run: key for key, runs in study.run_ids.items() for run in runs}
+    for entry, values in zip(judged, own, strict=True):
+        claim = entry.claim
+        cells = dict.fromkeys(by_run[run] for run in entry.run_ids)
+        said: dict[str, Value] = {"statement": claim.statement, "verdict": entry.marked}
+        row = layout.row(claim.id, entry, cells, **said, **values)
+        family = claim.id if math.isnan(entry.p) else claim.correction
+        yield replace(row, link=f"#claim-{claim.id}", family=family)

@@ -10,6 +10,7 @@ from coartic.analysis.markup import escaped
 from coartic.analysis.report.document import DataTable, Row
 from coartic.analysis.report.tables.common import marked, mean_of, table_ids
 from coartic.analysis.report.tables.layout import LAYOUTS
+from coartic.analysis.results.optima import ARMS
 from coartic.analysis.study import Study
 from coartic.analysis.words import true_minus
 from coartic.method import Information
@@ -62,7 +63,7 @@ def _method_row(study: Study, row: MethodRow) -> Row:
 def _optimum(study: Study, task: str) -> str:
     """What is known of a task's best rewards, in inline markup."""
     known = []
-    for arm in ("free", "still"):
+    for arm in ARMS:
         best = study.optima.get((task, arm))
         if best is not None:
             bound = "no bound proven" if best.bound is None else f"proven bound {best.bound}"

@@ -16,7 +16,7 @@ from coartic.analysis.published import (
 )
 from coartic.analysis.report.document import DataTable, RestsOn, Row, Value
 from coartic.analysis.report.tables.common import counts, estimate_as_printed, marked, mean_of
-from coartic.analysis.report.tables.layout import LAYOUTS, Layout, with_interval
+from coartic.analysis.report.tables.layout import LAYOUTS, Layout, estimated
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.study import Study
 from coartic.analysis.words import typographic
@@ -32,11 +32,9 @@ def beside_paper(study: Study) -> tuple[DataTable | None, ...]:
 def published_table(study: Study) -> DataTable | None:
     """Learned rewards of the paper's cells, published and ours."""
     rows = paper_rows(study)
-    derived = dict.fromkeys(
-        row.cell.task for row in rows if (published_initial(row.cell.task) or ("", 0, False))[2]
-    )
-    names = ", ".join(derived)
-    said = f"Published initial rewards of {names} are derived from other printed numbers."
+    initial = {row.cell.task: published_initial(row.cell.task) for row in rows}
+    derived = ", ".join(task for task, printed in initial.items() if printed and printed.derived)
+    said = f"Published initial rewards of {derived} are derived from other printed numbers."
     return _CELLS.table(
         (_published_row(study, row) for row in rows),
         notes=(said,) if derived else (),
@@ -85,16 +83,16 @@ def _published_row(study: Study, row: PaperRow) -> Row:
     cell, remark = row.cell, row.paper.remark
     initial = cell.good.initial_reward.dropna()
     published_hands = [f"{s.hands} {s.runs or ''}".strip() for s in row.paper.sequences]
-    printed_initial = published_initial(cell.task) or (None, None, False)
+    printed = published_initial(cell.task)
     return _beside(
         study,
         _CELLS,
         row,
         row.paper.summary,
-        {"published_initial": ("derived",)} if printed_initial[2] else {},
+        {"published_initial": ("derived",)} if printed and printed.derived else {},
         published_as=", ".join(filter(None, (_published_as(row.paper.summary), remark))),
         initial=float(initial.iloc[0]) if len(initial) else None,
-        published_initial=printed_initial[1],
+        published_initial=printed.reward if printed else None,
         hands=counts(cell.good.hands),
         published_hands=", ".join(published_hands) or None,
     )
@@ -116,7 +114,7 @@ def _beside(
     **own: Value,
 ) -> Row:
     """A row of either table: published, ours, the difference, and what is the table's own."""
-    cell, apart = row.cell, row.difference
+    cell = row.cell
     both: dict[str, Value] = {
         "task": marked(study, cell.task),
         "method": cell.label,
@@ -125,7 +123,7 @@ def _beside(
         "published_as": _published_as(published),
         "ours": mean_of(row.rewards),
         "runs": len(row.rewards),
-        "difference": with_interval(apart.estimate, apart.low, apart.high) if apart else None,
+        "difference": estimated(row.difference),
     }
     name = (cell.task, cell.label, *([row.hands] if isinstance(row, SequenceRow) else []))
     made = layout.row(" ".join(name), row, ((cell.task, cell.label),), **both | own)
