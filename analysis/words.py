@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from coartic import Task
     from coartic.analysis.statistics.estimates import Inference
 
 NONE = "–"
@@ -17,6 +18,7 @@ NONE = "–"
 NO_SPREAD = "no spread"
 """Shown for an interval that is a point, which would look like certainty."""
 MINUS, NARROW_SPACE, TIMES = "−", "\N{NARROW NO-BREAK SPACE}", "×"
+RECONSTRUCTED = "† Reconstructed: what the paper does not print of this task was inferred."
 LONGEST_SLUG = 80
 """Characters of a slug before its number; names of files must not be too long."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -55,6 +57,11 @@ def interval(found: Inference, style: str = ".1f") -> str:
     if found.low == found.high:
         return f"{text} (no spread in {' and '.join(map(str, found.n))} runs)"
     return f"{text} [{found.low:{style}}, {found.high:{style}}]"
+
+
+def marked(name: str, task: Task) -> str:
+    """A name with † where its task is reconstructed (:data:`RECONSTRUCTED`)."""
+    return f"{name} †" if task.reconstructed else name
 
 
 def tally(of: Mapping[Any, int]) -> str:

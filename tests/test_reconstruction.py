@@ -272,15 +272,7 @@ def test_a_task_with_other_goals_is_another_task() -> None:
     search = Search(TASK, layouts()["two-armed-1"], (), jobs=1)
     first, second = (
         result.cells["EC3"].rewards
-        for result in scored(
-            search,
-            [TASK.goal_array, NEAR_PRINTED],
-            targets.tests_of("two-armed-1"),
-            conditions=("EC2", "EC3", "EC4"),
-            wave=1,
-            runs=3,
-            trials=50,
-        )
+        for result in scored(search, [TASK.goal_array, NEAR_PRINTED], wave=1, runs=3, trials=50)
     )
     changed = load_task("two-armed-1").model_dump() | {"goals": NEAR_PRINTED.tolist()}
     task = parse_task(changed, "test")

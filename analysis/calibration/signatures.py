@@ -27,10 +27,11 @@ from coartic.analysis.signatures.manifold import movable, subspaces, synergy
 from coartic.analysis.signatures.subtasks import ROUNDING, change_from, sacrifice_p, sacrifices
 from coartic.analysis.signatures.trajectories import entropy
 from coartic.analysis.statistics import intervals
+from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.intervals import Interval
 from coartic.robot import Array
 
-ALPHA = 0.05
+ALPHA = LEVEL
 SIMULATIONS = 2000
 SEED = 20131
 RESAMPLES = 199

@@ -12,6 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy import stats
 
+from coartic.analysis.statistics.estimates import CONFIDENCE
 from coartic.analysis.statistics.intervals import Interval
 from coartic.robot import Array
 
@@ -44,7 +45,7 @@ def rate(check: Check, simulations: int, seed: Seed, method: Method = "exact") -
     """How often a check sees something in so many data sets; the same seed, the same rate."""
     rng = np.random.default_rng(seed)
     seen = sum(bool(check.seen(rng)) for _ in range(simulations))
-    low, high = stats.binomtest(seen, simulations).proportion_ci(0.95, method=method)
+    low, high = stats.binomtest(seen, simulations).proportion_ci(CONFIDENCE, method=method)
     return Interval(seen / simulations, float(low), float(high))
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coartic.analysis.claims.catalogue import CLAIMS, family_sizes
-from coartic.analysis.claims.power import SIMULATIONS, TRIED, Chances, powers, runs_needed
+from coartic.analysis.claims.power import SIMULATIONS, TRIED, powers, runs_needed
 from coartic.analysis.claims.register import CHOSEN, FITTED, RULES, Claim
 from coartic.analysis.claims.statements import REASONS
 from coartic.analysis.published import RUNS
@@ -75,7 +75,8 @@ def _lines() -> Iterator[str]:
     yield from ("| claim | supported | not supported | runs |", "| --- | --- | --- | --- |")
     needed = runs_needed(CLAIMS)
     for name, chances in powers(CLAIMS, {}).items():
-        yield f"| {name} | {_row(chances)} | {needed[name] or f'more than {TRIED[-1]}'} |"
+        both = " | ".join(f"{chance:.0%}" for chance in chances)
+        yield f"| {name} | {both} | {needed[name] or f'more than {TRIED[-1]}'} |"
     level = LEVEL / sizes["paper"]
     one, two = (smallest_difference(1.0, sd, RUNS, level) for sd in (0.0, 1.0))
     yield ""
@@ -101,10 +102,6 @@ def _lines() -> Iterator[str]:
             f"Held by {said['held']}" if "held" in said else said["open"]
         )
         yield f"| {said['place']} | “{said['quote']}” | {becomes} |"
-
-
-def _row(chances: Chances) -> str:
-    return " | ".join(f"{chance:.0%}" for chance in chances)
 
 
 def _claim(claim: Claim) -> Iterator[str]:

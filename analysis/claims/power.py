@@ -212,12 +212,10 @@ def _share_p(claim: Claim, sizes: Sizes) -> Drawn | None:
 def _mean_p(task: str, first: Side, second: Side, sizes: Sizes) -> Array | None:
     """One-tailed p-values that the first is higher; None where nothing is printed."""
     bound = _printed_bound(task, first, second)
-    if bound is not None and not _printed(task, first):
-        return _least_p(
-            bound,
-            _rng(task, first, second),
-            min(sizes.get((task, side.name), RUNS) for side in (first, second)),
-        )
+    cell = published_cell(task, first.name)
+    if bound is not None and (cell is None or cell.summary is None):
+        runs = min(sizes.get((task, side.name), RUNS) for side in (first, second))
+        return _least_p(bound, _rng(task, first, second), runs)
     a = _moments(task, first, sizes)
     if second.known:
         number = printed_known(task, second)
@@ -230,11 +228,6 @@ def _mean_p(task: str, first: Side, second: Side, sizes: Sizes) -> Array | None:
     if a is None or b is None:
         return None
     return np.where(np.minimum(a[0], b[0]) < FEWEST, 1.0, welch_p(*a, *b))
-
-
-def _printed(task: str, side: Side) -> bool:
-    cell = published_cell(task, side.name)
-    return cell is not None and cell.summary is not None
 
 
 def _least_p(bound: float, rng: np.random.Generator, runs: int) -> Array:

@@ -187,13 +187,11 @@ class Judged(Finding):
     @property
     def methods(self) -> tuple[str, ...]:
         """Its tests, in words."""
-        return tuple(dict.fromkeys(map(_in_words, (*self.tests, *(self.against or ())))))
+        every = *self.tests, *(self.against or ())
+        untested = (f" ({t.note})" if math.isnan(t.p) and t.note else "" for t in every)
+        return tuple(dict.fromkeys(t.method + why for t, why in zip(every, untested, strict=True)))
 
     @property
     def marked(self) -> str:
         """The verdict, with † where the claim is fitted."""
         return self.verdict + (" †" if self.claim.fitted else "")
-
-
-def _in_words(test: Inference) -> str:
-    return f"{test.method} ({test.note})" if math.isnan(test.p) and test.note else test.method

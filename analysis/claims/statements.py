@@ -31,17 +31,16 @@ def _read() -> dict[str, dict[str, Any]]:
         for name, row in rows.items():
             apart = "{which}" in row["statement"]
             for which in _APART if apart else ("",):
-                own = {k: _of(v, which) for k, v in row.items()}
+                own = {
+                    key: said[which] if isinstance(said, dict) and which in said else said
+                    for key, said in row.items()
+                }
                 own["statement"] = row["statement"].replace("{which}", which)
                 fitted = section == "Two-armed tasks" or which == "two-armed"
                 key = f"{name}-{which}" if apart else name
                 selected = key in _SELECTED
                 found[key] = {**own, "section": section, "fitted": fitted, "selected": selected}
     return found
-
-
-def _of(said: Any, which: str) -> Any:
-    return said[which] if isinstance(said, dict) and which in said else said
 
 
 STATEMENTS = _read()

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from coartic.analysis.figures import style
 from coartic.analysis.figures.bars import stars
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import chosen, missing
+from coartic.analysis.figures.selection import NO_CONTEXTS, chosen, missing
 from coartic.analysis.methods import short_name
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study
@@ -64,7 +64,7 @@ def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:
     labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
     frame = frame[frame.label.isin(labels)]
     if not len(frame):
-        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+        raise missing(study, NO_CONTEXTS)
     keys = ["task", "where", "label", "n"]
     equivalent, other = (
         frame[frame.signature == name]

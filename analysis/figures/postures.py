@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from coartic import Hand, Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.robot import MARKERS, box
-from coartic.analysis.figures.selection import chosen, missing
+from coartic.analysis.figures.selection import NO_CONTEXTS, chosen, missing
 from coartic.analysis.methods import CONDITIONS, spoken_name
 from coartic.analysis.study import Study
 from coartic.robot import Array
@@ -100,7 +100,7 @@ def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """
     found = contexts(study, methods)
     if found is None:
-        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+        raise missing(study, NO_CONTEXTS)
     figure = Figure(figsize=(style.ONE, 1.6), layout="constrained")
     _draw(figure.subplots(), found)
     method = spoken_name(found.method)
@@ -163,11 +163,9 @@ def _base(axes: Axes, task: Task, q: Array, color: str, *, above: bool) -> None:
 
 def _data(found: Contexts) -> pd.DataFrame:
     """One row a run: task and posture at the shared goal."""
-    return pd.concat(list(_parts(found)), ignore_index=True)
-
-
-def _parts(found: Contexts) -> Iterator[pd.DataFrame]:
+    parts = []
     for task, runs in zip(found.tasks, found.postures, strict=True):
         joints = dict(zip(task.robot.joint_names, runs.T, strict=True))
         named = {"task": task.name, "method": found.method, "goal": found.goal}
-        yield pd.DataFrame({**named, "hand": found.hand, **joints})
+        parts.append(pd.DataFrame({**named, "hand": found.hand, **joints}))
+    return pd.concat(parts, ignore_index=True)

@@ -48,7 +48,7 @@ def profiles(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     """
     scores = normalised_scores(study)
     tasks = list(scores.task.unique())
-    known = study.results.tasks
+    known = study.tasks
     learners = {name: most_exploring(known[name]) for name in tasks}
     joined = scores[scores.method == scores.task.map(learners)].assign(method=LEARNER)
     scores = pd.concat([joined, scores], ignore_index=True)

@@ -19,6 +19,7 @@ from coartic.analysis.methods import CONDITIONS, short_name
 from coartic.analysis.published import TRIALS, Summary
 from coartic.analysis.statistics.equivalence import MARGIN, Equivalence
 from coartic.analysis.study import Study
+from coartic.analysis.words import marked
 
 _MARKS = {
     "equivalent": (style.BLUE, "o", style.BLUE),
@@ -54,7 +55,7 @@ def published(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     data = pd.DataFrame(rows)
     figure = Figure(figsize=(style.ONE, 0.85 + 0.185 * len(data)), layout="constrained")
     axes = figure.subplots()
-    _draw(axes, data, {name: name + " †" * bool(own.reconstructed) for name, own in found.items()})
+    _draw(axes, data, {name: marked(name, own) for name, own in found.items()})
     shown = {name: found[name] for name in data.task.unique()}
     words = "; ".join(
         f"{row['task']}, {short_name(row['method'])} {row['hands']}".strip()

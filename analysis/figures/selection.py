@@ -13,6 +13,8 @@ from coartic.text import did_you_mean
 HEADLINES = tuple(name for name, row in METHODS.items() if row.headline)
 """Methods that stand for their families where none are named, in the order of figures."""
 
+NO_CONTEXTS = "no method has solved runs on two tasks that share their first goals"
+
 
 def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) -> list[str]:
     """Labels of ``methods``, or of the default ones, that have a solved run on one of the tasks.

@@ -37,7 +37,7 @@ def signature_matrix(study: Study, *, methods: Sequence[str] | None = None) -> l
     The value of a cell is the mean over the places (goals, coordinates) of the signature.
     Raises CoarticError where no method has a signature on any of the tasks.
     """
-    plots, ids = [], slugs(study.results.tasks)
+    plots, ids = [], slugs(study.tasks)
     found, frame = study.tasks, study.signatures
     if methods is not None:
         chosen(study, list(found), methods)

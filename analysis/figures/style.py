@@ -24,6 +24,7 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 from coartic import Task
 from coartic.analysis.methods import METHODS, Color, Dash
 from coartic.analysis.statistics import estimates
+from coartic.analysis.words import RECONSTRUCTED, marked
 
 amount = EngFormatter(sep="")
 """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
@@ -105,14 +106,12 @@ def heading(task: Task) -> str:
     """A task's name above a panel, with a dagger where it is reconstructed."""
     # Variants of a task share its title, but not its name.
     name = task.label if task.label.lower().replace(" ", "-") == task.name else task.name
-    return f"{name} †" if task.reconstructed else name
+    return marked(name, task)
 
 
 def dagger(tasks: Iterable[Task]) -> str:
     """What the dagger means, for a caption; empty where no task is reconstructed."""
-    if not any(task.reconstructed for task in tasks):
-        return ""
-    return " † Reconstructed: what the paper does not print of this task was inferred."
+    return f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
 
 
 _WIDEST: ContextVar[float] = ContextVar("widest", default=TWO)

@@ -87,11 +87,11 @@ def _rounded(match: re.Match[str]) -> str:
     # A letter of a word that is drawn as paths.
     tag = re.sub(r' transform="translate\((\S+) 0\)"', r' x="\1"', tag)
     places = r'( (?:x|y|transform)=")([^"]*)'
-    return re.sub(places, lambda m: m[1] + _DIGITS.sub(_hundredths, m[2]), tag)
 
+    def short(number: re.Match[str]) -> str:
+        return _decimal(round(float(number[0]) * _FINE))
 
-def _hundredths(match: re.Match[str]) -> str:
-    return _decimal(round(float(match[0]) * _FINE))
+    return re.sub(places, lambda m: m[1] + _DIGITS.sub(short, m[2]), tag)
 
 
 def _marks_alone(text: str) -> str:

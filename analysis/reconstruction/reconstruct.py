@@ -15,8 +15,9 @@ from coartic.analysis.reconstruction.constraints import Tried
 from coartic.analysis.reconstruction.layout import layouts
 from coartic.analysis.reconstruction.scoring import Figure
 from coartic.analysis.reconstruction.search import Search
-from coartic.analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
+from coartic.analysis.reconstruction.targets import constraints_of
 from coartic.analysis.reconstruction.waves import (
+    DECIMALS,
     ENSEMBLE,
     LAST,
     PLAN,
@@ -31,8 +32,6 @@ from coartic.readings import load_readings, task_under
 from coartic.robot import Array
 from coartic.text import did_you_mean
 
-DECIMALS = 3
-"""Of coordinates."""
 _MOST_NEAR = 20_000  # points of the grid, drawn at random, that are moved into the region
 _MOST_STEPS = 4_000  # random steps from what was found
 _STEP = 0.15  # their SD, length unit
@@ -105,8 +104,6 @@ def reconstruct(
     beside it; the first of them stands unless another one is nearer beyond chance. The result
     depends on the arguments and on nothing else.
     """
-    name = search.task.name
-    tests, conditions = tests_of(name), conditions_of(name)
     layout = search.layout
     known = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
     compete = layout.points(known)
@@ -121,9 +118,8 @@ def reconstruct(
     def score(places: Array) -> list[Scored]:
         fresh = {goals.tobytes(): goals for goals in places if goals.tobytes() not in scores}
         found = scored(
-            search, fresh.values(), tests, conditions=conditions, wave=ENSEMBLE,
-            runs=effort.runs, trials=effort.trials,
-        )  # fmt: skip
+            search, fresh.values(), wave=ENSEMBLE, runs=effort.runs, trials=effort.trials
+        )
         scores.update(zip(fresh, found, strict=True))
         return [scores[goals.tobytes()] for goals in places]
 
@@ -131,14 +127,11 @@ def reconstruct(
     results = score(layout.places(begin))
     report(described(results, effort.runs))
     nearest = best_of_waves(
-        search, begin, results, tests, conditions=conditions, plan=effort.plan,
-        report=report, trials=effort.trials,
-    )[:1]  # fmt: skip
+        search, begin, results, plan=effort.plan, trials=effort.trials, report=report
+    )[:1]
     if len(compete) and not (nearest == compete[:1]).all():
-        found, standing = scored(
-            search, layout.places(np.concatenate([nearest, compete[:1]])), tests,
-            conditions=conditions, wave=LAST, runs=effort.last, trials=effort.trials,
-        )  # fmt: skip
+        both = layout.places(np.concatenate([nearest, compete[:1]]))
+        found, standing = scored(search, both, wave=LAST, runs=effort.last, trials=effort.trials)
         better = clearly_nearer(found, standing)
         report(
             f"the nearest {found.distance:.2f}, the one that stands {standing.distance:.2f}, "

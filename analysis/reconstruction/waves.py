@@ -20,19 +20,21 @@ from coartic import CONDITIONS
 from coartic.analysis.reconstruction.scoring import (
     Compared,
     Learned,
-    Test,
     compared,
     distance,
     distance_error,
     learned,
 )
 from coartic.analysis.reconstruction.search import Search
+from coartic.analysis.reconstruction.targets import conditions_of, tests_of
 from coartic.readings import condition_under
 from coartic.robot import Array
 
 _SEEDS = 1_000_000  # of a wave begin at a multiple of this
 ENSEMBLE, LAST = 0, 99
 """Waves that score the members of the ensemble, and the nearest point beside one that stands."""
+DECIMALS = 3
+"""Of coordinates."""
 CLEARLY = 2.0
 """Standard errors by which another point has to be nearer."""
 
@@ -77,9 +79,7 @@ class Scored:
 def scored(
     search: Search,
     goals: Iterable[Array],
-    tests: Sequence[Test],
     *,
-    conditions: Sequence[str],
     wave: int,
     runs: int,
     trials: int = 10_000,
@@ -87,12 +87,13 @@ def scored(
 ) -> list[Scored]:
     """Learning runs at sets of goals (G, 2), with the seeds of a wave; in their order.
 
-    Runs ``before``, by the bytes of the goals, count with them.
+    Under the conditions of which something is printed, beside what is. Runs ``before``, by the
+    bytes of the goals, count with them.
     """
     seeds = range(_SEEDS * wave, _SEEDS * wave + runs)
-    explored = {
-        name: replace(CONDITIONS[name], **condition_under(search.readings)) for name in conditions
-    }
+    name, fields = search.task.name, condition_under(search.readings)
+    explored = {own: replace(CONDITIONS[own], **fields) for own in conditions_of(name)}
+    tests = tests_of(name)
 
     def score(places: Array) -> Scored:
         task = search.task_with(places)
@@ -112,36 +113,26 @@ def best_of_waves(
     search: Search,
     points: Array,
     results: Sequence[Scored],
-    tests: Sequence[Test],
     *,
-    conditions: Sequence[str],
     plan: Sequence[Wave] = PLAN,
     trials: int = 10_000,
-    decimals: int = 3,
     report: Callable[[str], None] = lambda text: None,
 ) -> Array:
     """Points by their distance to what is printed, the nearest first; those of the last wave.
 
-    ``points`` (N, P) are admissible and scored before; coordinates are rounded to ``decimals``.
+    ``points`` (N, P) are admissible and scored before; coordinates are rounded to
+    :data:`DECIMALS`.
     """
     known = {result.goals.tobytes(): result for result in results}
     for number, wave in enumerate(plan, ENSEMBLE + 1):
         points = points[_by_distance(results)[: wave.points]]
         if wave.around:
             rng = np.random.default_rng([number, wave.around])
-            found = np.round(search.spread(points, wave.around, rng, wave.step), decimals)
+            found = np.round(search.spread(points, wave.around, rng, wave.step), DECIMALS)
             found = search.admitted(found[search.layout.allowed(found)], "around the best")
             points = np.unique(np.concatenate([points, found]), axis=0)
-        results = scored(
-            search,
-            search.layout.places(points),
-            tests,
-            conditions=conditions,
-            wave=number,
-            runs=wave.runs,
-            trials=trials,
-            before=known,
-        )
+        goals = search.layout.places(points)
+        results = scored(search, goals, wave=number, runs=wave.runs, trials=trials, before=known)
         known |= {result.goals.tobytes(): result for result in results}
         report(f"wave {number}: {described(results, wave.runs)}")
     return points[_by_distance(results)]

@@ -26,7 +26,7 @@ from coartic.analysis.report.text import tone_of
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study
-from coartic.analysis.words import stated, typographic
+from coartic.analysis.words import marked, stated, typographic
 from coartic.method import Information
 
 _SAID: dict[str, dict[str, str]] = stated(__file__)
@@ -223,33 +223,23 @@ def _counted(found: Counter[Any], verdict: str) -> str:
 
 def strips(study: Study) -> list[Block]:
     """Verdicts as strips of colours and words, then what is not reproduced, by name."""
-    cells = tuple(
-        Verdict(
-            f"{_unbroken(study.tasks[row.cell.task].label)} "
-            + row.cell.label.removeprefix(LEARNER)
-            + " †" * bool(study.tasks[row.cell.task].reconstructed),
-            row.verdict or "not printed",
-            tone_of(row.verdict or ""),
-            "#published-and-ours",
-        )
-        for row in paper_rows(study)
-    )
+    cells = []
+    for row in paper_rows(study):
+        task, verdict = study.tasks[row.cell.task], row.verdict or "not printed"
+        name = marked(f"{_unbroken(task.label)} {row.cell.label.removeprefix(LEARNER)}", task)
+        cells.append(Verdict(name, verdict, tone_of(verdict), "#published-and-ours"))
     judged = [entry for entry in study.judged if entry.claim.place]
     decided = sorted(judged, key=lambda entry: _ORDER.index(entry.verdict))
-    squares = tuple(
-        Verdict(
-            entry.claim.statement + " †" * entry.claim.fitted,
-            entry.verdict,
-            tone_of(entry.verdict),
-            f"#claim-{entry.claim.id}",
-        )
-        for entry in decided
-    )
+    squares = []
+    for entry in decided:
+        name = entry.claim.statement + " †" * entry.claim.fitted
+        link = f"#claim-{entry.claim.id}"
+        squares.append(Verdict(name, entry.verdict, tone_of(entry.verdict), link))
     found: list[Block] = []
     if any(cell.tone != "plain" for cell in cells):
-        found.append(Strip("strip-cells", "Learned rewards", cells))
+        found.append(Strip("strip-cells", "Learned rewards", tuple(cells)))
     if squares and any(square.tone in ("good", "bad") for square in squares):
-        found.append(Strip("strip-claims", "Claims", squares, counted=True))
+        found.append(Strip("strip-claims", "Claims", tuple(squares), counted=True))
     if found:
         refuted = tuple(_refuted(judged, study))
         if refuted:

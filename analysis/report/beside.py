@@ -15,26 +15,21 @@ from coartic.analysis.study import Study
 def beside(document: Document, first: Study, second: Study, found: VersionComparison) -> Document:
     """The report of the first folder, which begins with both beside each other."""
     cards = tuple(_card(side, study) for side, study in zip("ab", (first, second), strict=True))
-    differing = tuple(
-        replace(section, id=f"beside-{section.id}", blocks=tuple(map(_folded, section.blocks)))
-        for section in versions_document(found).sections
-        if section.id != "outcome"
-    )
+    differing = []
+    for section in versions_document(found).sections:
+        blocks = tuple(
+            replace(block, folded=True) if isinstance(block, DataTable) else block
+            for block in section.blocks
+        )
+        if section.id != "outcome":
+            differing.append(replace(section, id=f"beside-{section.id}", blocks=blocks))
+    outcome = escaped(" ".join(found.summary))
     both = (
         Section("beside", "A and B", (), cards, cards=True),
-        Section(
-            "beside-outcome",
-            "A against B",
-            (),
-            differing,
-            finding=escaped(" ".join(found.summary)),
-        ),
+        Section("beside-outcome", "A against B", (), tuple(differing), finding=outcome),
     )
-    return replace(
-        document,
-        title=f"{document.title}, A, beside B",
-        sections=(*both, *document.sections),
-    )
+    title = f"{document.title}, A, beside B"
+    return replace(document, title=title, sections=(*both, *document.sections))
 
 
 def _card(side: str, study: Study) -> Section:
@@ -54,7 +49,3 @@ def _card(side: str, study: Study) -> Section:
         f"coartic {environment.coartic}, {environment.date[:10]}."
     )
     return Section(f"beside-{side}", title, tuple(blocks), finding=finding)
-
-
-def _folded(block: Block) -> Block:
-    return replace(block, folded=True) if isinstance(block, DataTable) else block

@@ -343,7 +343,7 @@ def _about(
     ]
     if _many(study):
         items.append(
-            f"With more than {MOST_TASKS} tasks (here {len(study.results.tasks)}) the report has "
+            f"With more than {MOST_TASKS} tasks (here {len(study.tasks)}) the report has "
             "no tables of pairs, targets, areas, Pareto sets and further signatures by task, and "
             "no figures of signatures; `coartic analyse` writes all of them as CSV."
         )
@@ -351,7 +351,7 @@ def _about(
 
 
 def _many(study: Study) -> bool:
-    return len(study.results.tasks) > MOST_TASKS
+    return len(study.tasks) > MOST_TASKS
 
 
 def _section(
@@ -363,11 +363,11 @@ def _section(
     below: Iterable[Section] = (),
 ) -> Section:
     """What was found, one figure, then folded: further figures, tables and what is below."""
-    first, more = figures[:1], tuple(figures[1:])
-    titles = "; ".join(figure.title for figure in more if isinstance(figure, FigureBlock))
-    below = [Section(f"{name}-figures", f"More figures: {titles}", more, folded=True), *below]
-    blocks = (*first, *_tables(*tables))
-    return Section(name, title, blocks, tuple(below[not more :]), finding=finding)
+    blocks, more = (*figures[:1], *_tables(*tables)), tuple(figures[1:])
+    if more:
+        titles = "; ".join(figure.title for figure in more if isinstance(figure, FigureBlock))
+        below = [Section(f"{name}-figures", f"More figures: {titles}", more, folded=True), *below]
+    return Section(name, title, blocks, tuple(below), finding=finding)
 
 
 def _tables(*found: DataTable | None) -> list[Block]:

@@ -71,7 +71,10 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
             **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
             **{"told": row.told, "family": row.family, "runs": row.runs},
             **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
-            **{"interval": _interval(row.low, row.high), "learner": learner(str(row.method))},
+            "interval": "none: run once"
+            if math.isnan(row.low)
+            else f"{row.low:.2f} to {row.high:.2f}",
+            "learner": learner(str(row.method)),
         }
         for row in rows
     ]
@@ -294,7 +297,3 @@ def _told(study: Study) -> dict[str, str]:
 def _number(value: float) -> float | None:
     """With four figures, which is more than are seen."""
     return None if math.isnan(value) else float(f"{value:.4g}")
-
-
-def _interval(low: float, high: float) -> str:
-    return "none: run once" if math.isnan(low) else f"{low:.2f} to {high:.2f}"

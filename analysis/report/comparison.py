@@ -13,7 +13,6 @@ from coartic.analysis.report.tables.common import table_ids
 from coartic.analysis.report.tables.methods import methods_table, reading_of_methods
 from coartic.analysis.report.tables.paper import beside_paper
 from coartic.analysis.study import Study
-from coartic.tables import Plan
 from coartic.text import counted
 
 
@@ -58,18 +57,15 @@ def _made(study: Study) -> str:
     """Of which suite, by which code, where and when."""
     manifest = study.results.manifest
     specification, environment = manifest.specification, manifest.environment
+    readings = " and ".join(specification.readings)
     made = (
         f", {counted(specification.runs, 'run')} of {specification.trials} trials, "
-        f"seed {specification.seed}{_read(specification)}; {version_text(environment)}, "
+        f"seed {specification.seed}{readings and f', read with {readings}'}; "
+        f"{version_text(environment)}, "
         f"model code {environment.model_code}; Python {environment.python}, "
         f"{environment.platform}; {environment.date}."
     )
     return f"Suite {code(specification.suite)}{escaped(made)}"
-
-
-def _read(plan: Plan) -> str:
-    """How the paper is read, where not by default."""
-    return f", read with {' and '.join(plan.readings)}" if plan.readings else ""
 
 
 def _noted(tables: Iterable[DataTable | None], said: set[str]) -> tuple[Block, ...]:

@@ -64,7 +64,7 @@ def _reconstructed(study: Study) -> Iterator[str]:
     alone = one_by_one(study)
     if len(alone) < len(study.tasks):
         yield _said("drawn", count=len(study.tasks) - len(alone))
-    for name, task in study.results.tasks.items():
+    for name, task in study.tasks.items():
         if name not in alone:
             continue
         entries = task.provenance.items()
@@ -82,7 +82,7 @@ def _reconstructed(study: Study) -> Iterator[str]:
 
 
 def _failures(study: Study) -> Iterator[str]:
-    runs = study.results.runs
+    runs = study.runs
     failed = runs[runs.status != "ok"]
     if not len(failed):
         yield _said("no_failures", runs=counted(len(runs), "run"))
@@ -113,7 +113,7 @@ def _failures(study: Study) -> Iterator[str]:
 
 
 def _versions(study: Study) -> Iterator[str]:
-    runs = study.results.runs
+    runs = study.runs
     known = runs.commit.dropna().astype(str)
     ids = known.str.removesuffix("+").str[:12]
     commits, changed = sorted(set(ids)), sorted(set(ids[known.str.endswith("+")]))
@@ -168,7 +168,7 @@ def _detectable(study: Study, key: CellKey) -> Iterator[str]:
 
 
 def _optima(study: Study) -> Iterator[str]:
-    without = [task for task in study.results.tasks if (task, "free") not in study.optima]
+    without = [task for task in study.tasks if (task, "free") not in study.optima]
     if without:
         yield _said("no_optimum", tasks=escaped(", ".join(without)))
     alone = one_by_one(study)
@@ -181,7 +181,7 @@ def _optima(study: Study) -> Iterator[str]:
         bounded = sum(best.bound is not None for best in others)
         drawn = len(study.tasks) - len(alone)
         yield _said("unproven_instances", count=len(others), drawn=drawn, bounded=bounded)
-    for task, arm in itertools.product(study.results.tasks, ARMS):
+    for task, arm in itertools.product(study.tasks, ARMS):
         best = study.optima.get((task, arm)) if task in alone else None
         if best is not None and not best.proven:
             bound = "" if best.bound is None else f"; none above {best.bound} is proven"
@@ -190,7 +190,7 @@ def _optima(study: Study) -> Iterator[str]:
 
 
 def _timing_and_model(study: Study) -> Iterator[str]:
-    runs, environment = study.results.runs, study.results.manifest.environment
+    runs, environment = study.runs, study.results.manifest.environment
     cold = ~runs.warm.astype("boolean")  # unknown where it went with the process
     yield _said(
         "times",
@@ -201,7 +201,7 @@ def _timing_and_model(study: Study) -> Iterator[str]:
     )
     yield _said("model")
     yield _said("one_posture")
-    if any(len(task.hands) > 1 for task in study.results.tasks.values()):
+    if any(len(task.hands) > 1 for task in study.tasks.values()):
         yield _said("arms")
 
 

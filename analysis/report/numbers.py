@@ -124,7 +124,7 @@ def words(name: str) -> str:
 def macro_names(study: Study) -> Names:
     """Names of tasks and labels, ``...Alt`` where an earlier one has the same letters."""
     return Names(
-        _distinct(study.results.tasks), _distinct(dict.fromkeys(label for _, label in study.cells))
+        _distinct(study.tasks), _distinct(dict.fromkeys(label for _, label in study.cells))
     )
 
 

@@ -43,7 +43,7 @@ def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
     """
     chosen = list(study.trajectories if cells is None else cells)
     tasks = [
-        _task(study.results.tasks[name], study, [cell for cell in chosen if cell[0] == name])
+        _task(study.tasks[name], study, [cell for cell in chosen if cell[0] == name])
         for name in dict.fromkeys(name for name, _ in chosen)
     ]
     shown = [task for task in tasks if task["movements"]]

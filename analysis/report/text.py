@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from coartic.analysis.methods import short_name
 from coartic.analysis.report.document import Column, DataTable, Estimate, Row, Strip, Tone, Value
 from coartic.analysis.words import NO_SPREAD, NONE, true_minus, typographic
 
@@ -81,6 +82,11 @@ class Part:
         if not numbers:
             return NONE
         return f"[{', '.join(numbers)}]" if self.kind == "interval" else numbers[0]
+
+    def named(self, value: Value) -> str:
+        """The same, methods by their short names."""
+        text = self.text(value)
+        return short_name(text) if self.column.name in METHOD_COLUMNS and text != NONE else text
 
 
 def by_column(table: DataTable) -> list[list[Part]]:

@@ -17,7 +17,8 @@ import numpy as np
 
 from coartic import Task
 from coartic.analysis.results.optima import KEPT
-from coartic.analysis.signatures.permutation import RESAMPLES, divisions, p_values
+from coartic.analysis.signatures.permutation import divisions, p_values
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
 from coartic.analysis.statistics.spread import mean
 from coartic.robot import Array
 
@@ -131,7 +132,7 @@ def lead_time(
     second: Array,
     rng: np.random.Generator,
     *,
-    alpha: float = 0.05,
+    alpha: float = LEVEL,
     resamples: int = 999,
 ) -> int | None:
     """How long before a hit two contexts become distinguishable, and stay so, in ticks.

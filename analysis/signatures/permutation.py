@@ -8,9 +8,8 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.analysis.statistics.estimates import RESAMPLES
 from coartic.robot import Array
-
-RESAMPLES = 9999
 
 
 def divisions(

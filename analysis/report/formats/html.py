@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from markupsafe import Markup, escape
 
 from coartic.analysis.markup import inline
-from coartic.analysis.methods import LEARNER, short_name
+from coartic.analysis.methods import LEARNER
 from coartic.analysis.report.document import (
     CellKey,
     DataTable,
@@ -25,7 +25,7 @@ from coartic.analysis.report.document import (
     Row,
 )
 from coartic.analysis.report.formats.templates import on_one_line, template
-from coartic.analysis.report.text import METHOD_COLUMNS, Part, by_column, tallied, tone_of
+from coartic.analysis.report.text import Part, by_column, tallied, tone_of
 from coartic.analysis.words import NONE, true_minus
 from coartic.text import one_line
 
@@ -170,16 +170,9 @@ def cell_view(row: Row, own: list[Part]) -> CellView:
     if column.name == "verdict":
         kind = f"{kind} {tone_of(str(value or ''))}".strip()
     cells = row.cells_by_column.get(column.name, ())
-    text = shown["value"]
-    name = short_name(text) if column.name in METHOD_COLUMNS and text != NONE else text
-    return CellView(
-        breakable(name),
-        text if name != text else "",
-        small.get("sd"),
-        small.get("interval", ""),
-        kind,
-        cells,
-    )
+    text, name = shown["value"], own[0].named(value)
+    title, interval = text if name != text else "", small.get("interval", "")
+    return CellView(breakable(name), title, small.get("sd"), interval, kind, cells)
 
 
 def breakable(text: str) -> str:

@@ -14,11 +14,10 @@ import textwrap
 from collections.abc import Sequence
 
 from coartic.analysis.markup import inline
-from coartic.analysis.methods import short_name
 from coartic.analysis.report.document import DataTable, Document, Value
 from coartic.analysis.report.formats.templates import LATEX, template
 from coartic.analysis.report.tables.main import MAIN
-from coartic.analysis.report.text import METHOD_COLUMNS, Part, parts
+from coartic.analysis.report.text import Part, parts
 from coartic.analysis.words import NO_SPREAD, NONE, stated
 from coartic.text import one_line
 
@@ -129,7 +128,7 @@ def is_long(table: DataTable) -> bool:
     used = sum(_longest(part, table) + 2 for part in shown if part not in broken)
     each = max((_LINE - used) / max(len(broken), 1), _WORD)
     lines = sum(
-        max((-(-len(_words(part, row.values[part.index])) // each) for part in broken), default=1)
+        max((-(-len(part.named(row.values[part.index])) // each) for part in broken), default=1)
         for row in table.rows
     )
     notes = sum(len(note) / _LINE for note in table.notes)
@@ -145,7 +144,7 @@ def _broken(shown: Sequence[Part], table: DataTable) -> list[Part]:
 
 
 def _longest(part: Part, table: DataTable) -> int:
-    return max((len(_words(part, row.values[part.index])) for row in table.rows), default=0)
+    return max((len(part.named(row.values[part.index])) for row in table.rows), default=0)
 
 
 def _head(part: Part, table: DataTable) -> str:
@@ -157,12 +156,6 @@ def _head(part: Part, table: DataTable) -> str:
     place = "l" if part.column.kind == "text" else "r" if part.kind == "interval" else "c"
     stacked = r" \\ ".join(map(latex_text, lines))
     return f"{{\\shortstack[{place}]{{{stacked}}}}}"
-
-
-def _words(part: Part, value: Value) -> str:
-    """A value as it is printed, before LaTeX."""
-    text = part.text(value)
-    return short_name(text) if part.column.name in METHOD_COLUMNS and text != NONE else text
 
 
 def latex_text(text: str) -> str:
@@ -210,7 +203,7 @@ def _kind(part: Part, table: DataTable) -> str:
 
 def _cell(part: Part, value: Value) -> str:
     if part.column.kind == "text":
-        return latex_text(_words(part, value))
+        return latex_text(part.named(value))
     numbers = part.numbers(value)
     if not numbers:
         return f"{{{latex_text(NONE)}}}"

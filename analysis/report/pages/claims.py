@@ -103,7 +103,9 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
             f"With so many instances it is supported with a chance of {POWER:.0%} if the true "
             f"effect is {entry.visible:.2g} {claim.unit} in each family."
         )
-    items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(_basis(entry))}.{see}")
+    runs = [f"{len(entry.run_ids)} runs"] if entry.run_ids else []
+    basis = ", ".join([*runs, *entry.sources]) or "nothing in this folder"
+    items.append(f"Place: {escaped(f'{where}{quote}')}. Rests on: {escaped(basis)}.{see}")
     if claim.reconstructions:
         items.append(
             f"With other admissible goals it is supported in {claim.reconstructions}: what was "
@@ -121,11 +123,6 @@ def claim_section(entry: Judged, figures: Mapping[str, str] | None = None) -> Se
 
 def _place(claim: Claim) -> str:
     return ", ".join(filter(None, (claim.place, claim.figure)))
-
-
-def _basis(entry: Judged) -> str:
-    runs = [f"{len(entry.run_ids)} runs"] if entry.run_ids else []
-    return ", ".join([*runs, *entry.sources]) or "nothing in this folder"
 
 
 def _p(value: float) -> str:

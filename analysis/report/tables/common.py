@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from coartic.analysis import words
 from coartic.analysis.published import Summary
 from coartic.analysis.report.document import Estimate
 from coartic.analysis.report.tables.layout import finite
 from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study
-from coartic.analysis.words import slugs
 
 
 def table_ids(study: Study) -> dict[str, str]:
     """Names of tasks as tables' ids have them."""
-    return slugs(study.results.tasks)
+    return words.slugs(study.tasks)
 
 
 def mean_of(rewards: Any) -> Estimate | None:
@@ -46,4 +46,4 @@ def counts(hands: pd.Series) -> str | None:
 
 def marked(study: Study, task: str) -> str:
     """A task's name, with † where it is reconstructed."""
-    return f"{task} †" if study.results.tasks[task].reconstructed else task
+    return words.marked(task, study.tasks[task])

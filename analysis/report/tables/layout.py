@@ -12,11 +12,11 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 from coartic.analysis.comparisons.methods import TOLD
 from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
 from coartic.analysis.statistics.estimates import Inference
-from coartic.analysis.words import stated
+from coartic.analysis.words import RECONSTRUCTED, stated
 
 _LETTERS = {"told", "told_more", "told_less"}  # columns with letters of information
 _MARKS = {
-    "†": "† Reconstructed: what the paper does not print of this task was inferred.",
+    "†": RECONSTRUCTED,
     "δ": "Cliff's δ: how often a run of the first is higher than one of the second, less how "
     "often it is lower; −1 to 1.",
 }

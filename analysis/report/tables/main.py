@@ -16,7 +16,7 @@ from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report.document import Column, DataTable, Row, Value
 from coartic.analysis.report.tables.layout import LAYOUTS, Layout, finite, with_interval
 from coartic.analysis.study import Study
-from coartic.analysis.words import slugs
+from coartic.analysis.words import marked, slugs
 
 MAIN = ("main-methods", "published-and-ours", "main-verdicts")
 """Ids of the tables for a paper, in their order; all others are its supplement."""
@@ -51,9 +51,9 @@ def _order(item: tuple[object, pd.DataFrame]) -> tuple[int, float]:
 
 def _columns(study: Study, tasks: list[str], names: dict[str, str]) -> Iterator[Column]:
     for task in tasks:
-        dagger = " †" * bool(study.tasks[task].reconstructed)
+        header = marked(study.tasks[task].label, study.tasks[task])
         yield Column(
-            *(f"on_{names[task]}", f"{study.tasks[task].label}{dagger}", "number", "%", 1),
+            *(f"on_{names[task]}", header, "number", "%", 1),
             rests_on=("runs", "optimum"),
         )
     yield Column("trials", "trials", "number", digits=0, rests_on=("runs",))
