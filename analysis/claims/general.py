@@ -17,6 +17,7 @@ from scipy import optimize, stats
 from coartic import Hand, Task
 from coartic.analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
 from coartic.analysis.claims.evidence import all_hold, exceeds, shown
+from coartic.analysis.claims.power import welch_p
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.claims.statements import MARGINS, decides, decides_apart
 from coartic.analysis.methods import LEARNER
@@ -231,14 +232,9 @@ def _printed(task: str | None, of: Solved) -> Summary | None:
 def _welch(first: Summary, second: Summary, off: float) -> float:
     """One-tailed p that the first mean is higher; ``off`` half units of their last decimals."""
     apart = sum(0.5 * 10.0 ** -(s.digits[0] if s.digits else 0) for s in (first, second))
-    return float(
-        stats.ttest_ind_from_stats(
-            *(first.mean + off * apart, first.sd, first.runs),
-            *(second.mean, second.sd, second.runs),
-            equal_var=False,
-            alternative="greater",
-        ).pvalue
-    )
+    both = ((s.runs, s.mean, (s.sd or 0.0) ** 2) for s in (first, second))
+    (n, mean, variance), other = both
+    return float(welch_p(n, mean + off * apart, variance, *other))
 
 
 @decides_apart("not-normal", CELLS)

@@ -17,7 +17,7 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -240,9 +240,7 @@ def _least_p(bound: float, rng: np.random.Generator, runs: int) -> Array:
     return np.asarray(special.stdtr(freedom, -rng.normal(shift, 1, SIMULATIONS) / scale))
 
 
-def welch_p(
-    n: Array, mean: Array, variance: Array, m: Array, other: Array, spread: Array
-) -> Array:
+def welch_p(n: Any, mean: Any, variance: Any, m: Any, other: Any, spread: Any) -> Array:
     """One-tailed p of Welch's t-test that ``mean`` of n values is above ``other`` of m."""
     one, two = variance / n, spread / m
     freedom = (one + two) ** 2 / (one**2 / (n - 1) + two**2 / (m - 1))

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from scipy import stats
 
 from coartic.analysis.comparisons.paper import published_of
 from coartic.analysis.figures import style
@@ -18,8 +17,9 @@ from coartic.analysis.figures.plot import Plot, spoken, worded
 from coartic.analysis.figures.selection import has, missing, solved
 from coartic.analysis.methods import CONDITIONS, LEARNER, short_name
 from coartic.analysis.published import Summary, published_cell, published_initial
-from coartic.analysis.statistics.estimates import CONFIDENCE, RESAMPLES, mean
+from coartic.analysis.statistics.estimates import RESAMPLES, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.intervals import Interval, student
 from coartic.analysis.study import Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
@@ -86,8 +86,7 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
         cell = solved(study, task, label)
         rewards, paper = cell.rewards, published_of(cell)
         found = mean(rewards)
-        summary = paper.summary if paper else None
-        centre, half = summary.mean if summary else math.nan, _half(summary)
+        printed_mean = _printed(paper.summary if paper else None)
         rows.append(
             {
                 "task": task,
@@ -96,9 +95,9 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
                 "reward": found.estimate,
                 "low": found.low,
                 "high": found.high,
-                "published": centre,
-                "published_low": centre - half,
-                "published_high": centre + half,
+                "published": printed_mean.value,
+                "published_low": printed_mean.low,
+                "published_high": printed_mean.high,
                 "p": bootstrap_test(rewards, before).p,
             }
         )
@@ -107,12 +106,11 @@ def _rows(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns.split())
 
 
-def _half(summary: Summary | None) -> float:
-    """Half of Student's interval of a printed mean; NaN where no SD is printed."""
+def _printed(summary: Summary | None) -> Interval:
+    """A printed mean with Student's interval, where an SD is printed."""
     if summary is None or summary.sd is None or summary.runs < 2:
-        return math.nan
-    quantile = float(stats.t.ppf(0.5 + CONFIDENCE / 2, summary.runs - 1))
-    return quantile * summary.sd / math.sqrt(summary.runs)
+        return Interval(math.nan if summary is None else summary.mean)
+    return student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
 
 
 def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:

@@ -86,7 +86,7 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
         for task, told, family in dict.fromkeys((row.task, row.told, row.family) for row in rows)
     ]
     chosen = _choices(tasks, data.told, data.family)
-    every = _filtered(_chart(values), chosen)
+    every = _chosen(values, chosen)
     base = every.transform_filter("!datum.heading")
     order = alt.EncodingSortField("place", op="min", order="ascending")
     bold: Any = {
@@ -162,7 +162,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     near = alt.selection_point(
         name="near", fields=["name"], on="pointerover", clear="pointerout", empty=False
     )
-    base = _filtered(_chart(values), chosen[:3])
+    base = _chosen(values, chosen[:3])
     base = base.transform_filter("datum.spend === spend")
     base = base.transform_filter("every || datum.main || family !== 'all'")
     ends = base
@@ -259,13 +259,11 @@ def _choices(tasks: list[str], told: Iterable[str], families: Iterable[str]) -> 
     )
 
 
-def _filtered(chart: Any, chosen: Iterable[Any]) -> Any:
-    for param in chosen:
-        name = param.param.name
-        if name == "task":
-            chart = chart.transform_filter("datum.task === task")
-        else:
-            chart = chart.transform_filter(f"{name} === 'all' || datum.{name} === {name}")
+def _chosen(values: list[dict[str, Any]], chosen: Iterable[Any]) -> Any:
+    chart = _chart(values)
+    for name in (param.param.name for param in chosen):
+        any_of_them = "" if name == "task" else f"{name} === 'all' || "
+        chart = chart.transform_filter(f"{any_of_them}datum.{name} === {name}")
     return chart
 
 
