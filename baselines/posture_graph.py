@@ -71,8 +71,8 @@ def sample_postures(
     q[:, :BASE_DOF] += far[:, None] * miss * moving[:BASE_DOF]
     spent.forward_kinematics += count
     for _ in range(_PROJECTIONS):
-        miss = aim - robot.forward_kinematics(q, hand)
-        jacobian = robot.jacobian(q, hand) * moving
+        position, jacobian = robot.linearised(q, hand)
+        miss, jacobian = aim - position, jacobian * moving
         spent.forward_kinematics += count
         spent.jacobians += count
         square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-6 * np.eye(2)
@@ -192,17 +192,14 @@ class PostureGraph:
                 came = np.empty((len(layer), cost.shape[1]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for j in range(cost.shape[1]):
-                    total = cost[:, j, None] + step
-                    came[:, j] = total.argmin(axis=0)
-                    reached[:, j] = total.min(axis=0)
+                    came[:, j], reached[:, j] = _least(cost[:, j, None] + step)
             else:
                 # (i, j) -> (k, i): the hand comes from its own node j; the least over j.
                 came = np.empty((len(layer), cost.shape[0]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for i in range(cost.shape[0]):
                     total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
-                    came[:, i] = total.argmin(axis=0)
-                    reached[:, i] = total.min(axis=0)
+                    came[:, i], reached[:, i] = _least(total)
             yield _Begun((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
     def _chain(self, whole: _Begun) -> Chain:
@@ -272,3 +269,9 @@ def _squares(before: Array, after: Array, joints: slice) -> Array:
     """Squared distances of every pair, over some joints, shape ``(before, after)``."""
     difference = before[:, None, joints] - after[None, :, joints]
     return np.asarray((difference**2).sum(axis=-1))
+
+
+def _least(costs: Array) -> tuple[NDArray[np.intp], Array]:
+    """The row of the least of every column, and that least."""
+    rows = costs.argmin(axis=0)
+    return rows, costs[rows, np.arange(len(rows))]

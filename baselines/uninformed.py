@@ -8,6 +8,7 @@ goals were hit are known afterwards.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from coartic.learning import TRIALS
 from coartic.method import Information, MethodError, Parameters, Result, Session
 from coartic.robot import HANDS, Array
 from coartic.task import hands_of
-from coartic.trials import Trials, make_trials
+from coartic.trials import make_trials
 
 TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 
@@ -50,6 +51,7 @@ class Practice:
     def __init__(self, session: Session, parameters: UninformedParameters) -> None:
         self._session = session
         self._task = session.hand_over(*TOLD)
+        self._trials = partial(make_trials, self._task, model=session.model)
         self._other_arm = parameters.other_arm
         left = session.trials_left
         self.left = parameters.trials if left is None else min(parameters.trials, left)
@@ -128,12 +130,12 @@ class Practice:
         return Result(log.movements, {"best_trial": self._best_trial, **details})
 
     def _make(self, hands: list[str], targets: Array, than: Array | None = None) -> Attempt:
-        made = self._simulated(hands, targets)
+        made = self._trials(hands, targets)
         rewards = np.where(made.completed, -made.ticks, -math.inf)
         if than is not None and (better := rewards > than).any():
             end = int(better.argmax()) + 1
             if end < len(rewards):  # what the trials up to there alone took
-                made, rewards = self._simulated(hands[:end], targets[:end]), rewards[:end]
+                made, rewards = self._trials(hands[:end], targets[:end]), rewards[:end]
         self._session.spend(
             trials=len(rewards),
             movement_ticks=int(made.ticks.sum()),
@@ -153,24 +155,3 @@ class Practice:
         self.made += len(rewards)
         self.left -= len(rewards)
         return Attempt(rewards, made.reached)
-
-    def _simulated(self, hands: list[str], targets: Array) -> Trials:
-        """Trials with hands of their own, in their order: one call for each hand sequence."""
-        rows = {
-            kind: np.flatnonzero([chosen == kind for chosen in hands])
-            for kind in dict.fromkeys(hands)
-        }
-        parts = [
-            make_trials(self._task, kind, targets[own], model=self._session.model)
-            for kind, own in rows.items()
-        ]
-        order = np.argsort(np.concatenate(list(rows.values())))
-        return Trials(
-            ticks=np.concatenate([part.ticks for part in parts])[order],
-            completed=np.concatenate([part.completed for part in parts])[order],
-            targets=np.concatenate([part.targets for part in parts])[order],
-            reached=np.concatenate([part.reached for part in parts])[order],
-            corrections=sum(part.corrections for part in parts),
-            iterations=sum(part.iterations for part in parts),
-            evaluations=sum(part.evaluations for part in parts),
-        )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ class Lanes(NamedTuple):
     """Lanes and who is in them."""
 
     at: Any
-    """The rows, by name; see :func:`lanes_for`."""
+    """The rows, by name; see :func:`_layout`."""
     corrected: Any
     """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``. Only to be
     copied: some are integers."""
@@ -56,7 +57,15 @@ def ends_of(runs: int) -> Ends:
 
 def lanes_for(robot: Robot) -> Lanes:
     """Lanes for either arm of a robot; the shorter one ends in links of length 0."""
-    links = robot.most_links
+    record, corrected, moved = _layout(robot.most_links)
+    at = np.zeros(1, record)
+    rows = at.view(np.float64).reshape(-1, LANES)
+    return Lanes(at[0], rows[corrected], rows[moved])
+
+
+@cache
+def _layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
+    """The rows of arms of so many links; which of them a correction needs, and a movement."""
     joints = (BASE_DOF + links,)
     corrected = {"q": joints, "pulled": ()}  # base x and y, then the joints of the arm
     shared = {
@@ -78,13 +87,11 @@ def lanes_for(robot: Robot) -> Lanes:
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing
     kinds = dict.fromkeys(("run", "first", "links"), np.int64)
-    at = np.zeros(
-        1,
-        [(name, kinds.get(name, np.float64), (*shape, LANES)) for name, shape in shapes.items()],
+    record = np.dtype(
+        [(name, kinds.get(name, np.float64), (*shape, LANES)) for name, shape in shapes.items()]
     )
-    rows = at.view(np.float64).reshape(-1, LANES)
     first, last = _height(corrected), _height(corrected | shared)
-    return Lanes(at[0], rows[:last], rows[first : last + _height(moved)])
+    return record, slice(last), slice(first, last + _height(moved))
 
 
 def _height(shapes: Mapping[str, tuple[int, ...]]) -> int:

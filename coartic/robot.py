@@ -145,10 +145,7 @@ class Robot:
     def forward_kinematics(self, q: ArrayLike, hand: Hand) -> Array:
         """Hand position F_a(q), shape ``(..., 2)``, for ``q`` of shape ``(..., dof)``."""
         array = self._configuration(q)
-        xs, ys = self._numpy_chain(array, hand)
-        position = np.empty((*array.shape[:-1], 2))
-        position[..., 0], position[..., 1] = xs[-1], ys[-1]
-        return position
+        return self._hand(*self._numpy_chain(array, hand), array)
 
     def joint_positions(self, q: ArrayLike, hand: Hand) -> Array:
         """Positions of shoulder, joints and hand, shape ``(..., n + 1, 2)``."""
@@ -161,6 +158,10 @@ class Robot:
         Columns of the other arm's joints are zero. Units: length unit per length
         unit (base) or per rad (joints).
         """
+        return self.linearised(q, hand)[1]
+
+    def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
+        """:meth:`forward_kinematics` and :meth:`jacobian` of the same ``q``, of one chain."""
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -169,7 +170,7 @@ class Robot:
         result[..., 1, 1] = 1.0
         for k in range(tip):
             result[..., 0, arm.first + k], result[..., 1, arm.first + k] = lever(xs, ys, k, tip)
-        return result
+        return self._hand(xs, ys, array), result
 
     def nullspace_projector(
         self, q: ArrayLike, hand: Hand, free: ArrayLike | None = None
@@ -230,6 +231,13 @@ class Robot:
         by_joint = q if q.ndim == 1 else np.moveaxis(q, -1, 0)
         chain(by_joint, arm, xs, ys, np.cos, np.sin)
         return xs, ys
+
+    @staticmethod
+    def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
+        """The end of a chain, shape ``(..., 2)``."""
+        position = np.empty((*q.shape[:-1], 2))
+        position[..., 0], position[..., 1] = xs[-1], ys[-1]
+        return position
 
     def _symbolic_chain(self, q: Any, hand: Hand) -> tuple[list[Any], list[Any]]:
         import casadi

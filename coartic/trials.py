@@ -8,6 +8,7 @@ for methods that make thousands of trials.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,8 +45,9 @@ class Trials(NamedTuple):
 
 
 class _Made(NamedTuple):
-    """What the kernel fills; see :class:`Trials`."""
+    """What the kernel reads and fills; see :class:`Trials`."""
 
+    hands: Any  # (N, G)
     targets: Any
     reached: Any
     ticks: Any
@@ -75,19 +77,20 @@ def _empty(target: Any) -> bool:
 
 
 @inner
-def _depart(arm: Any, problem: Any, work: Any) -> int:
+def _depart(first: int, number: int, problem: Any, made: Any, work: Any) -> int:
     """Put the acting trials on their way; how many."""
     count = 0
     for trial in range(len(work.q)):
         if work.acting[trial]:
             q, target = work.q[trial], work.target[trial]
+            arm = arm_of(problem, made.hands[first + trial, number])
             depart(work.lanes.at, count, trial, q, target, arm)
             count += 1
     return count
 
 
 @inner
-def _attempt(first: int, number: int, arm: Any, problem: Any, made: Any, work: Any) -> None:
+def _attempt(first: int, number: int, problem: Any, made: Any, work: Any) -> None:
     """Move to the targets; a trial without one moves to where it is."""
     goal = goal_of(problem, number)
     for given in (True, False):
@@ -103,7 +106,7 @@ def _attempt(first: int, number: int, arm: Any, problem: Any, made: Any, work: A
                     work.target[trial, j] = at if math.isnan(target[j]) else target[j]
                 if given:
                     fill_row(target, work.target[trial])
-        count = _depart(arm, problem, work)
+        count = _depart(first, number, problem, made, work)
         move_lanes(work.lanes, count, goal, given, problem.model, work.q, work.target, work.ends)
         for trial in range(len(work.q)):
             if work.acting[trial] and given:
@@ -111,7 +114,7 @@ def _attempt(first: int, number: int, arm: Any, problem: Any, made: Any, work: A
 
 
 @inner
-def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: Any) -> None:
+def _finish(first: int, number: int, problem: Any, made: Any, work: Any) -> None:
     """Have **A** finish what was missed."""
     goal, lanes, ends = goal_of(problem, number), work.lanes, work.ends
     count = 0
@@ -119,6 +122,7 @@ def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: An
         work.acting[trial] = work.going[trial] and not ends.hit[trial]
         if work.acting[trial]:
             fill_row(work.target[trial], work.q[trial])
+            arm = arm_of(problem, made.hands[first + trial, number])
             board(lanes.at, count, trial, work.q[trial], arm)
             count += 1
     correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
@@ -127,7 +131,7 @@ def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: An
             made.iterations[0] += ends.iterations[trial]
             made.corrections[0] += ends.converged[trial]
             work.acting[trial] = ends.converged[trial]
-    count = _depart(arm, problem, work)
+    count = _depart(first, number, problem, made, work)
     stops = problem.model.corrective_arrival
     move_lanes(lanes, count, goal, stops, problem.model, work.q, work.target, ends)
     for trial in range(len(work.q)):
@@ -136,16 +140,15 @@ def _finish(first: int, number: int, arm: Any, problem: Any, made: Any, work: An
 
 
 @inner
-def _make_lot(first: int, hands: Any, problem: Any, made: Any, work: Any) -> None:
+def _make_lot(first: int, problem: Any, made: Any, work: Any) -> None:
     """Make the trials from ``first`` on, as many as there is room for."""
     goals = len(problem.goals)
     for trial in range(len(work.q)):
         fill_row(work.q[trial], problem.start)
         work.going[trial] = first + trial < len(made.targets)
     for number in range(goals):
-        arm = arm_of(problem, hands[number])
-        _attempt(first, number, arm, problem, made, work)
-        _finish(first, number, arm, problem, made, work)
+        _attempt(first, number, problem, made, work)
+        _finish(first, number, problem, made, work)
         for trial in range(len(work.q)):
             work.going[trial] = work.going[trial] and work.ends.hit[trial]
             if work.going[trial]:
@@ -154,14 +157,16 @@ def _make_lot(first: int, hands: Any, problem: Any, made: Any, work: Any) -> Non
 
 
 @entry
-def _make(hands: Any, problem: Any, made: Any, work: Any) -> None:
-    """Make every trial of ``made.targets``, and fill the rest."""
+def _make(problem: Any, made: Any, work: Any) -> None:
+    """Make every trial of ``made.hands`` and ``made.targets``, and fill the rest."""
     for first in range(0, len(made.targets), len(work.q)):
-        _make_lot(first, hands, problem, made, work)
+        _make_lot(first, problem, made, work)
 
 
-def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = PAPER) -> Trials:
-    """Make N trials with the hand sequence ``hands`` (``"RRLR"``), each from the start.
+def make_trials(
+    task: Task, hands: str | Sequence[str], targets: Array, *, model: MotionModel = PAPER
+) -> Trials:
+    """Make N trials, each from the start, with one hand sequence (``"RRLR"``) or each its own.
 
     ``targets`` has shape ``(N, G, dof)``, length unit (base) and rad (joints). A joint
     whose target is NaN keeps its value; for a goal without any target **A** acts alone.
@@ -169,11 +174,9 @@ def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = 
     ``LARGEST``, for ones that move a locked base, and for hands the robot does not have.
     """
     checked_model(model, radius=task.radius)
-    names = hands_of(hands)
-    if len(names) != len(task.goals) or not set(names) <= set(task.hands):
-        raise ValueError(f"hands {hands!r} do not fit task {task.name!r}")
     given = _checked_targets(task, targets)
     made = _Made(
+        hands=_checked_hands(task, hands, len(given)),
         targets=given,
         reached=np.full_like(given, np.nan),
         ticks=np.zeros(len(given), dtype=np.int64),
@@ -181,9 +184,8 @@ def make_trials(task: Task, hands: str, targets: Array, *, model: MotionModel = 
         corrections=np.zeros(1, dtype=np.int64),
         iterations=np.zeros(1, dtype=np.int64),
     )
-    codes = np.array([HANDS.index(hand) for hand in names], dtype=np.int64)
     work = _work_for(max(min(len(given), LANES), 1), task)
-    _make(codes, problem_of(task, model), made, work)
+    _make(problem_of(task, model), made, work)
     counts = (made.corrections[0], made.iterations[0], work.ends.evaluations.sum())
     return Trials(made.ticks, made.completed, given, made.reached, *map(int, counts))
 
@@ -192,6 +194,23 @@ def _work_for(trials: int, task: Task) -> _Work:
     q, target = np.zeros((2, trials, task.robot.dof))
     going, acting = np.zeros((2, trials), dtype=np.bool_)
     return _Work(q, target, going, acting, ends_of(trials), lanes_for(task.robot))
+
+
+def _checked_hands(task: Task, hands: str | Sequence[str], count: int) -> NDArray[np.int64]:
+    """The hand of every trial and goal; ValueError where they do not fit the task."""
+    each = [hands] if isinstance(hands, str) else list(hands)
+    codes: dict[str, list[int]] = {}
+    for sequence in dict.fromkeys(each):
+        names = hands_of(sequence)
+        if len(names) != len(task.goals) or not set(names) <= set(task.hands):
+            raise ValueError(f"hands {sequence!r} do not fit task {task.name!r}")
+        codes[sequence] = [HANDS.index(hand) for hand in names]
+    if isinstance(hands, str):
+        each *= count
+    if len(each) != count:
+        raise ValueError(f"{len(each)} hand sequences for {count} trials")
+    rows = np.array([codes[sequence] for sequence in each], dtype=np.int64)
+    return rows.reshape(count, len(task.goals))
 
 
 def _checked_targets(task: Task, targets: Array) -> Array:

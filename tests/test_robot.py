@@ -59,6 +59,9 @@ def test_leading_axes_are_vectorised(robot, hand):
     links = robot.left_links if hand == "left" else robot.right_links
     assert positions.shape == (3, 5, len(links) + 1, 2)
     assert jacobians.shape == (3, 5, 2, robot.dof)
+    tips, again = robot.linearised(q, hand)
+    np.testing.assert_array_equal(tips, robot.forward_kinematics(q, hand))
+    np.testing.assert_array_equal(again, jacobians)
     for index in np.ndindex(3, 5):
         np.testing.assert_array_equal(positions[index], robot.joint_positions(q[index], hand))
         np.testing.assert_array_equal(jacobians[index], robot.jacobian(q[index], hand))

@@ -37,11 +37,13 @@ TASKS = [
 def test_equal_to_execution_one_by_one(task, seed, noise, max_iterations):
     rng = np.random.default_rng(seed)
     model = MotionModel(max_iterations=max_iterations)
-    hands = str(rng.choice(hand_sequences(task)))
+    hands = [str(sequence) for sequence in rng.choice(hand_sequences(task), 8)]
     goals, dof = len(task.goals), task.robot.dof
     targets = np.tile(task.q0, (8, goals, 1)) + noise * rng.standard_normal((8, goals, dof))
-    alone = corrective_trial(task, hands).configurations  # fewer where a hand cannot reach
-    targets[:, : len(alone)] += alone - task.q0
+    for sequence in set(hands):
+        alone = corrective_trial(task, sequence).configurations  # fewer where it cannot reach
+        own = [chosen == sequence for chosen in hands]
+        targets[own, : len(alone)] += alone - task.q0
     held = rng.random((8, goals, dof)) < 0.2
     held[..., ["xy".index(coordinate) for coordinate in task.locked_base]] = True
     held[rng.random((8, goals)) < 0.2] = True
@@ -52,7 +54,7 @@ def test_equal_to_execution_one_by_one(task, seed, noise, max_iterations):
     for n in range(8):
         movements = []
         attempted = min(goals, (~np.isnan(trials.reached[n, :, 0])).sum() + 1)
-        for goal, hand in enumerate(hands_of(hands)):
+        for goal, hand in enumerate(hands_of(hands[n])):
             if held[n, goal].all():
                 movements.append(Movement(goal + 1, hand, "corrective"))
                 evaluations -= goal < attempted
@@ -81,6 +83,17 @@ def test_equal_to_execution_one_by_one(task, seed, noise, max_iterations):
     assert trials.iterations == iterations
     assert trials.corrections == corrections
     assert trials.evaluations == evaluations
+
+
+def test_one_hand_sequence_stands_for_all():
+    task = load_task("two-armed-1")
+    targets = np.random.default_rng(0).normal(0, 0.3, (3, len(task.goals), task.robot.dof))
+    targets[..., :2] = np.nan
+    one, each = (make_trials(task, hands, targets) for hands in ("RLRL", ["RLRL"] * 3))
+    for same, other in zip(one, each, strict=True):
+        np.testing.assert_array_equal(same, other)
+    with pytest.raises(ValueError, match="2 hand sequences for 3 trials"):
+        make_trials(task, ["RLRL", "RRRR"], targets)
 
 
 def test_failures_are_seen():
