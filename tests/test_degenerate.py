@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from coartic import load_task
+from coartic.analysis import study
+from coartic.analysis.comparisons import versions
 from coartic.analysis.signatures.context import context_dependence, distance, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import movable, synergy
@@ -99,8 +102,18 @@ def shown(text):
     return "\n".join(line for line in text.splitlines() if " runs: " not in line)
 
 
+@pytest.fixture(scope="module")
+def read_once():
+    """Commands one after the other read a folder once: what they find in it is found once."""
+    once = cache(study.load)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (study, versions):
+            patch.setattr(module, "load", once)
+        yield
+
+
 @pytest.mark.parametrize("name", FOLDERS)
-@pytest.mark.usefixtures("in_this_process", "undrawn")
+@pytest.mark.usefixtures("in_this_process", "undrawn", "read_once")
 def test_every_command(name, folders, monkeypatch, capsys, tmp_path):
     folder = folders(name, monkeypatch, capsys)
     other = folders("one of all", monkeypatch, capsys)

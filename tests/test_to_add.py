@@ -1,9 +1,9 @@
 """The table "to add" of CONTRIBUTING: what is added by its steps alone is in a report."""
 
-import os
+import multiprocessing
 import shutil
-import subprocess
 import sys
+import warnings
 
 import pytest
 
@@ -75,37 +75,44 @@ caption = "Longest runs."
 task = {}
 ticks = { kind = "number" }
 """
-RUN = """
-import os
-import sys
-import coartic
-coartic.__path__.insert(0, os.getcwd())  # the other packages come from here
-from coartic import analysis, baselines, benchmarks
-from coartic.analysis.figures import register
-from coartic.analysis.report.build import build
-from coartic.benchmarks import Selection, run_suite
-from coartic.benchmarks.registry import CLASSES
-from tests.support.reports import undrawn
-from tests.support.suites import InProcess
+def look(house):
+    """A report by the packages there, and what is in it of what was added.
 
-chosen = Selection(tasks=["ascending"], methods=["nearest-hand", "corrective-alone/given"])
-run_suite("comparison", sys.argv[1], runs=1, select=chosen, executor=InProcess())
-study = analysis.load(sys.argv[1])
-register.REGISTER = [row for row in register.REGISTER if row.name == "dots"]
-with undrawn():
-    document = build(study).document
-tables = {table.id: table for table in document.tables()}
-for changed in (analysis, baselines, benchmarks):
-    assert changed.__file__.startswith(os.getcwd())
-assert "nearest-hand" in CLASSES
-assert "nearest-hand" in {row.key for row in tables["methods-ascending"].rows}
-assert "goals_hit" in {column.name for column in tables["main-signatures-ascending"].columns}
-claims = {row.key: row.values for row in tables["claims"].rows}
-assert "supported" in claims["all-goals-hit"]
-assert "dots" in {figure.id for figure in document.figures()}
-(longest,) = tables["longest"].rows
-assert longest.values == ("ascending", int(-study.runs.reward.min()))
-"""
+    In a process of its own. If it is a fork it has imported these packages as they are here.
+    """
+    for name in [*sys.modules]:
+        if name.partition(".")[0] == "coartic" or name.startswith("tests.support"):
+            del sys.modules[name]
+    import coartic
+
+    coartic.__path__.insert(0, str(house))  # the other packages come from here
+    from coartic import analysis, baselines, benchmarks
+    from coartic.analysis.figures import register
+    from coartic.analysis.report.build import build
+    from coartic.benchmarks import Selection, run_suite
+    from coartic.benchmarks.registry import CLASSES
+    from tests.support.reports import undrawn
+    from tests.support.suites import InProcess
+
+    chosen = Selection(tasks=["ascending"], methods=["nearest-hand", "corrective-alone/given"])
+    run_suite("comparison", house / "results", runs=1, select=chosen, executor=InProcess())
+    study = analysis.load(house / "results")
+    register.REGISTER = [row for row in register.REGISTER if row.name == "dots"]
+    with undrawn():
+        document = build(study).document
+    tables = {table.id: table for table in document.tables()}
+    for changed in (analysis, baselines, benchmarks):
+        assert changed.__file__.startswith(str(house))
+    assert "nearest-hand" in CLASSES
+    assert "nearest-hand" in {row.key for row in tables["methods-ascending"].rows}
+    signatures = tables["main-signatures-ascending"]
+    assert "goals_hit" in {column.name for column in signatures.columns}
+    claims = {row.key: row.values for row in tables["claims"].rows}
+    assert "supported" in claims["all-goals-hit"]
+    assert "dots" in {figure.id for figure in document.figures()}
+    (longest,) = tables["longest"].rows
+    assert longest.values == ("ascending", int(-study.runs.reward.min()))
+
 
 LEFT_OUT = shutil.ignore_patterns("example")
 
@@ -173,12 +180,10 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
         "[tasks_table(study)]",
         "[tasks_table(study), longest_table(study)]",
     )
-    done = subprocess.run(
-        [sys.executable, "-c", RUN, house / "results"],
-        cwd=house,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    process = how.Process(target=look, args=(house,))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of threads, which a fork does not have
+        process.start()
+    process.join()
+    assert process.exitcode == 0
