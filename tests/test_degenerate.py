@@ -15,6 +15,8 @@ from hypothesis.extra.numpy import arrays
 from coartic import load_task
 from coartic.analysis import study
 from coartic.analysis.comparisons import versions
+from coartic.analysis.figures.register import SECTIONS
+from coartic.analysis.figures.style import ONE
 from coartic.analysis.signatures.context import context_dependence, distance, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import movable, synergy
@@ -168,6 +170,17 @@ def test_runs_that_are_equal_have_no_spread_anywhere(folders, monkeypatch, capsy
     assert len(tests)
     assert set(tests.p[tests.signature.str.contains("context|part")]) == {1.0}
     assert (pd.read_csv(folder / "comparisons.csv").sd_first.dropna() == 0).all()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_figures_for_narrow_pages(folders, monkeypatch, capsys):
+    """Which the reports above have none of."""
+    drawn = study.load(folders("all equal", monkeypatch, capsys)).figures
+    narrow = [plot for name in SECTIONS for plot in drawn.for_a_phone(name).values()]
+    assert narrow
+    for plot in narrow:
+        assert plot.figure.get_figwidth() == ONE
+        assert not NONSENSE.search(f"{plot.caption} {plot.alt}")
 
 
 # The mechanism

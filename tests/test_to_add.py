@@ -75,6 +75,8 @@ caption = "Longest runs."
 task = {}
 ticks = { kind = "number" }
 """
+
+
 def look(house):
     """A report by the packages there, and what is in it of what was added.
 

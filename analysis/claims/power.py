@@ -51,6 +51,8 @@ TRIED = (20, 30, 40, 60, 80, 100, 150)
 """Numbers of runs a cell that :func:`runs_needed` tries."""
 
 Sizes = Mapping[tuple[str, str], int]
+_remembered = lru_cache(maxsize=256)
+"""Folders of as many runs have the same chances."""
 
 
 @dataclass(frozen=True)
@@ -147,9 +149,9 @@ Drawn = tuple[Array, tuple[Array, Array]]
 def _drawn_p(claim: Claim, sizes: Sizes) -> Drawn | None:
     if claim.rule == "higher":
         parts = [
-            _mean_p(task, *sides(pair), sizes)
+            _mean_p(task, *pair, *(_size(sizes, task, side.name) for side in pair))
             for task, pairs in claim.pairs.items()
-            for pair in pairs
+            for pair in map(sides, pairs)
         ]
         known = [p for p in parts if p is not None]
         if len(known) < len(parts):
@@ -159,13 +161,23 @@ def _drawn_p(claim: Claim, sizes: Sizes) -> Drawn | None:
         contrary = np.minimum(1.0, p.min(axis=0) * len(p))
         return p.max(axis=0), (contrary, np.full(SIMULATIONS, 1 / SIMULATIONS))
     if claim.rule in ("most", "few", "about"):
-        return _share_p(claim, sizes)
-    return _differ_p(claim, sizes) if claim.rule == "differ" else None
+        ((task, text),) = claim.runs.items()
+        return _share_p(claim.rule, task, text, _size(sizes, task, counted_hands(text)[0]))
+    if claim.rule == "differ":
+        ((task, text),) = claim.runs.items()
+        names = text.split()
+        return _differ_p(task, *((name, _size(sizes, task, name)) for name in names))
+    return None
 
 
-def _differ_p(claim: Claim, sizes: Sizes) -> Drawn | None:
-    ((task, text),) = claim.runs.items()
-    cells = [_draw(task, name, sizes.get((task, name), RUNS)) for name in text.split()]
+def _size(sizes: Sizes, task: str, name: str) -> int:
+    return sizes.get((task, name), RUNS)
+
+
+@_remembered
+def _differ_p(task: str, *named: tuple[str, int]) -> Drawn | None:
+    """``named``: conditions with their runs."""
+    cells = [_draw(task, name, runs) for name, runs in named]
     if None in cells:
         return None
     names = sorted({name for cell in cells if cell for name in cell.names})
@@ -183,10 +195,9 @@ def _counts(cell: _Drawn, names: list[str]) -> NDArray[np.int64]:
     return np.stack([(cell.which == index).sum(axis=1) for index in own], axis=1)
 
 
-def _share_p(claim: Claim, sizes: Sizes) -> Drawn | None:
-    ((task, text),) = claim.runs.items()
+@_remembered
+def _share_p(rule: str, task: str, text: str, n: int) -> Drawn | None:
     condition, hands, inverse = counted_hands(text)
-    n = sizes.get((task, condition), RUNS)
     drawn = _draw(task, condition, n)
     if drawn is None or hands not in drawn.names:
         return None
@@ -195,28 +206,28 @@ def _share_p(claim: Claim, sizes: Sizes) -> Drawn | None:
     (count, total) = printed_count(task, condition, hands)
     share = 1 - count / total if inverse else count / total
     every = np.arange(n + 1)
-    if claim.rule == "about":
+    if rule == "about":
         bound = FEW if share - FEW < MOST - share else MOST
         p = half_p(every, n)
         outside = (every <= FEW * n) | (every >= MOST * n)
         contrary = np.ones(n + 1)
         contrary[outside] = [unlike_p((k, n), (count, total)) for k in every[outside].tolist()]
     else:
-        bound, most = MOST, claim.rule == "most"
+        bound, most = MOST, rule == "most"
         p, contrary = share_p(every, n, MOST, "greater"), share_p(every, n, MOST, "less")
         p, contrary = (p, contrary) if most else (contrary, p)
     mirrored = min(1.0, max(0.0, 2 * bound - share))
     return p[counts], (contrary, stats.binom.pmf(every, n, mirrored))
 
 
-def _mean_p(task: str, first: Side, second: Side, sizes: Sizes) -> Array | None:
+@_remembered
+def _mean_p(task: str, first: Side, second: Side, runs: int, others: int) -> Array | None:
     """One-tailed p-values that the first is higher; None where nothing is printed."""
     bound = _printed_bound(task, first, second)
     cell = published_cell(task, first.name)
     if bound is not None and (cell is None or cell.summary is None):
-        runs = min(sizes.get((task, side.name), RUNS) for side in (first, second))
-        return _least_p(bound, _rng(task, first, second), runs)
-    a = _moments(task, first, sizes)
+        return _least_p(bound, _rng(task, first, second), min(runs, others))
+    a = _moments(task, first, runs)
     if second.known:
         number = printed_known(task, second)
         if a is None or number is None:
@@ -224,7 +235,7 @@ def _mean_p(task: str, first: Side, second: Side, sizes: Sizes) -> Array | None:
         n, mean, variance = a
         p = special.stdtr(n - 1, -(mean - number) / np.sqrt(variance / n))
         return np.where(n < FEWEST, 1.0, p)
-    b = _moments(task, second, sizes)
+    b = _moments(task, second, others)
     if a is None or b is None:
         return None
     return np.where(np.minimum(a[0], b[0]) < FEWEST, 1.0, welch_p(*a, *b))
@@ -247,9 +258,9 @@ def welch_p(n: Any, mean: Any, variance: Any, m: Any, other: Any, spread: Any) -
     return np.asarray(special.stdtr(freedom, (other - mean) / np.sqrt(one + two)))
 
 
-def _moments(task: str, side: Side, sizes: Sizes) -> tuple[Array, Array, Array] | None:
+def _moments(task: str, side: Side, runs: int) -> tuple[Array, Array, Array] | None:
     """Number, mean and variance of the runs on one side, each of shape ``(simulations,)``."""
-    drawn = _draw(task, side.name, sizes.get((task, side.name), RUNS))
+    drawn = _draw(task, side.name, runs)
     if drawn is None or (side.hands and side.hands not in drawn.names):
         return None
     own = np.ones_like(drawn.which, dtype=bool)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
 from coartic.analysis.results.folder import Cell, CellKey, CellRuns
@@ -147,5 +148,6 @@ def _row(study: Study, cell: CellRuns) -> MethodRow:
 
 def median(values: pd.Series) -> float:
     """Of the values that are known; NaN where none is, as for runs that crashed."""
-    known = values.dropna()
-    return float(known.median()) if len(known) else math.nan
+    known = values.to_numpy(dtype=np.float64, na_value=np.nan)
+    known = known[~np.isnan(known)]
+    return float(np.median(known)) if len(known) else math.nan

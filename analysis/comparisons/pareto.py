@@ -117,8 +117,11 @@ def dominated(reward: Array, amount: Array, tolerance: float = 0.0) -> Flags:
 
 def _spent(cell: CellRuns, spend: str, told: int) -> Array:
     """What each run spent (n,); NaN for times that are not taken."""
-    runs = cell.runs.assign(information=told, solve_s=solve_times(cell.good))
-    return runs[spend].to_numpy(dtype=np.float64, na_value=np.nan)
+    if spend == "information":
+        return np.full(len(cell.runs), float(told))
+    times = spend == "solve_s"
+    values = solve_times(cell.good).reindex(cell.runs.index) if times else cell.runs[spend]
+    return values.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
 def _median(values: Array) -> Array:

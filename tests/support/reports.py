@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 import coartic.cli.reading
-from coartic.analysis.figures import register
+from coartic.analysis.figures import Figures, register
 from coartic.analysis.report import pictures
 from coartic.analysis.report.build import build, write
 from coartic.analysis.report.formats import html as page
@@ -31,10 +31,11 @@ LATEX = r"""\documentclass{article}
 
 @contextmanager
 def undrawn():
-    """Reports whose figures are empty, as is the script of their charts, which is not ours:
-    making them takes long, and has tests of its own.
+    """Reports whose figures are empty, with none for a narrow page, as is the script of their
+    charts, which is not ours: making them takes long, and has tests of its own.
     """
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figures, "for_a_phone", lambda figures, section: {})
         patch.setattr(pictures, "svg_text", lambda plot: SVG)
         patch.setattr(pictures, "rendered", lambda plot, endings: {f"{plot.id}.svg": SVG.encode()})
         patch.setattr(page, "vega", str)
