@@ -122,7 +122,8 @@ def inner(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """As :func:`inner`, for a part of one other function: passing whole tables would cost."""
+    """As :func:`inner`, but a part of its callers, whose error model it has: passing whole tables
+    would cost, and loops over a shape are unrolled where it is known."""
     compiled: F = njit(**_INNER, inline="always")(function)
     return compiled
 

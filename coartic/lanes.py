@@ -177,7 +177,7 @@ _chain = inner(chain)
 
 @lanewise
 def near(at: Any, count: int) -> bool:
-    """Whether no lane's angles are too large for the kernels' own cosine."""
+    """Whether all angles are surely small enough for the kernels' own cosine: by a bound."""
     far = 0
     for i in range(whole(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
@@ -211,7 +211,7 @@ _far_chains = _chains_by(cosine, sine)
 
 @inner
 def place(at: Any, count: int, is_near: bool) -> None:
-    """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near`` says :func:`near`."""
+    """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
     if is_near:
         _near_chains(at, whole(count))
     else:

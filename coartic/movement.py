@@ -102,7 +102,7 @@ def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
 
 @lanewise
 def _set_off(at: Any, count: int, model: Any) -> bool:
-    """Rates, bounds and number of steps of every lane; whether all stay :func:`near`."""
+    """Rates, bounds and number of steps of every lane; whether all surely stay near."""
     far = 0
     for i in range(whole(count)):
         distance = math.sqrt(at.distance[i])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct, reference
-from coartic.compiled import entry
+from coartic.compiled import entry, joint_chain, joint_lever
 from coartic.corrective import largest_square, shift_kernel
 from coartic.movement import Goal, scratch_for
 from coartic.robot import HANDS
@@ -50,14 +50,39 @@ def test_a_square_within_the_largest_has_a_root_within_the_length(length):
     assert math.sqrt(square) <= length < math.sqrt(math.nextafter(square, math.inf))
 
 
-@pytest.mark.parametrize("turn", [3e4, -6e4, 9.9e4])  # rad; a link's angle is the sum of joints'
-def test_equals_the_matrix_form_where_the_arm_is_wound_up(turn):
-    q = np.array([0.3, -0.2, *np.linspace(0.1, 0.8, 8)])
-    q[2:] += turn * np.array([1, 1, 1, 1, 1, -1, 1, 1])
-    for hand in HANDS:
-        fast, slow = (way(ROBOT, q, hand, (3.0, 2.0)) for way in (correct, reference.correct))
-        assert (fast.converged, fast.iterations) == (True, slow.iterations)
-        np.testing.assert_allclose(fast.q, slow.q, atol=1e-6)
+@entry
+def _by_steps(q, arm, goal, gain, tolerance, most, xs, ys):
+    """The descent with the cosine that knows any angle, one evaluation after the other."""
+    tip = len(arm.links)
+    for iteration in range(most):
+        joint_chain(q, arm, xs, ys)
+        error_x, error_y = goal.x - xs[tip], goal.y - ys[tip]
+        if math.sqrt(error_x * error_x + error_y * error_y) <= tolerance:
+            return iteration
+        q[0] += gain * error_x
+        q[1] += gain * error_y
+        for k in range(tip):
+            dx, dy = joint_lever(xs, ys, k, tip)
+            q[arm.first + k] += gain * (dx * error_x + dy * error_y)
+    return most
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
+    """Beyond what the kernels' own cosine knows, from the start or on the way."""
+    rng = np.random.default_rng(seed)
+    robot, hand = (ROBOT, UNEVEN)[seed % 2], HANDS[seed // 2 % 2]
+    q = rng.uniform(-1, 1, robot.dof)
+    q[2:] += rng.choice([9.9e4, 5e4, 2.4e4]) * rng.choice([1, 1, -1])
+    goal, slow = rng.uniform(-1, 1, 2), q.copy()
+    fast = correct(robot, q, hand, tuple(goal))
+    scratch, model = scratch_for(robot), PAPER
+    iterations = _by_steps(
+        slow, robot.arm(hand), Goal(*goal, 0.0), model.gain, model.correction_tolerance,
+        model.max_iterations, scratch.xs, scratch.ys,
+    )  # fmt: skip
+    assert fast.iterations == iterations
+    np.testing.assert_array_equal(fast.q, slow)
 
 
 @pytest.mark.parametrize("hand", HANDS)

@@ -32,8 +32,6 @@ def said(of):
 def changed(of, column, values):
     """The study with a column of its runs replaced in some rows, by their number."""
     runs = of.results.runs.copy()
-    if runs[column].dtype == "category":
-        runs[column] = runs[column].cat.add_categories(list(set(values.values())))
     for row, value in values.items():
         runs.loc[row, column] = value
     return Study(replace(of.results, runs=runs))

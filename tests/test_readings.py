@@ -215,8 +215,8 @@ def test_the_learner_is_the_slow_one_whatever_is_read_together(first_trial):
     failed = 0
     for seed, fields in enumerate(READ):
         condition = replace(FORGETFUL, first_trial=first_trial, noise_sd=0.02, **fields)
-        fast = learn(task, condition, seed=seed, trials=9)
-        slow = reference.learn(task, condition, seed=seed, trials=9)
+        fast = learn(task, condition, seed=seed, trials=5)
+        slow = reference.learn(task, condition, seed=seed, trials=5)
         np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
         np.testing.assert_array_equal(fast.completed, slow.completed)
         assert fast.counters.corrections == slow.corrections

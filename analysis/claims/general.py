@@ -232,7 +232,7 @@ def _printed(task: str | None, of: Solved) -> Summary | None:
 def _welch(first: Summary, second: Summary, off: float) -> float:
     """One-tailed p that the first mean is higher; ``off`` half units of their last decimals."""
     apart = sum(0.5 * 10.0 ** -(s.digits[0] if s.digits else 0) for s in (first, second))
-    both = ((s.runs, s.mean, (s.sd or 0.0) ** 2) for s in (first, second))
+    both = ((s.runs, s.mean, math.nan if s.sd is None else s.sd**2) for s in (first, second))
     (n, mean, variance), other = both
     return float(welch_p(n, mean + off * apart, variance, *other))
 

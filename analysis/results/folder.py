@@ -139,7 +139,7 @@ def made_here(folder: Path) -> Results:
 
 
 _OF_CELLS = ("told", "parameters", "commit", "code", "packages")
-"""Columns of runs that all runs of a cell have alike, or nearly: categories, not texts."""
+"""Columns of runs that all runs of a cell have alike, or nearly: each text is kept once."""
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame:
@@ -150,6 +150,9 @@ def read_table(folder: Path, name: str) -> pd.DataFrame:
     repeated = [name for name in texts if name != "run_id"]
     frame = pd.read_parquet(path, dtype_backend="numpy_nullable", read_dictionary=repeated)
     for column in repeated:
-        if column not in _OF_CELLS:
-            frame[column] = frame[column].astype("string")
+        texts = frame[column]
+        if column in _OF_CELLS:
+            frame[column] = texts.astype(object).astype(pd.StringDtype("python"))
+        else:
+            frame[column] = texts.astype(pd.StringDtype("pyarrow"))
     return frame

@@ -8,6 +8,7 @@ import shutil
 from dataclasses import replace
 
 import pytest
+from filelock import FileLock
 
 import coartic.benchmarks.executors
 from coartic import PAPER, CoarticError
@@ -50,13 +51,18 @@ REFUSED = ("import/exit-0", "name/learner", "name/escape", "told/none")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("attacks")
-    (folder / "small.toml").write_text(SUITE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coartic.benchmarks.executors, "Local", InProcess)
-        code, said = in_process(["run", folder / "small.toml", "--out", folder / "whole"])
-    assert code == 0, said
+def whole(session_folder):
+    """Made by the first worker for all."""
+    folder = session_folder / "attacks"
+    with FileLock(session_folder / "attacks.lock"):
+        if not (folder / "made").exists():
+            folder.mkdir()
+            (folder / "small.toml").write_text(SUITE)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(coartic.benchmarks.executors, "Local", InProcess)
+                code, said = in_process(["run", folder / "small.toml", "--out", folder / "whole"])
+            assert code == 0, said
+            (folder / "made").touch()
     return folder / "whole"
 
 

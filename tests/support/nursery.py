@@ -1,8 +1,11 @@
 """Processes forked from one that has imported what they need, which takes most of their time.
 
-So begin the guards and workers of sandboxes (:mod:`coartic.benchmarks.sandbox`), kernels loaded;
-all else about them is as it is. ``python -m tests.support.nursery SOCKET MODULE...`` imports the
-modules; it does the ``main`` of one in a fork for each message, and says how one has ended.
+So begin the guards and workers of sandboxes (:mod:`coartic.benchmarks.sandbox`), kernels loaded.
+What the system says of them, command line and first environment, is the nursery's: tests of how
+processes are told by it use ``sandboxes_by_themselves``.
+
+``python -m tests.support.nursery SOCKET MODULE...`` imports the modules; it does the ``main`` of
+one in a fork for each message, and says how one has ended.
 """
 
 import gc
