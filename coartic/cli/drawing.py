@@ -28,20 +28,21 @@ def draw(
 ) -> None:
     """Draw start configuration and goals of tasks; FAMILY/v1/i000..i003 are several."""
     from coartic import builtin_tasks, load_task
-    from coartic.analysis.figures.plot import FORMATS, picture
-    from coartic.analysis.figures.tasks import tasks_plot
     from coartic.families import named_by
     from coartic.files import check_outputs, write_outputs
 
-    if out.suffix.lower() not in FORMATS:
-        raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}")
-    check_outputs([out], replace=replace)
     names = [name for text in names_in(tasks, "--tasks") for name in named_by(text)]
     if not names and not task_file:
         names = list(builtin_tasks())
     chosen = [load_task(name) for name in dict.fromkeys(names)] + [
         load_task(path) for path in task_file or []
     ]
+    from coartic.analysis.figures.plot import FORMATS, picture  # after what is soon said
+    from coartic.analysis.figures.tasks import tasks_plot
+
+    if out.suffix.lower() not in FORMATS:
+        raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}")
+    check_outputs([out], replace=replace)
     write_outputs({out: picture(tasks_plot(chosen), out.suffix.lower())}, replace=replace)
     say(f"{', '.join(task.name for task in chosen)} drawn in {out}.")
 
