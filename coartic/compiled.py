@@ -117,7 +117,7 @@ _INNER = _OPTIONS | {"no_cpython_wrapper": True}
 
 def inner(function: F) -> F:
     """Compile a function that only other compiled functions call."""
-    compiled: F = njit(**_INNER)(function)
+    compiled: F = _for_any_number(njit(**_INNER)(function))
     return compiled
 
 
@@ -130,8 +130,18 @@ def inlined(function: F) -> F:
 
 def lanewise(function: F) -> F:
     """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
-    compiled: F = njit(**_INNER, error_model="numpy")(function)
+    compiled: F = _for_any_number(njit(**_INNER, error_model="numpy")(function))
     return compiled
+
+
+def _for_any_number(dispatcher: Any) -> Any:
+    """Compile it once, not once more for a number whose value the compiler knows: ``count = 0``
+    before a loop is one."""
+    template = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda given, names: template(
+        tuple(map(types.unliteral, given)), names
+    )
+    return dispatcher
 
 
 def entry(function: F) -> F:

@@ -410,7 +410,7 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
             work.acting[run] = work.going[run] = converged
 
 
-@inlined
+@inner
 def _trial(
     first: bool,
     explore: bool,
@@ -481,7 +481,7 @@ def _copy(run: int, source: Any, destination: Any) -> None:
     destination.count[run] = source.count[run]
 
 
-@inlined
+@inner
 def _learn_from(trial: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*."""
     others = max(1, kept.rewards.shape[1] - 1)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import entry, fill_row, inner
+from coartic.compiled import entry, fill_row, inlined, inner
 from coartic.corrective import correct_lanes
 from coartic.lanes import LANES, Ends, Lanes, board, depart, ends_of, lanes_for
 from coartic.model import PAPER, MotionModel, checked_model
@@ -89,7 +89,7 @@ def _depart(first: int, number: int, problem: Any, made: Any, work: Any) -> int:
     return count
 
 
-@inner
+@inlined
 def _attempt(first: int, number: int, problem: Any, made: Any, work: Any) -> None:
     """Move to the targets; a trial without one moves to where it is."""
     goal = goal_of(problem, number)
@@ -113,7 +113,7 @@ def _attempt(first: int, number: int, problem: Any, made: Any, work: Any) -> Non
                 made.ticks[first + trial] += work.ends.ticks[trial]
 
 
-@inner
+@inlined
 def _finish(first: int, number: int, problem: Any, made: Any, work: Any) -> None:
     """Have **A** finish what was missed."""
     goal, lanes, ends = goal_of(problem, number), work.lanes, work.ends
@@ -139,7 +139,7 @@ def _finish(first: int, number: int, problem: Any, made: Any, work: Any) -> None
             made.ticks[first + trial] += ends.ticks[trial]
 
 
-@inner
+@inlined
 def _make_lot(first: int, problem: Any, made: Any, work: Any) -> None:
     """Make the trials from ``first`` on, as many as there is room for."""
     goals = len(problem.goals)

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from numba import njit, types
+
 from coartic import compiled
 
 ROOT = Path(__file__).parent.parent
@@ -83,3 +85,18 @@ def test_a_change_in_a_called_module_is_noticed(tmp_path):
             encoding="utf-8",
         )
         assert found() == (5.0, 0)
+
+
+def test_a_kernel_is_compiled_once_for_all_numbers():
+    """Also where the compiler knows one of them: a kernel's compilation takes seconds."""
+
+    @compiled.inner
+    def twice(number):
+        return 2 * number
+
+    @njit
+    def of_some(number):
+        return twice(3) + twice(number)
+
+    assert of_some(4) == 14
+    assert twice.signatures == [(types.int64,)]
