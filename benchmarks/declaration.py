@@ -8,6 +8,7 @@ and what comes back is checked here: :class:`Declaration` is the border.
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import json
 import sys
@@ -107,6 +108,15 @@ def reason_against(method: type[Method], task: Task, parameters: Mapping[str, An
     completed(method, parameters)
     reason = method(method.Parameters(**parameters)).why_not(task)
     return None if reason is None else str(reason)
+
+
+def built_in_methods(module: str) -> tuple[type[Method], ...]:
+    """The methods of a module of this project. Raises MethodFileError where there are none."""
+    try:
+        methods: tuple[type[Method], ...] = importlib.import_module(module).METHODS
+    except (ImportError, AttributeError):
+        raise MethodFileError(f"{module} has no methods here") from None
+    return methods
 
 
 def methods_of(foreign: Foreign) -> list[type[Method]]:

@@ -116,22 +116,27 @@ def _lots(
 ) -> Iterator[Sequence[RunSpec]]:
     """Runs that are performed side by side; results do not depend on which these are.
 
-    Where there are few, each worker has its part, but lots are not made smaller than
-    :data:`LEAST_TOGETHER`: a run beside many takes a fraction of its time alone.
+    Lots that do not go round among the workers are divided, so that each has its part, but not
+    into lots smaller than :data:`LEAST_TOGETHER`: a run beside many takes a fraction of its time
+    alone.
     """
-    share = max(math.ceil(len(specs) / workers), LEAST_TOGETHER)
+    lots: list[list[RunSpec]] = []
     for _, group in groupby(specs, key=lambda spec: id(spec.setting)):
         together: list[RunSpec] = []
         for spec in group:
             if spec.run_id in alone:
-                yield [spec]
-                continue
-            together.append(spec)
-            if len(together) == min(spec.setting.most_together, share):
-                yield together
-                together = []
-        if together:
-            yield together
+                lots.append([spec])
+            elif together and len(together) < spec.setting.most_together:
+                together.append(spec)
+            else:
+                together = [spec]
+                lots.append(together)
+    left = len(lots) % workers
+    whole = len(lots) - left
+    yield from lots[:whole]
+    for lot in lots[whole:]:
+        size = max(math.ceil(len(lot) * left / workers), LEAST_TOGETHER)
+        yield from (lot[first : first + size] for first in range(0, len(lot), size))
 
 
 def _to_redo(record: Record, spec: RunSpec, retry_failed: bool) -> bool:

@@ -55,7 +55,7 @@ def environment() -> dict[str, Any]:
         "model_code": source_fingerprint(),
         "commit": _commit(),
         "python": platform.python_version(),
-        "packages": {name: metadata.version(name) for name in _LIBRARIES},
+        "packages": _versions(),
         "platform": plain(platform.platform(), LONGEST_LINE),
         "processor": plain(_processor(), LONGEST_LINE),
         "cores": cpu_count(),
@@ -85,6 +85,11 @@ def process_peak_mb() -> float:
         return float(psutil.Process().memory_info().peak_wset) / 2**20
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return {name: metadata.version(name) for name in _LIBRARIES}
 
 
 @cache

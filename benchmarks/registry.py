@@ -18,25 +18,18 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-import coartic.baselines.cma_es
-import coartic.baselines.corrective_alone
-import coartic.baselines.nullspace_qp
-import coartic.baselines.optimum
-import coartic.baselines.posture_based
-import coartic.baselines.random_search
-import coartic.baselines.trajectory_optimisation
 from coartic import CoarticError, Task, record
 from coartic.benchmarks.code_identity import built_in_code, foreign_code
 from coartic.benchmarks.declaration import (
     Declaration,
     Foreign,
     MethodFileError,
+    built_in_methods,
     completed,
     declared,
     reason_against,
 )
 from coartic.benchmarks.sandbox import Failure, Sandbox
-from coartic.dual_process import DUAL_PROCESS
 from coartic.inputs import problems_inline, read_text
 from coartic.learning import METHOD_PREFIX
 from coartic.method import Method
@@ -49,15 +42,19 @@ RESERVED = (METHOD_PREFIX, SEARCH)
 """Ids that begin so have a meaning in every table: methods of this project alone have them."""
 QUESTION_LIMIT_S = 60.0
 """Seconds that a method which is not built in has to say what it is."""
-BUILT_IN: tuple[type[Method], ...] = (
-    *DUAL_PROCESS,
-    *coartic.baselines.corrective_alone.METHODS,
-    *coartic.baselines.random_search.METHODS,
-    *coartic.baselines.cma_es.METHODS,
-    *coartic.baselines.nullspace_qp.METHODS,
-    *coartic.baselines.posture_based.METHODS,
-    *coartic.baselines.trajectory_optimisation.METHODS,
-    *coartic.baselines.optimum.METHODS,
+MODULES = (
+    "coartic.dual_process",
+    "coartic.baselines.corrective_alone",
+    "coartic.baselines.random_search",
+    "coartic.baselines.cma_es",
+    "coartic.baselines.nullspace_qp",
+    "coartic.baselines.posture_based",
+    "coartic.baselines.trajectory_optimisation",
+    "coartic.baselines.optimum",
+)
+"""Where this project's methods are, each in its module's ``METHODS``."""
+BUILT_IN: tuple[type[Method], ...] = tuple(
+    method for module in MODULES for method in built_in_methods(module)
 )
 CLASSES: Mapping[str, type[Method]] = {method.name: method for method in BUILT_IN}
 """The built-in methods by id."""

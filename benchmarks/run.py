@@ -7,6 +7,8 @@ folder lacks, and writes its tables, which
 
 from __future__ import annotations
 
+import importlib
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -181,6 +183,8 @@ class SuitePlan:
                 progress = Progress(total, present=total, failed=failed)
                 watch(progress, None)
                 return RunReport(folder, progress, time.perf_counter() - clock, manifest)
+            # What pyarrow imports when the first table is made, while workers begin.
+            threading.Thread(target=importlib.import_module, args=["pandas"]).start()
             progress = perform_missing(
                 [spec for cell in self.cells for spec in cell.specs()],
                 store,

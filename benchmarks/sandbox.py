@@ -39,6 +39,7 @@ LARGEST_ANSWER = 128 << 20
 LAST_WORDS = 4096
 """Bytes that are kept of what a process prints."""
 _END_LIMIT_S = 10.0
+_CHUNK = 1 << 20  # bytes read at once: each read waits for whoever is busy here
 _LOOK_S = 0.1  # between looks at the clock
 _RETRIES = 2  # fresh processes for a run whose process was killed
 _START_LIMIT_S = 300.0  # imports and a cold compilation, on a slow machine
@@ -72,6 +73,7 @@ class Sandbox:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 env={**os.environ, **THREADS, "PYTHONPATH": _path(), MARK: self._mark},
+                bufsize=_CHUNK,
                 start_new_session=True,  # Ctrl-C is for the parent
             )
         except OSError as error:

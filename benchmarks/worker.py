@@ -24,6 +24,7 @@ from coartic.benchmarks.declaration import (
     Foreign,
     MethodFileError,
     brief,
+    built_in_methods,
     completed,
     declared,
     methods_of,
@@ -63,7 +64,7 @@ def answer(question: dict[str, Any]) -> Any:
     foreign = Foreign(**question["foreign"])
     if what == "describe":
         return [declared(method).model_dump(mode="json") for method in _foreign_methods(foreign)]
-    method = _method(question["method"], foreign)
+    method = _method(question["method"], _methods(foreign))
     if what == "complete":
         return completed(method, question["parameters"])
     if what == "applies":
@@ -130,7 +131,7 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
 def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) -> type[Method]:
     """The method of a job, with the job's code. Raises ForeignCodeError otherwise."""
     try:
-        method = _method(name, foreign)
+        method = _method(name, _methods(foreign, job["module"]))
         if foreign is None and job["sources"] == built_in_sources(job["code"]):
             return method  # to the letter what the job's code was made of
         code = built_in_code(method.__module__) if foreign is None else _foreign_code(foreign)
@@ -222,17 +223,16 @@ def _foreign_code(foreign: Foreign) -> str:
     return foreign_code(foreign)
 
 
-def _method(name: str, foreign: Foreign | None) -> type[Method]:
-    if foreign is None:
-        from coartic.benchmarks.registry import CLASSES  # its imports are no use to other methods
+def _methods(foreign: Foreign | None, module: str = "") -> Sequence[type[Method]]:
+    """Those of one module, if they are this project's: what others import is no use to them."""
+    return built_in_methods(module) if foreign is None else _foreign_methods(foreign)
 
-        if name not in CLASSES:
-            raise MethodFileError("it is not installed on this worker")
-        return CLASSES[name]
-    for method in _foreign_methods(foreign):
+
+def _method(name: str, methods: Sequence[type[Method]]) -> type[Method]:
+    for method in methods:
         if method.name == name:
             return method
-    raise MethodFileError(f"{foreign.where} defines no method {name!r}")
+    raise MethodFileError("it is not installed on this worker")
 
 
 def main() -> None:

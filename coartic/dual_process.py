@@ -207,6 +207,6 @@ def _method(condition: ExplorationCondition) -> type[DualProcess]:
     )
 
 
-DUAL_PROCESS: tuple[type[DualProcess], ...] = tuple(
+METHODS: tuple[type[DualProcess], ...] = tuple(
     map(_method, chain(CONDITIONS.values(), VARIANTS.values()))
 )

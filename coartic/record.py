@@ -311,11 +311,16 @@ def in_lots(records: Iterable[Record]) -> Iterator[list[Record]]:
         yield lot
 
 
+_Trials = tuple[list[int], int]
+"""Rewards of the trials that hit every goal; number of the others."""
+
+
 def _broken_laws(record: Record) -> Iterator[str]:
+    trials = _trials(record)
     yield from _broken_by_outcome(record)
-    yield from _broken_by_spending(record)
+    yield from _broken_by_spending(record, trials)
     if record.method.startswith(METHOD_PREFIX):
-        yield from _broken_by_learning(record)
+        yield from _broken_by_learning(record, trials)
 
 
 def _broken_by_outcome(record: Record) -> Iterator[str]:
@@ -338,8 +343,8 @@ def _broken_by_outcome(record: Record) -> Iterator[str]:
         yield "its reward is above the bound it proves"
 
 
-def _broken_by_spending(record: Record) -> Iterator[str]:
-    spent, (known, failed) = record.meter, _trials(record)
+def _broken_by_spending(record: Record, trials: _Trials) -> Iterator[str]:
+    spent, (known, failed) = record.meter, trials
     if spent is None:
         return
     if len(record.rewards) > spent.trials:
@@ -350,9 +355,9 @@ def _broken_by_spending(record: Record) -> Iterator[str]:
         yield "its trials' rewards are more than its ticks"
 
 
-def _broken_by_learning(record: Record) -> Iterator[str]:
+def _broken_by_learning(record: Record, trials: _Trials) -> Iterator[str]:
     spent, rewards, asked = record.meter, record.rewards, record.specification
-    known, failed = _trials(record)
+    known, failed = trials
     policy = asked.task.get("initial_hands") in INITIAL_POLICIES  # it makes trials of its own
     if spent is not None and rewards and not policy:
         if (spent.trials, spent.failed_trials) != (len(rewards), failed):
@@ -389,8 +394,7 @@ def corrections_of(record: Record) -> list[int] | None:
     return whole if len(whole) == len(counts) == 1 + PARTS else None
 
 
-def _trials(record: Record) -> tuple[list[int], int]:
-    """Rewards of the trials that hit every goal; number of the others."""
+def _trials(record: Record) -> _Trials:
     known = [reward for reward in record.rewards if reward is not None]
     return known, len(record.rewards) - len(known)
 

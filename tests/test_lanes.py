@@ -196,7 +196,13 @@ def test_long_runs_are_fewer_side_by_side():
 
 @pytest.mark.parametrize(
     ("runs", "workers", "sizes"),
-    [(40, 2, [20, 20]), (20, 8, [8, 8, 4]), (100, 2, [40, 40, 20]), (40, 1, [40])],
+    [
+        (40, 2, [20, 20]),
+        (20, 8, [8, 8, 4]),
+        (100, 2, [40, 40, 10, 10]),
+        (83, 2, [40, 40, 3]),
+        (40, 1, [40]),
+    ],
 )
 def test_a_cell_is_divided_among_workers(runs, workers, sizes):
     (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])

@@ -639,7 +639,6 @@ attack(
     "replaces a built-in method in the registry while it is imported",
     before="""
     import coartic.benchmarks.registry as methods
-    from coartic.dual_process import DUAL_PROCESS
     def worse(self, session):
         return honest(session)
     for built_in in methods.BUILT_IN:
