@@ -26,8 +26,7 @@ from typing import IO, Any
 
 import psutil
 
-from coartic.benchmarks.guard import THREADS as THREADS
-from coartic.benchmarks.guard import end, end_below
+from coartic.benchmarks.guard import THREADS, end, end_below
 from coartic.errors import CoarticError
 from coartic.learning import METHOD_PREFIX
 from coartic.text import plain

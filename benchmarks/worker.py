@@ -30,8 +30,8 @@ from coartic.benchmarks.declaration import (
     methods_of,
     reason_against,
 )
+from coartic.benchmarks.guard import THREADS
 from coartic.benchmarks.provenance import environment, process_peak_mb
-from coartic.benchmarks.sandbox import THREADS
 from coartic.errors import SolutionError
 from coartic.learning import warm_up
 from coartic.method import (

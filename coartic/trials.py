@@ -8,7 +8,7 @@ for methods that make thousands of trials.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import LARGEST, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array
-from coartic.task import Task, hands_of
+from coartic.task import Task, hands_of, letters_of
 
 
 class Trials(NamedTuple):
@@ -198,19 +198,20 @@ def _work_for(trials: int, task: Task) -> _Work:
 
 def _checked_hands(task: Task, hands: str | Sequence[str], count: int) -> NDArray[np.int64]:
     """The hand of every trial and goal; ValueError where they do not fit the task."""
-    each = [hands] if isinstance(hands, str) else list(hands)
+    several = isinstance(hands, Iterable) and not isinstance(hands, str)
+    each: list[Any] = list(hands) if several else [hands]
+    letters = set(letters_of(task.hands))
     codes: dict[str, list[int]] = {}
-    for sequence in dict.fromkeys(each):
-        names = hands_of(sequence)
-        if len(names) != len(task.goals) or not set(names) <= set(task.hands):
-            raise ValueError(f"hands {sequence!r} do not fit task {task.name!r}")
-        codes[sequence] = [HANDS.index(hand) for hand in names]
-    if isinstance(hands, str):
-        each *= count
-    if len(each) != count:
+    for sequence in each:
+        if not isinstance(sequence, str) or sequence not in codes:
+            fits = isinstance(sequence, str) and len(sequence) == len(task.goals)
+            if not fits or not set(sequence) <= letters:
+                raise ValueError(f"hands {sequence!r} do not fit task {task.name!r}")
+            codes[sequence] = [HANDS.index(hand) for hand in hands_of(sequence)]
+    if several and len(each) != count:
         raise ValueError(f"{len(each)} hand sequences for {count} trials")
-    rows = np.array([codes[sequence] for sequence in each], dtype=np.int64)
-    return rows.reshape(count, len(task.goals))
+    rows = [codes[sequence] for sequence in (each if several else each * count)]
+    return np.array(rows, dtype=np.int64).reshape(count, len(task.goals))
 
 
 def _checked_targets(task: Task, targets: Array) -> Array:
