@@ -1,13 +1,12 @@
 """How fast the compiled learner is, how fast it could be, and how that grows.
 
 ``python -m coartic.benchmarks.speed`` measures in one run, on the cells of suite ``paper`` at
-full size,
-microseconds a trial and core of: the step-by-step loop in plain NumPy (on a few trials of every
-cell, whose rewards have to be equal; its cost per trial hardly changes with learning); the
-compiled kernel with one run at a time; the same with the runs of the cell side by side; and the
-floor, which is what cannot be left out: the forward kinematics that the rules of a movement and
-of the corrective process ask for, at the price of one evaluation among full lanes, and the random
-numbers. ``--repeats`` gives the spread.
+full size, microseconds of processor time a trial of: the step-by-step loop in plain NumPy (on a
+few trials of every cell, whose rewards have to be equal; its cost per trial hardly changes with
+learning); the compiled kernel with one run at a time; the same with the runs of the cell side by
+side; with as many as fill the lanes; and the floor, which is what cannot be left out: the forward
+kinematics that the rules of a movement and of the corrective process ask for, at the price of one
+evaluation among full lanes, and the random numbers. ``--repeats`` gives the spread.
 """
 
 from __future__ import annotations
@@ -58,20 +57,22 @@ class Prices:
 
 @dataclass(frozen=True)
 class Times:
-    """Microseconds a trial and core of one cell."""
+    """Microseconds of processor time a trial of one cell."""
 
     name: str
     numpy: float
     alone: float
     together: float
+    full: float
     floor: float
 
     def row(self) -> str:
         """A line of the table."""
-        ratios = (self.numpy / self.together, self.alone / self.together)
         return (
-            f"{self.name:18}{self.numpy:10.0f}{self.alone:10.2f}{self.together:10.2f}"
-            f"{self.floor:10.2f}{ratios[0]:12.0f}{ratios[1]:9.2f}{self.together / self.floor:9.2f}"
+            f"{self.name:18}{self.numpy:8.0f}{self.alone:9.2f}{self.together:9.2f}"
+            f"{self.full:9.2f}{self.floor:8.2f}{self.numpy / self.together:12.0f}"
+            f"{self.alone / self.together:10.2f}{self.together / self.floor:12.2f}"
+            f"{self.full / self.floor:11.2f}"
         )
 
 
@@ -91,7 +92,9 @@ def main() -> None:
     print("compiling, unless it was done before ...", flush=True)
     warm_up()
     for number in range(repeats):
-        print(f"\nMeasurement {number + 1} of {repeats}, microseconds a trial and core:\n")
+        print(
+            f"\nMeasurement {number + 1} of {repeats}, microseconds of processor time a trial:\n"
+        )
         _print_cells(suite, cells, trials)
     _print_growth()
 
@@ -100,15 +103,15 @@ def _print_cells(
     suite: Suite, cells: Sequence[tuple[Task, ExplorationCondition]], trials: int
 ) -> None:
     print(
-        f"{'cell':18}{'NumPy':>10}{'one run':>10}{f'{suite.runs} runs':>10}{'floor':>10}"
-        f"{'NumPy/runs':>12}{'one/runs':>9}{'runs/floor':>11}"
+        f"{'cell':18}{'NumPy':>8}{'one run':>9}{f'{suite.runs} runs':>9}{f'{LANES} runs':>9}"
+        f"{'floor':>8}{'NumPy/runs':>12}{'one/runs':>10}{'runs/floor':>12}{'full/floor':>11}"
     )
     prices = _prices(Robot())
     times = []
     for task, condition in cells:
         times.append(_times(task, condition, trials, suite.runs, prices))
         print(times[-1].row(), flush=True)
-    names = ("numpy", "alone", "together", "floor")
+    names = ("numpy", "alone", "together", "full", "floor")
     total = Times("all", *(sum(getattr(row, name) for row in times) for name in names))
     print(total.row())
     print(
@@ -129,11 +132,12 @@ def _print_cells(
 def _times(
     task: Task, condition: ExplorationCondition, trials: int, runs: int, prices: Prices
 ) -> Times:
-    clock = time.perf_counter()
+    clock = time.thread_time()
     slow = reference.learn(task, condition, seed=0, trials=SLOW_TRIALS)
-    slow_us = (time.perf_counter() - clock) / SLOW_TRIALS * 1e6
+    slow_us = (time.thread_time() - clock) / SLOW_TRIALS * 1e6
     (alone,) = learn_many(task, condition, seeds=[0], trials=trials, jobs=1)
     together = learn_many(task, condition, seeds=range(runs), trials=trials, jobs=1)
+    full = learn_many(task, condition, seeds=range(LANES), trials=trials, jobs=1)
     name = f"{task.name} {condition.id}"
     if not np.array_equal(alone.rewards[:SLOW_TRIALS], slow.rewards) or not np.array_equal(
         alone.rewards, together[0].rewards
@@ -143,10 +147,16 @@ def _times(
     return Times(
         name,
         slow_us,
-        alone.wall_s / trials * 1e6,
-        sum(run.wall_s for run in together) / runs / trials * 1e6,
+        _us([alone]),
+        _us(together),
+        _us(full),
         sum(floors) / runs,
     )
+
+
+def _us(runs: Sequence[LearningRun]) -> float:
+    """Microseconds of one core that a trial of a run took."""
+    return sum(run.cpu_s for run in runs) / sum(len(run.rewards) for run in runs) * 1e6
 
 
 def _suite(suite: Suite, trials: int) -> tuple[float, float, float]:
@@ -177,11 +187,11 @@ def _suite(suite: Suite, trials: int) -> tuple[float, float, float]:
 
 def _print_growth() -> None:
     """How the time of a trial grows, with as many runs side by side as there are lanes."""
-    print(f"\nGrowth, {LANES} runs side by side, microseconds a trial and core:\n")
+    print(f"\nGrowth, {LANES} runs side by side, microseconds of processor time a trial:\n")
     print(f"{'':32}{'a trial':>10}{'evaluations':>13}{'ns each':>10}")
     for name, task, condition, trials in _grown():
         runs = learn_many(task, condition, seeds=range(LANES), trials=trials, jobs=1)
-        us = sum(run.wall_s for run in runs) / LANES / trials * 1e6
+        us = _us(runs)
         asked = sum(run.counters.forward_kinematics for run in runs) / LANES / trials
         print(f"{name:32}{us:10.2f}{asked:13.1f}{us / asked * 1e3:10.1f}", flush=True)
 
@@ -240,9 +250,9 @@ def _best_ns(act: Callable[[], object]) -> float:
     act()  # compiles
     seconds = []
     for _ in range(_BEST_OF):
-        clock = time.perf_counter()
+        clock = time.thread_time()
         act()
-        seconds.append(time.perf_counter() - clock)
+        seconds.append(time.thread_time() - clock)
     return min(seconds) * 1e9
 
 

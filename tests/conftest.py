@@ -9,6 +9,7 @@ import sys
 import pytest
 from filelock import FileLock
 from hypothesis import settings
+from joblib import cpu_count
 
 from coartic.benchmarks.guard import THREADS
 
@@ -158,8 +159,20 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """One more than there are cores: some tests wait, for processes or for a clock."""
+    return cpu_count() + 1
+
+
 def pytest_collection_finish():
     """What is imported and collected stays: looking through it again and again takes long."""
     gc.freeze()
     gc.set_threshold(100_000, 50, 1_000)
     gc.enable()
+
+
+def pytest_unconfigure():
+    """pytest looks five times for garbage that says something when it goes: once is enough."""
+    gc.collect()
+    gc.freeze()
