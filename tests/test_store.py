@@ -305,17 +305,21 @@ def test_packs_are_bounded(tmp_path, monkeypatch):
     assert [list(read_pack(path)) for path in packs_of(tmp_path)] == [[r.run_id] for r in records]
 
 
-PLANNED, RECORDS = done()
+@pytest.fixture(scope="module")
+def made():
+    """As :func:`done`, once."""
+    return done()
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_a_damaged_pack_loses_the_damaged_lines_alone(data, tmp_path):
+def test_a_damaged_pack_loses_the_damaged_lines_alone(data, made, tmp_path):
     """Wherever a byte is changed or the pack is cut."""
+    planned, records = made
     folder = tmp_path / uuid.uuid4().hex
     store = Store(folder)
     with store.locked():
-        store.write(RECORDS)
+        store.write(records)
     (path,) = packs_of(folder)
     content = path.read_bytes()
     at = data.draw(st.integers(0, len(content) - 1), label="at")
@@ -332,12 +336,12 @@ def test_a_damaged_pack_loses_the_damaged_lines_alone(data, tmp_path):
         elif common and line in found:
             whole.add(line.split(b" ")[0].decode())
     with store.locked():
-        known = list(store.read_known([spec.run_id for spec in PLANNED]))
+        known = list(store.read_known([spec.run_id for spec in planned]))
         kept = {r.run_id: r for r in known if not isinstance(r, Damage)}
         for damage in known:
             if isinstance(damage, Damage):
                 store.set_aside(damage)
-    assert kept == {r.run_id: r for r in RECORDS if r.run_id in kept}
+    assert kept == {r.run_id: r for r in records if r.run_id in kept}
     assert kept.keys() >= whole
     assert dict(store.packs()) == kept
     assert not store.packs().damaged
@@ -350,14 +354,15 @@ class KilledError(BaseException):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_any_sequence_of_writes_and_kills(data, tmp_path):
+def test_any_sequence_of_writes_and_kills(data, made, tmp_path):
     """What was written last of a run is what is there, or what was there before the kill."""
+    _, records = made
     folder = tmp_path / uuid.uuid4().hex
     now: dict[str, tuple[object, ...]] = {}
     steps = data.draw(
         st.lists(
             st.tuples(
-                st.lists(st.sampled_from(RECORDS), min_size=1, max_size=4, unique_by=id),
+                st.lists(st.sampled_from(records), min_size=1, max_size=4, unique_by=id),
                 st.sampled_from([None, "write", "rename", "rename done", "drop"]),
             ),
             min_size=1,
