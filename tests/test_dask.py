@@ -11,7 +11,6 @@ import queue
 import re
 import signal
 import socket
-import sys
 import threading
 import time
 from contextlib import contextmanager, suppress

@@ -15,7 +15,7 @@ from coartic.benchmarks.specification import Limits
 from coartic.benchmarks.store import Store
 from coartic.compiled import entry
 from coartic.corrective import _errors
-from coartic.lanes import LANES, board, ends_of, lanes_for, near, place
+from coartic.lanes import LANES, board, lanes_for, near, place
 from coartic.movement import Goal
 from coartic.trigonometry import LARGEST
 from tests.support.strategies import UNEVEN

@@ -1,4 +1,4 @@
-"""``python -m tests.support.caller ADDRESSES`` calls a Dask scheduler at each, a JSON list of them.
+"""``python -m tests.support.caller ADDRESSES`` calls a Dask scheduler at each of a JSON list.
 
 It prints a line for each that there is none at: what was said, and seconds.
 """
