@@ -123,7 +123,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     found = dict(_built_in())
 
     def add(foreign: Foreign, origin: str) -> None:
-        origin = plain(origin, LONGEST_LINE)
+        origin, code = plain(origin, LONGEST_LINE), ""
         for declaration in _described(foreign, origin):
             name = declaration.name
             if name.startswith(RESERVED):
@@ -135,7 +135,8 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
                 raise MethodFileError(
                     f"{origin}: method id {name!r} is already taken ({found[name].origin})"
                 )
-            found[name] = Entry(declaration, origin, foreign_code(foreign), foreign)
+            code = code or foreign_code(foreign)  # of all methods of a file
+            found[name] = Entry(declaration, origin, code, foreign)
 
     for point in metadata.entry_points(group=ENTRY_POINTS):
         origin = f"plug-in {point.dist.name if point.dist else point.value}"

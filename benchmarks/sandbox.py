@@ -40,6 +40,7 @@ LAST_WORDS = 4096
 _END_LIMIT_S = 10.0
 _CHUNK = 1 << 20  # bytes read at once: each read waits for whoever is busy here
 _LOOK_S = 0.1  # between looks at the clock
+_LAST_S = 1.0  # for what a process had said when it ended
 _RETRIES = 2  # fresh processes for a run whose process was killed
 _START_LIMIT_S = 300.0  # imports and a cold compilation, on a slow machine
 
@@ -188,14 +189,14 @@ class Sandbox:
     def _last_answer(self) -> bytes | None:
         """What was said before the end, if it was."""
         try:
-            return self._answers.get(timeout=1.0)
+            return self._answers.get(timeout=_LAST_S)
         except queue.Empty:  # somebody else holds the stream open
             return None
 
     def _end_of_worker(self, wall_s: float) -> Failure:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._guard.wait(_END_LIMIT_S)  # it closed its output: it is ending
-        self._listener.join(1.0)
+        self._listener.join(_LAST_S)
         code = self._guard.poll()
         number = 0 if code is None else code - 128 if code > 128 else -code if code < 0 else 0
         how = f"killed by {_signal_name(number)}" if number else f"exit code {code or 0}"

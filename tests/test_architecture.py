@@ -81,15 +81,8 @@ from coartic import *
 from pkgutil import iter_modules
 modules = {module.name for module in iter_modules(coartic.__path__)}
 assert not modules & set(coartic.__all__), "a module would hide what has its name"
+print("public", flush=True)
 """
-
-
-def test_the_package_imports_what_is_asked_for():
-    """Every public name is there, under its own name whatever is imported first."""
-    done = subprocess.run(
-        [sys.executable, "-c", PUBLIC], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
 
 
 def test_help_needs_no_compiler():
@@ -175,11 +168,22 @@ assert load_results(report.folder).runs.reward.tolist() == [record.solution.rewa
 """
 
 
-def test_nothing_needs_what_posix_alone_has(tmp_path):
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    """How both programs end in one process, which imports all libraries."""
+    out = tmp_path_factory.mktemp("fresh") / "out"
+    command = [sys.executable, "-c", PUBLIC + WITHOUT_POSIX, out, "coartic"]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_the_package_imports_what_is_asked_for(fresh):
+    """Every public name is there, under its own name whatever is imported first."""
+    assert fresh.stdout.startswith("public\n"), fresh.stderr
+
+
+def test_nothing_needs_what_posix_alone_has(fresh):
     """As on Windows: modules are imported, a suite is planned, a record kept and read."""
-    command = [sys.executable, "-c", WITHOUT_POSIX, tmp_path / "out", "coartic"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    assert fresh.returncode == 0, fresh.stderr
 
 
 def test_git_ignores_no_source():

@@ -11,8 +11,6 @@ import queue
 import re
 import signal
 import socket
-import subprocess
-import sys
 import threading
 import time
 from contextlib import contextmanager, suppress
@@ -33,12 +31,13 @@ LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 
 
 SCHEDULER, WORKER = "distributed.cli.dask_scheduler", "distributed.cli.dask_worker"
+CALLER = "tests.support.caller"
 
 
 @pytest.fixture(scope="module")
 def nursery():
     """Schedulers and workers begin as forks: to import Dask takes longer than all they do."""
-    found = Nursery((SCHEDULER, WORKER, "coartic.benchmarks.cluster"))
+    found = Nursery((SCHEDULER, WORKER, CALLER))
     yield found
     found.close()
 
@@ -355,6 +354,7 @@ def other_services():
         web.shutdown()
 
 
+CALLERS = 4  # at once: they wait more than they do
 PORT = "missing port number"
 SCHEME = "unknown address scheme"
 NAMED = "Name or service not known|Servname not supported|No address|name resolution"
@@ -384,33 +384,25 @@ WRONG_ADDRESSES = {  # and what is said of them
 }
 
 
-def test_wrong_addresses_get_a_sentence_each_and_nothing_else():
-    program = """if True:
-        import json, sys, time
-        from coartic.benchmarks.cluster import Dask
-        from coartic import CoarticError
-        for address in json.loads(sys.argv[1]):
-            clock = time.monotonic()
-            try:
-                list(Dask(address, scheduler_s=0.5).perform([{"run_id": "0"}]))
-            except CoarticError as error:
-                print(json.dumps([str(error), time.monotonic() - clock]))
-    """
+def test_wrong_addresses_get_a_sentence_each_and_nothing_else(nursery, tmp_path):
     with other_services() as ports:
         places = {name: f"127.0.0.1:{port}" for name, port in ports.items()}
         addresses = [
             re.sub(r"\{(\w+)\}", lambda found: places[found[1]], address)
             for address in WRONG_ADDRESSES
         ]
-        done = subprocess.run(
-            [sys.executable, "-c", program, json.dumps(addresses)],
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-    assert (done.returncode, done.stderr) == (0, "")
-    said = [json.loads(line) for line in done.stdout.splitlines()]
-    for (sentence, seconds), pattern in zip(said, WRONG_ADDRESSES.values(), strict=True):
+        callers = [
+            Process(
+                nursery, tmp_path / f"{first}.log", CALLER, json.dumps(addresses[first::CALLERS]),
+                environment={},
+            )
+            for first in range(CALLERS)
+        ]  # fmt: skip
+        assert [caller.process.wait(120) for caller in callers] == [0] * CALLERS
+    said = [caller.log.read_text(encoding="utf-8").splitlines() for caller in callers]
+    answers = [json.loads(said[n % CALLERS].pop(0)) for n in range(len(addresses))]
+    assert not any(said)
+    for (sentence, seconds), pattern in zip(answers, WRONG_ADDRESSES.values(), strict=True):
         assert re.match(f"no Dask scheduler at .*({pattern})", sentence), sentence
         assert sentence.isprintable()
         assert len(sentence) < 700

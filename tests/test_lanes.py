@@ -14,8 +14,8 @@ from coartic.benchmarks.sandbox import failure
 from coartic.benchmarks.specification import Limits
 from coartic.benchmarks.store import Store
 from coartic.compiled import entry
-from coartic.corrective import Corrector, correct_lanes
-from coartic.lanes import LANES, board, ends_of, lanes_for, near, place
+from coartic.corrective import _errors
+from coartic.lanes import LANES, board, lanes_for, near, place
 from coartic.movement import Goal
 from coartic.trigonometry import LARGEST
 from tests.support.strategies import UNEVEN
@@ -104,8 +104,10 @@ def test_lanes_do_not_mix(count, far):
 
 
 @njit
-def _correct_some(lanes, count, goal, how, model, found, ends):
-    correct_lanes(lanes, count, goal, how, model, found, ends)
+def _seen(at, count, goal, square):
+    """As corrections begin each of their steps; all of one takes seconds to compile."""
+    place(at, count, near(at, count))
+    _errors(at, count, goal, square)
 
 
 def vectors():
@@ -120,13 +122,11 @@ def vectors():
 @pytest.mark.skipif(not vectors(), reason="no vector instructions that this test knows")
 def test_the_listing_holds_vector_instructions():
     robot, task = Robot(left_links=(0.8,) * 5, right_links=(0.8,) * 5), load_task("ascending")
-    lanes, ends, found = lanes_for(robot), ends_of(2), np.zeros((2, robot.dof))
+    lanes, goal = lanes_for(robot), Goal(*task.goal_array[0], task.radius)
     for lane in range(2):
-        _board(lanes, lane, lane, found[lane] + 0.1, robot.arm("right"))
-    goal = Goal(*task.goal_array[0], task.radius)
-    _correct_some(lanes, 2, goal, Corrector(True, True, 0.0), PAPER, found, ends)
-    assert ends.converged.all()
-    listing = _correct_some.inspect_asm(_correct_some.signatures[-1])  # takes as long as compiling
+        _board(lanes, lane, lane, np.zeros(robot.dof), robot.arm("right"))
+    _seen(lanes.at, 2, goal, np.inf)
+    listing = _seen.inspect_asm(_seen.signatures[-1])  # takes as long as compiling
     registers = vectors()
     found = [line.split() for line in listing.splitlines() if any(v in line for v in registers)]
     on_vectors = [words[0] for words in found]

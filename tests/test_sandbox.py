@@ -97,8 +97,9 @@ def test_a_killed_worker_is_a_crash_with_its_signal(known):
 
 
 @pytest.mark.usefixtures("sandboxes_by_themselves")
-def test_a_worker_does_not_outlive_its_guard():
+def test_a_worker_does_not_outlive_its_guard(monkeypatch):
     """Nor does what went away from below it, which is told by its mark."""
+    monkeypatch.setattr(sandbox, "_LAST_S", 0.1)  # the worker holds its stream open
     own = Sandbox()
     (worker,) = map(psutil.Process, workers())
     mark = {sandbox.MARK: worker.environ()[sandbox.MARK]}
@@ -275,7 +276,7 @@ def test_what_a_method_starts_ends_with_it(known, tmp_path):
     """Also where it has left for a session of its own, and whether its run ends or is ended."""
     store = Store(tmp_path)
     left = spec_of(known, "test/leaver")
-    stayed = spec_of(known, "test/stayer", Limits(1.0))
+    stayed = spec_of(known, "test/stayer", Limits(0.5))
     perform_plan([*left, *stayed], store, Local(1))
     assert [store.read(spec.run_id).status for spec in (*left, *stayed)] == ["ok", "timeout"]
     close_all()

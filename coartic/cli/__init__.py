@@ -84,9 +84,19 @@ def main() -> None:
         raise
     except OSError as error:
         complain("error", str(error.strerror or error))
+        _flush_or_drop()
         sys.exit(1)
     finally:
         signal.signal(signal.SIGINT, interrupted)
+
+
+def _flush_or_drop() -> None:
+    """What cannot be written is dropped: Python would try, fail and complain as it ends."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _check_arguments() -> None:

@@ -815,7 +815,7 @@ def _make_cases() -> list[Case]:
         case("surroundings", f"module {name}", ("list",), "Tasks", code=0,
              files={f"{name}.py": "raise ImportError\n"})  # fmt: skip
     full = "No space left on device"
-    case("surroundings", "output is full", ("cite",), full, shell="> /dev/full", code=1)
+    case("surroundings", "output is full", ("--version",), full, shell="> /dev/full", code=1)
     case("surroundings", "output is closed", ("--version",), "", shell=">&-", code=0)
     case("surroundings", "errors are closed", ("--version",), "coartic ", shell="2>&-", code=0)
     return found
@@ -837,6 +837,7 @@ def attack(root: Path, cases: Sequence[str] = (), *, words: bool = True) -> list
         (folder / "cases.json").write_text(json.dumps(list(cases)), encoding="utf-8")
         with (folder / "failed.txt").open("w+") as failed:
             if _is_loaded(root):
+                _import_all()  # not in the fork, which would take it along
                 code = _forked(folder, env, failed.fileno())
             else:
                 command = [sys.executable, "-P", __file__, "--here"]
@@ -914,10 +915,14 @@ _COMMANDS_IMPORT = (
 )
 
 
-def _here() -> None:
+def _import_all() -> None:
     for module in _COMMANDS_IMPORT:
         with contextlib.suppress(ImportError):  # of another version
             importlib.import_module(module)
+
+
+def _here() -> None:
+    _import_all()
     line: Any = importlib.import_module("coartic.cli")
     if hasattr(line, "app"):  # put together once, not for every case
         from typer.main import get_command

@@ -11,12 +11,14 @@ import pytest
 from filelock import FileLock
 
 import coartic.benchmarks.executors
+import coartic.cli
 from coartic import PAPER, CoarticError
 from coartic.analysis.results.folder import load_results
 from coartic.analysis.results.laws import read_manifest
 from coartic.benchmarks.store import Store
 from coartic.benchmarks.tables import write_tables
 from coartic.scores import solved
+from tests.support.commands import ready
 from tests.support.suites import InProcess
 
 from .checkout import PART_OF_A_FOLDER, Ended, in_process
@@ -50,6 +52,14 @@ to end with it."""
 REFUSED = ("import/exit-0", "name/learner", "name/escape", "told/none")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _ready():
+    """The command line, put together once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(coartic.cli, "app", ready())
+        yield
+
+
 @pytest.fixture(scope="module")
 def whole(session_folder):
     """Made by the first worker for all."""
@@ -73,7 +83,7 @@ def copied(whole, tmp_path):
     def copy():
         folder = tmp_path / "results"
         shutil.rmtree(folder, ignore_errors=True)
-        return shutil.copytree(whole, folder)
+        return shutil.copytree(whole, folder, copy_function=shutil.copyfile)
 
     return copy
 
