@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,6 @@ from hypothesis.extra.numpy import arrays
 
 from coartic import load_task
 from coartic.analysis import study
-from coartic.analysis.comparisons import versions
 from coartic.analysis.figures.register import SECTIONS
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.signatures.context import context_dependence, distance, permutation_p
@@ -102,16 +100,6 @@ def folders(tmp_path_factory):
 def shown(text):
     """A text without the folders' own names."""
     return "\n".join(line for line in text.splitlines() if " runs: " not in line)
-
-
-@pytest.fixture(scope="module")
-def read_once():
-    """Commands one after the other read a folder once: what they find in it is found once."""
-    once = cache(study.load)
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (study, versions):
-            patch.setattr(module, "load", once)
-        yield
 
 
 @pytest.mark.parametrize("name", FOLDERS)
