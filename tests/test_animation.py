@@ -128,8 +128,8 @@ def test_nothing_leaves_the_picture(moves):
 
 def test_gif(moves, tmp_path):
     panels = [Panel("a", moves), Panel("b", initial(load_task("ascending")))]
-    timed = animate(panels, tmp_path / "a.gif", speed=600, width=300)
-    animate(panels, tmp_path / "b.gif", speed=600, width=300)
+    timed = animate(panels, tmp_path / "a.gif", speed=2000, width=300)
+    animate(panels, tmp_path / "b.gif", speed=2000, width=300)
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
     with Image.open(tmp_path / "a.gif") as film:
         assert film.width == 300

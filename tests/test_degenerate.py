@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,6 @@ from hypothesis.extra.numpy import arrays
 
 from coartic import load_task
 from coartic.analysis import study
-from coartic.analysis.comparisons import versions
 from coartic.analysis.figures.register import SECTIONS
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.signatures.context import context_dependence, distance, permutation_p
@@ -63,7 +61,7 @@ methods = ["optimum/dynamic-programming"]
 parameters = { nodes = 10, graphs = 1, chains = 1 }
 """
 FOLDERS = {
-    "one run": "paper --runs 1 --trials 20 --tasks ascending,descending",
+    "one run of one trial": "paper --runs 1 --trials 1 --tasks ascending,descending",
     "two runs of two trials": "paper --runs 2 --trials 2 --tasks two-armed-2",
     "all equal": "equal.toml",
     "all failed": "paper --runs 3 --trials 3 --task-file stuck.toml --tasks stuck",
@@ -71,7 +69,6 @@ FOLDERS = {
     "--methods EC1,random-search/climbing",
     "one method": "quick --tasks ascending,two-armed-1 --methods corrective-alone/given",
     "one cell": "paper --runs 3 --trials 20 --tasks ascending",
-    "one of all": "paper --runs 1 --trials 1 --tasks ascending",
     "optimum alone": "optimum.toml",
 }
 NONSENSE = re.compile(r"\bnan\b|\binf\b|<NA>|\b0 of 0\b")
@@ -104,21 +101,11 @@ def shown(text):
     return "\n".join(line for line in text.splitlines() if " runs: " not in line)
 
 
-@pytest.fixture(scope="module")
-def read_once():
-    """Commands one after the other read a folder once: what they find in it is found once."""
-    once = cache(study.load)
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (study, versions):
-            patch.setattr(module, "load", once)
-        yield
-
-
 @pytest.mark.parametrize("name", FOLDERS)
 @pytest.mark.usefixtures("in_this_process", "undrawn", "read_once")
 def test_every_command(name, folders, monkeypatch, capsys, tmp_path):
     folder = folders(name, monkeypatch, capsys)
-    other = folders("one of all", monkeypatch, capsys)
+    other = folders("one run of one trial", monkeypatch, capsys)
     copy = shutil.copytree(folder, tmp_path / "copy")
     runs = pd.read_parquet(copy / "runs.parquet")
     run, solved = runs.run_id.iloc[-1], bool((runs.status == "ok").iloc[-1])

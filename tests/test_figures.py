@@ -145,7 +145,7 @@ def test_wide_figures_are_drawn_one_column_wide_as_well(figures):
     assert widest() == TWO
 
 
-def test_an_unknown_name_gets_an_answer(study):
+def test_an_unknown_name_gets_an_answer(study, alone):
     with pytest.raises(KeyError, match="no figure 'learned'; did you mean 'learned-reward'"):
         study.figures["learned"]
     with pytest.raises(KeyError, match="no figure 0; there are"):
@@ -153,9 +153,9 @@ def test_an_unknown_name_gets_an_answer(study):
     assert 0 not in study.figures
     assert repr(study.figures).startswith("Figures by id, of Study of ")
     with pytest.raises(KeyError, match="no table 'claim'; did you mean 'claims'"):
-        study.tables["claim"]
+        alone.tables["claim"]
     with pytest.raises(KeyError, match="no table 0; `list"):
-        study.tables[0]
+        alone.tables[0]
 
 
 def test_every_figure_has_its_row_and_its_section(figures):

@@ -407,6 +407,12 @@ def hostile(tmp_path_factory):
     return named(replace(results, runs=runs))
 
 
+@pytest.fixture(scope="module")
+def study(hostile):
+    """What is computed of it, each once."""
+    return Study(hostile)
+
+
 def words_alone(source):
     """Every inline of a page holds text, our own marks and links within the page at most."""
     allowed = {"text", "softbreak", "hardbreak", "code_inline", "em_open", "em_close"}
@@ -434,10 +440,10 @@ def words_alone(source):
 SIGN = "alert(1)</script>"  # of EVIL: it must be seen as what it is
 
 
-def test_comparison_page(hostile):
+def test_comparison_page(study, hostile):
     rows = {
         key: replace(row, beaten=1, corrections=2, told="G")
-        for key, row in Study(hostile).method_rows.items()
+        for key, row in study.method_rows.items()
     }
     page = to_markdown(comparison_document(MadeUp(hostile, method_rows=rows)), tables="")
     assert page.count("is better than the optimum") == len(rows)
@@ -450,8 +456,8 @@ def printable(text):
     return all(c == "\n" or c.isprintable() or unicodedata.category(c) == "Zs" for c in text)
 
 
-def test_analyse(hostile, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(coartic.analysis.study, "load_results", lambda folder: hostile)
+def test_analyse(study, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(coartic.analysis.study, "load", lambda folder: study)
     code, out, error = call(monkeypatch, capsys, "analyse", tmp_path)
     assert (code, error) == (0, "")
     assert printable(out)
@@ -495,9 +501,9 @@ def test_compare(hostile, monkeypatch, capsys, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def report(hostile, tmp_path_factory):
+def report(study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign") / "report"
-    return report_of(Study(hostile), folder)
+    return report_of(study, folder)
 
 
 def test_report_page(report):

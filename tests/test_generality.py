@@ -29,7 +29,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.words import true_minus
 from coartic.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
-from tests.support.reports import document_of, without_figures
+from tests.support.reports import document_of, undrawn, without_figures
 from tests.support.suites import run_and_write, suite_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -384,7 +384,7 @@ def folder(tmp_path_factory):
 
 def test_a_small_folder_through_a_report(folder):
     study = Study(folder)
-    with without_figures(but=OWN_FIGURES):
+    with undrawn(), without_figures(but=OWN_FIGURES):
         document = build(study).document
     assert [figure.id for figure in document.figures()] == list(OWN_FIGURES)
     (section,) = [s for s in document.sections if s.id == "families"]
@@ -416,7 +416,7 @@ def test_many_instances_alone_are_reported_together(folder, monkeypatch):
 
 
 def test_a_folder_without_instances_has_no_such_section(traced):
-    study = Study(traced.results)
+    study = traced
     assert study.instances is None
     assert study.contrasts == []
     with without_figures(but=OWN_FIGURES):

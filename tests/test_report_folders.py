@@ -92,8 +92,14 @@ def odd(tmp_path_factory):
     return with_environment(folder)
 
 
-def test_odd_names_one_run_and_no_optimum(odd, tmp_path, few_figures):
-    of = Study(odd)
+@pytest.fixture(scope="module")
+def of_odd(odd):
+    """What is computed of it, each once."""
+    return Study(odd)
+
+
+def test_odd_names_one_run_and_no_optimum(of_odd, tmp_path, few_figures):
+    of = of_odd
     folder = report_of(of, tmp_path / "report")
     page = (folder / "report.md").read_text(encoding="utf-8")
     assert "None is known of shelf-2, shelf.2, A\\_b" in page.replace("A_b", "A\\_b")
@@ -108,9 +114,9 @@ def test_odd_names_one_run_and_no_optimum(odd, tmp_path, few_figures):
     compiled(folder)
 
 
-def test_macros_that_run_together_are_told_apart(odd, monkeypatch):
+def test_macros_that_run_together_are_told_apart(odd, of_odd, monkeypatch):
     """As task a with method b-c and task a-b with method c would: all ABC."""
-    of = Study(odd)
+    of = of_odd
     labels = macro_names(of).labels
     same = Names(dict.fromkeys(odd.tasks, "X"), labels)
     monkeypatch.setattr(coartic.analysis.report.headlines, "macro_names", lambda of: same)
@@ -186,7 +192,7 @@ def test_labels_with_commas_are_quoted():
     assert labels_in(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
 
 
-def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, few_figures):
+def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, few_figures, read_once):
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").write_text("x")
     assert "not a results folder" in refused(monkeypatch, capsys, "report", tmp_path / "empty")
@@ -229,7 +235,7 @@ def everything(folder):
 
 
 def test_a_report_is_made_again_where_nobody_changed_it(
-    monkeypatch, capsys, tmp_path, tmp_path_factory, few_figures
+    monkeypatch, capsys, tmp_path, tmp_path_factory, few_figures, read_once
 ):
     home, results = tmp_path / "report", tmp_path_factory.mktemp("small")
     run_and_write(results, [Cell(tiny_task(), KNOWN["dual-process/EC4"])], runs=1, trials=5)
@@ -261,11 +267,11 @@ def test_damaged_folders(name, monkeypatch, capsys, tmp_path, odd, undrawn):
     assert not (folder / "report").exists()
 
 
-def test_many_tasks_make_a_short_report(monkeypatch, odd, undrawn):
+def test_many_tasks_make_a_short_report(monkeypatch, of_odd, undrawn):
     monkeypatch.setattr(coartic.analysis.report.build, "MOST_TASKS", 5)
     own = [row for row in register.REGISTER if row.name == "signatures"]
     monkeypatch.setattr(register, "REGISTER", own)
-    document = build(Study(odd)).document
+    document = build(of_odd).document
     kinds = {table.id.partition("-")[0] for table in document.tables()}
     assert kinds >= {"methods", "tasks"}
     assert not kinds & {"pairs", "costs", "targets", "areas", "pareto", "claims"}
@@ -275,8 +281,8 @@ def test_many_tasks_make_a_short_report(monkeypatch, odd, undrawn):
     )
 
 
-def test_tables_of_a_study_are_those_of_its_report(odd, few_figures):
-    study = Study(odd)
+def test_tables_of_a_study_are_those_of_its_report(of_odd, few_figures):
+    study = of_odd
     document, tables = build(study).document, study.tables
     assert list(tables) == [table.id for table in document.tables()]
     for table in document.tables():

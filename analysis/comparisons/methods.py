@@ -110,7 +110,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
     ``runs`` have a solution. Their whole time stands for methods that mark no solving.
     """
-    warm = runs.warm.astype("boolean").fillna(False).astype(bool)
+    warm = runs.warm.to_numpy(dtype=bool, na_value=False)
     times: pd.Series = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     return times[warm] if warm.any() else times
 

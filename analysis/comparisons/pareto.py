@@ -126,6 +126,8 @@ def _spent(cell: CellRuns, spend: str, told: int) -> Array:
 
 def _median(values: Array) -> Array:
     """Median over the last axis of the values that are known; NaN where none is."""
+    if not np.isnan(values).any():
+        return np.asarray(np.median(values, axis=-1))  # the same, in a tenth of the time
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
         return np.asarray(np.nanmedian(values, axis=-1))

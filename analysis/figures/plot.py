@@ -8,11 +8,11 @@ import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.text import Text
 from PIL import Image
 
@@ -33,6 +33,7 @@ _NO_DATE = {
     ".svg": {"Date": None},
     ".png": {"Software": None},
 }
+_NO_LAYOUT: Any = {"figure.autolayout": False, "figure.constrained_layout.use": False}
 _COLOURS = 256
 _FAMILY = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _WORDS: dict[str, dict[str, str]] = stated(__file__, "words")
@@ -164,13 +165,15 @@ def _smaller(stream: io.BytesIO, ending: str) -> bytes:
 
 
 def _settle(figure: Figure) -> None:
-    """Lay the figure out once, for all formats, with words that print."""
-    if isinstance(engine := figure.get_layout_engine(), PlaceHolderLayoutEngine):
-        return
+    """Lay the figure out once, for all formats, with words that print.
+
+    It has no layout engine then: with one, every file would draw all twice.
+    """
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         text.set_text("\n".join(map(printed, text.get_text().split("\n"))))
-    if engine is not None:
+    if (engine := figure.get_layout_engine()) is not None:
         for _ in range(2):  # the first time does not know how tall titles are
-            figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+            engine.execute(figure)
+        with rc_context(_NO_LAYOUT):
+            figure.set_layout_engine(None)

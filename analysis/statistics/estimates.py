@@ -86,9 +86,17 @@ def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Ar
 
     Raises ValueError where a seed occurs twice in one of them.
     """
-    a, b = (runs[["seed", "reward"]] for runs in (first, second))
-    both = a.merge(b, on="seed", validate="one_to_one").dropna()
-    return both.reward_x.to_numpy(dtype=np.float64), both.reward_y.to_numpy(dtype=np.float64)
+    a, b = (runs.seed.to_numpy() for runs in (first, second))
+    if len(np.unique(a)) < len(a) or len(np.unique(b)) < len(b):
+        raise ValueError("seeds are not one-to-one: one occurs twice")
+    _, *places = np.intersect1d(a, b, assume_unique=True, return_indices=True)
+    order = np.argsort(places[0])
+    x, y = (
+        runs.reward.to_numpy(dtype=np.float64, na_value=np.nan)[own[order]]
+        for runs, own in zip((first, second), places, strict=True)
+    )
+    known = ~(np.isnan(x) | np.isnan(y))
+    return x[known], y[known]
 
 
 def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
