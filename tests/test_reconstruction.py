@@ -251,7 +251,7 @@ def test_a_chance_is_that_of_the_rounded_figures() -> None:
     rewards = np.round(rng.normal(-300.0, 3.0, 1000))
     figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
     (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
-    drawn = rng.choice(rewards, (200_000, 20))
+    drawn = rng.choice(rewards, (60_000, 20))
     alike = (np.round(drawn.mean(axis=1)) == -301) & (
         np.round(drawn.std(axis=1, ddof=1), 1) == 2.9
     )
