@@ -218,7 +218,7 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         to_second, _ = KDTree(second[:, moving]).query(first[:, moving])
         least = min(least, (to_first + to_second).min())
     # In steps; the grid is not finer than one.
-    found = certify(task, 5000, still=True, model=PAPER, most_nodes=400)
+    found = certify(task, 5000, still=True, model=PAPER, most_nodes=160)
     merged = len(mergeable(task, (None, None)))
     assert found.ticks <= math.ceil(least / PAPER.step) + 2
     assert found.ticks >= math.floor(least / PAPER.step) + 2 - merged - 4

@@ -10,7 +10,14 @@ from pydantic import ValidationError
 
 from coartic import Movement, corrective_trial, learn, reference, trajectory
 from coartic.errors import CoarticError, TaskError
-from coartic.exploration import CONDITIONS, ExplorationCondition, FirstTrial, State, Ties, UnknownTarget
+from coartic.exploration import (
+    CONDITIONS,
+    ExplorationCondition,
+    FirstTrial,
+    State,
+    Ties,
+    UnknownTarget,
+)
 from coartic.model import PAPER, checked_model
 from coartic.movement import follow, path_points
 from coartic.readings import (

@@ -228,7 +228,7 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
 
 def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
-    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 1_000)
+    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 500)
     rng = np.random.default_rng(0)
     own = Learned(rng.normal(-300.0, 3.0, 1000), ("RRR",) * 1000)
 

@@ -120,7 +120,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
         start + 0.1 * rng.standard_normal(start.shape),
         method="SLSQP",
         constraints={"type": "ineq", "fun": inside},
-        options={"maxiter": 500, "ftol": 1e-12},
+        options={"maxiter": 500, "ftol": 1e-10},
     )
     assert min(inside(found.x)) > -1e-8
     assert plan.cost <= found.fun + 1e-5
@@ -224,9 +224,10 @@ def test_whole_ticks_are_what_is_executed():
 @pytest.mark.parametrize("name", ["ascending", "two-armed-2"])
 @pytest.mark.parametrize("other_arm", ["free", "still"])
 def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, name, other_arm):
-    task = load_task(name)
+    task, hands = load_task(name), "given"
+    if name == "two-armed-2":
+        task, hands = changed(name, goals=task.goals[:3], initial_hands="RRR"), "RLR"
     session = Session(task, 0, method.told, trusted=True)
-    hands = {"ascending": "given", "two-armed-2": "RLRR"}[name]
     parameters = method.Parameters(other_arm=other_arm, nodes=40, graphs=1, chains=1, hands=hands)
     result = method(parameters).solve(session)
     execution = execute(task, result.solution)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coartic.analysis.comparisons.methods import STILL, solve_times
+from coartic.analysis.comparisons.methods import STILL, numbers, solve_times
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.results.optima import ARMS, locks_base
 from coartic.robot import Array
@@ -85,12 +85,12 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     limit = study.results.manifest.limits.trials or math.inf
     found = {}
     for cell in study.cells.values():
-        runs = cell.runs.set_index("run_id")
-        totals = runs[list(SPENDS)].astype("Float64")
-        totals["solve_s"] = solve_times(cell.good.set_index("run_id"))
-        table = totals.to_numpy(dtype=np.float64, na_value=np.nan).tolist()
+        runs = cell.runs
+        own_times = solve_times(cell.good).reindex(runs.index)
+        columns = (own_times if name == "solve_s" else runs[name] for name in SPENDS)
+        table = zip(*(numbers(column).tolist() for column in columns), strict=True)
         rows = zip(
-            map(str, runs.index), table, runs.status, runs.reward, runs.parameters, strict=True
+            map(str, runs.run_id), table, runs.status, runs.reward, runs.parameters, strict=True
         )
         for run_id, spent, status, reward, parameters in rows:
             total = dict(zip(SPENDS, spent, strict=True))
