@@ -241,14 +241,14 @@ def test_a_failed_solve_is_an_outcome(monkeypatch):
 def test_solutions_keep_the_rules(method, task, hands):
     """Steps within m, locks kept, every goal hit without correction, hands as given."""
     task = load_task(task)
-    result, execution, session = solve(method, task, hands=hands, period=10)
+    result, execution, session = solve(method, task, hands=hands, period=20)
     assert execution.completed
     assert execution.corrections == 0
     assert execution.hands == hands
     q = task.q0
     for movement, at_hit in zip(result.solution, execution.configurations, strict=True):
         steps = np.diff(np.vstack([q, movement.waypoints]), axis=0)
-        assert np.linalg.norm(steps, axis=1).max() <= 10 * PAPER.step * (1 + 1e-9)
+        assert np.linalg.norm(steps, axis=1).max() <= 20 * PAPER.step * (1 + 1e-9)
         q = at_hit
         if task.locked_base:
             assert (movement.waypoints[:, 1] == task.q0[1]).all()
@@ -311,7 +311,7 @@ def test_an_unreachable_goal_is_infeasible(hands):
         update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
     )
     with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:
-        solve(NextGoal, task, hands=hands, period=10)
+        solve(NextGoal, task, hands=hands, period=20, max_steps=1000)
     assert caught.value.outcome == "infeasible"
 
 

@@ -112,7 +112,7 @@ def search() -> Search:
         RewardIs("LRLR", -532.0),
         BaseMoves("RRRR", 2, 3, "left"),
     )
-    return Search(TASK, layout, constraints, jobs=1, near=60.0)
+    return Search(TASK, layout, constraints, jobs=1, near=45.0)
 
 
 def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
