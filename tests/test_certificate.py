@@ -51,7 +51,7 @@ def feasible(task, hands, rng, reach):
         moving = free.copy()
         moving[task.robot.joints(other)] = False
         q = q + reach * rng.standard_normal(q.shape) * moving
-        for _ in range(60):
+        for _ in range(20):
             miss = np.array(goal) - task.robot.forward_kinematics(q, hand)
             jacobian = task.robot.jacobian(q, hand) * moving
             q = q + jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(2), miss)
@@ -88,7 +88,7 @@ def test_a_relaxation_never_exceeds_a_true_path(name):
     """
     rng = np.random.default_rng(7)
     checked = cut = 0
-    for task, hands, q, length in paths(name):
+    for task, hands, q, length in itertools.islice(paths(name), 0, None, 2):
         for chosen in (hands, undecided(hands, rng)):
             root = Relaxation(task, chosen, (), True)
             box = root.first_box(length)
@@ -146,14 +146,14 @@ def test_the_least_of_a_term_is_exact():
         box = np.stack([low, low + rng.uniform(0, 9, 16)], 1)
         multipliers = Multipliers(rng.standard_normal((4, 10)), rng.standard_normal((4, 2)))
         lagrangian = root.lagrangian(multipliers, 1.0)
-        sampled = np.linspace(*box.T, 4001)
-        true = np.min([lagrangian.at(angles) for angles in sampled], axis=0)
+        sampled = np.linspace(*box.T, 1001)
+        values = np.array([lagrangian.at(angles) for angles in sampled])
+        true = values.min(axis=0)
         least = lagrangian.least(box)
         assert np.all(least <= true + 1e-12)
         assert least == pytest.approx(true, abs=1e-4)
         left = lagrangian.within(box, 0.3)
         gone = (sampled < left[:, 0]) | (sampled > left[:, 1])
-        values = np.array([lagrangian.at(angles) for angles in sampled])
         assert (values[gone] > np.broadcast_to(least + 0.3, values.shape)[gone] - 1e-9).all()
         assert gone.any()
 
@@ -197,7 +197,7 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         layers = []
         for hand, goal in zip(hands, task.goals, strict=True):
             # All angles and points of the disc: the base follows from the hand's x.
-            angle = np.linspace(-3, 4, 7001)
+            angle = np.linspace(-3, 4, 2801)  # a quarter of a step apart
             q = np.zeros((angle.size, 4))
             q[:] = task.q0
             q[:, task.robot.joints(hand)] = angle[:, None]
@@ -218,7 +218,7 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         to_second, _ = KDTree(second[:, moving]).query(first[:, moving])
         least = min(least, (to_first + to_second).min())
     # In steps; the grid is not finer than one.
-    found = certify(task, 5000, still=True, model=PAPER, most_nodes=400)
+    found = certify(task, 5000, still=True, model=PAPER, most_nodes=160)
     merged = len(mergeable(task, (None, None)))
     assert found.ticks <= math.ceil(least / PAPER.step) + 2
     assert found.ticks >= math.floor(least / PAPER.step) + 2 - merged - 4
@@ -246,7 +246,7 @@ def test_nothing_false_is_proven():
 def test_bounds_only_grow_with_the_nodes():
     bounds = [
         certify(load_task("two-armed-1"), 465, still=False, model=PAPER, most_nodes=nodes).ticks
-        for nodes in (60, 160)
+        for nodes in (30, 70)
     ]
     assert bounds == sorted(bounds)
     assert bounds[0] > 400

@@ -35,10 +35,10 @@ def test_errors_are_counted_and_marked():
 def test_populations_have_the_parameters_they_state():
     """Mean by sampling; interquartile mean by its definition on other draws."""
     for population in error_rates.populations():
-        values = np.sort(population.draw(np.random.default_rng(5), 400_000))
+        values = np.sort(population.draw(np.random.default_rng(5), 100_000))
         error = values.std() / np.sqrt(len(values))
         assert values.mean() == pytest.approx(population.mean, abs=5 * error)
-        middle = values[100_000:300_000].mean()
+        middle = values[25_000:75_000].mean()
         assert middle == pytest.approx(population.middle, abs=20 * error)
 
 

@@ -118,12 +118,17 @@ def test_one_row_without_active_limits_is_the_closed_form(solver):
         )
 
 
+@pytest.fixture(scope="module")
+def enumerated():
+    """Problems of discs with their exact solutions."""
+    return [(*problem, exact(*problem)) for problem in problems(10, 5)]
+
+
 @pytest.mark.parametrize("solver", SETTINGS)
-def test_a_disc_without_active_limits_is_the_nearest_by_enumeration(solver):
+def test_a_disc_without_active_limits_is_the_nearest_by_enumeration(solver, enumerated):
     cascade = cascade_for(FACES, ROBOT.dof, solver)
     decided = 0
-    for rows, least, preferred in problems(10, 5):
-        wanted = exact(rows, least, preferred)
+    for rows, least, preferred, wanted in enumerated:
         assert np.abs(wanted).max() < LIMIT
         np.testing.assert_allclose(
             cascade.solve(rows, least, preferred), wanted, atol=1e-6 + 10 * SLACK
@@ -154,9 +159,9 @@ def test_a_modelling_language_gives_the_same(solver):
 
 
 def test_the_method_through_cvxpy_is_the_same_to_the_last_bit():
-    task, found = load_task("ascending"), []
+    task, found = tiny_task(), []
     for modelling in ("none", "cvxpy"):
-        method = NextGoal(NextGoal.Parameters(hands="RRR", period=10, modelling=modelling))
+        method = NextGoal(NextGoal.Parameters(hands="RR", period=10, modelling=modelling))
         session = Session(task, 0, method.told, trusted=True)
         result = method.solve(session)
         found.append(
@@ -236,14 +241,14 @@ def test_a_failed_solve_is_an_outcome(monkeypatch):
 def test_solutions_keep_the_rules(method, task, hands):
     """Steps within m, locks kept, every goal hit without correction, hands as given."""
     task = load_task(task)
-    result, execution, session = solve(method, task, hands=hands, period=10)
+    result, execution, session = solve(method, task, hands=hands, period=20)
     assert execution.completed
     assert execution.corrections == 0
     assert execution.hands == hands
     q = task.q0
     for movement, at_hit in zip(result.solution, execution.configurations, strict=True):
         steps = np.diff(np.vstack([q, movement.waypoints]), axis=0)
-        assert np.linalg.norm(steps, axis=1).max() <= 10 * PAPER.step * (1 + 1e-9)
+        assert np.linalg.norm(steps, axis=1).max() <= 20 * PAPER.step * (1 + 1e-9)
         q = at_hit
         if task.locked_base:
             assert (movement.waypoints[:, 1] == task.q0[1]).all()
@@ -306,7 +311,7 @@ def test_an_unreachable_goal_is_infeasible(hands):
         update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
     )
     with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:
-        solve(NextGoal, task, hands=hands, period=10)
+        solve(NextGoal, task, hands=hands, period=20, max_steps=1000)
     assert caught.value.outcome == "infeasible"
 
 
@@ -461,12 +466,12 @@ def test_the_hand_comes_nearer_all_the_time(name):
 def test_looking_farther_ahead_pays():
     """Development instances: the controller against itself and the corrective process."""
     totals = []
-    names = [f"{family}/v1/d00{k}" for family in ("one-armed", "aligned") for k in range(3)]
+    names = ["one-armed/v1/d001", "aligned/v1/d001"]
     for method, parameters in (
         (EverySequence, {}),
-        (NullspaceQP, {}),
-        (NextGoal, {"horizon": 1}),
-        (NextGoal, {}),
+        (NullspaceQP, {"period": 10}),
+        (NextGoal, {"period": 10, "horizon": 1}),
+        (NextGoal, {"period": 10}),
     ):
         executions = [solve(method, load_task(name), **parameters)[1] for name in names]
         assert not any(execution.reason for execution in executions)

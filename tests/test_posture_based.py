@@ -25,7 +25,7 @@ def solve(task, method, seed=0, **parameters):
     return method(method.Parameters(**parameters)).solve(session), session
 
 
-def shortest(task, hands, starts=12):
+def shortest(task, hands, starts=5):
     """Least joint-space distance through the goals' discs, by SLSQP from many starts."""
     free = []
     for hand in hands:

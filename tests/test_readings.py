@@ -10,7 +10,14 @@ from pydantic import ValidationError
 
 from coartic import Movement, corrective_trial, learn, reference, trajectory
 from coartic.errors import CoarticError, TaskError
-from coartic.exploration import CONDITIONS, ExplorationCondition, State, Ties, UnknownTarget
+from coartic.exploration import (
+    CONDITIONS,
+    ExplorationCondition,
+    FirstTrial,
+    State,
+    Ties,
+    UnknownTarget,
+)
 from coartic.model import PAPER, checked_model
 from coartic.movement import follow, path_points
 from coartic.readings import (
@@ -125,11 +132,11 @@ def test_the_learner_is_the_slow_one_under_every_reading(text):
     for name in ("EC2", "EC3"):
         plain = CONDITIONS[name]
         condition = replace(plain, **fields)
-        fast = learn(task, condition, seed=4, trials=9, model=model)
-        slow = reference.learn(task, condition, seed=4, trials=9, model=model)
+        fast = learn(task, condition, seed=42, trials=5, model=model)
+        slow = reference.learn(task, condition, seed=42, trials=5, model=model)
         np.testing.assert_array_equal(fast.completed, slow.completed)
         np.testing.assert_array_equal(fast.rewards[fast.completed], slow.rewards[slow.completed])
-        default = learn(task, plain, seed=4, trials=9)
+        default = learn(task, plain, seed=42, trials=5)
         differs |= (
             fast.rewards.tolist() != default.rewards.tolist() or fast.reward != default.reward
         )
@@ -137,14 +144,7 @@ def test_the_learner_is_the_slow_one_under_every_reading(text):
 
 
 # Readings that make no difference in a few trials.
-SELDOM = {
-    "ties=nearest",
-    "ties=previous",
-    "corrective-arrival=true",
-    "first-step=true",
-    "update=not-less",
-    "whole-last-step=true",
-}
+SELDOM = {"corrective-arrival=true", "first-step=true"}
 
 
 FORGETFUL = ExplorationCondition(
@@ -158,7 +158,7 @@ def test_a_tie_falls_to_the_hand_that_hit_the_goal_before(ties, state):
     """A trial that knows nothing: every greedy choice is a tie. Its draws are repeated here."""
     condition = replace(FORGETFUL, ties=ties, state=state)
     task, after_right = tiny_task(), 0
-    for seed in range(24, 36):
+    for seed in range(24, 30):
         rng, hands = np.random.default_rng(seed), []
         for _ in task.goals:
             before = hands[-1] if hands else 0
@@ -182,9 +182,9 @@ def test_without_correction_a_pair_that_has_no_target_is_still_corrected():
         FORGETFUL, hand_exploration="none", corrects=False, unknown_target="explores"
     )
     task = tiny_task()
-    for seed in range(4):
-        run = learn(task, condition, seed=seed, trials=30)
-        slow = reference.learn(task, condition, seed=seed, trials=30)
+    for seed in range(2):
+        run = learn(task, condition, seed=seed, trials=12)
+        slow = reference.learn(task, condition, seed=seed, trials=12)
         assert run.completed[:2].all()
         assert not run.completed[2:].all()
         assert run.counters.corrections == slow.corrections == 2 * len(task.goals)
@@ -192,16 +192,26 @@ def test_without_correction_a_pair_that_has_no_target_is_still_corrected():
         np.testing.assert_array_equal(run.rewards.data, slow.rewards)
 
 
-READ = [
-    {"ties": ties, "state": state, "unknown_target": unknown, "corrects": corrects}
-    for ties, state, unknown, corrects in itertools.product(
-        get_args(Ties), get_args(State), get_args(UnknownTarget), (True, False)
-    )
-]
+READ = {
+    "ties": get_args(Ties),
+    "state": get_args(State),
+    "unknown_target": get_args(UnknownTarget),
+    "corrects": (True, False),
+    "first_trial": get_args(FirstTrial),
+}
 
 
-@pytest.mark.parametrize("first_trial", ["learns", "forgotten"])
-def test_the_learner_is_the_slow_one_whatever_is_read_together(first_trial):
+def read_together():
+    """Any four of the fields in every combination, by half of those of all five."""
+    for places in itertools.product(*(range(len(choices)) for choices in READ.values())):
+        if sum(places) % 2 == 0:
+            yield {
+                field: choices[place]
+                for (field, choices), place in zip(READ.items(), places, strict=True)
+            }
+
+
+def test_the_learner_is_the_slow_one_whatever_is_read_together():
     task = tiny_task(
         robot={
             "left_links": list(UNEVEN.left_links),
@@ -212,17 +222,17 @@ def test_the_learner_is_the_slow_one_whatever_is_read_together(first_trial):
         goals=[[1.6, 0.9], [1.2, 1.1], [1.7, 0.7]],
         initial_hands="RLR",
     )
-    failed = 0
-    for seed, fields in enumerate(READ):
-        condition = replace(FORGETFUL, first_trial=first_trial, noise_sd=0.02, **fields)
-        fast = learn(task, condition, seed=seed, trials=5)
-        slow = reference.learn(task, condition, seed=seed, trials=5)
+    failed, together = 0, list(read_together())
+    for seed, fields in enumerate(together):
+        condition = replace(FORGETFUL, noise_sd=0.02, **fields)
+        fast = learn(task, condition, seed=seed, trials=4)
+        slow = reference.learn(task, condition, seed=seed, trials=4)
         np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
         np.testing.assert_array_equal(fast.completed, slow.completed)
         assert fast.counters.corrections == slow.corrections
         assert np.isfinite(fast.values).sum() == len(slow.values)
         failed += fast.counters.failed_trials
-    assert failed > len(READ)
+    assert failed > 30
 
 
 def test_a_goal_is_as_far_as_the_correction_of_a_reading_ends():
@@ -333,7 +343,7 @@ def test_a_path_follows_the_readings_of_its_steps():
 def test_a_path_of_one_line_is_the_movement_under_the_same_readings(first_step, whole_last_step):
     model = PAPER._replace(first_step=first_step, whole_last_step=whole_last_step)
     rng, hits = np.random.default_rng(5), 0
-    for _ in range(60):
+    for _ in range(30):
         q, target = rng.uniform(-1, 1, (2, 10))
         near = target if rng.random() < 0.5 else q
         goal = tuple(Robot().forward_kinematics(near, "left") + rng.uniform(-0.11, 0.11, 2))
@@ -344,4 +354,4 @@ def test_a_path_of_one_line_is_the_movement_under_the_same_readings(first_step, 
         assert (path.ticks, path.hit) == (line.ticks, line.hit)
         np.testing.assert_allclose(path.q, line.q, atol=1e-12)
         hits += path.hit
-    assert 20 < hits < 60
+    assert 10 < hits < 30

@@ -112,7 +112,7 @@ def search() -> Search:
         RewardIs("LRLR", -532.0),
         BaseMoves("RRRR", 2, 3, "left"),
     )
-    return Search(TASK, layout, constraints, jobs=1, near=60.0)
+    return Search(TASK, layout, constraints, jobs=1, near=45.0)
 
 
 def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
@@ -228,7 +228,7 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
 
 def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
-    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 1_000)
+    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 500)
     rng = np.random.default_rng(0)
     own = Learned(rng.normal(-300.0, 3.0, 1000), ("RRR",) * 1000)
 
@@ -251,7 +251,7 @@ def test_a_chance_is_that_of_the_rounded_figures() -> None:
     rewards = np.round(rng.normal(-300.0, 3.0, 1000))
     figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
     (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
-    drawn = rng.choice(rewards, (200_000, 20))
+    drawn = rng.choice(rewards, (60_000, 20))
     alike = (np.round(drawn.mean(axis=1)) == -301) & (
         np.round(drawn.std(axis=1, ddof=1), 1) == 2.9
     )

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
+from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.calibration import signatures as simulated
 from coartic.analysis.calibration.simulation import rate
 from coartic.analysis.references import references
@@ -692,7 +692,7 @@ def test_frame_of_two_contexts(tmp_path):
     tasks = [load_task("ascending"), load_task("descending")]
     solved = []
     for task in tasks:
-        runs = [learn(task, "EC1", seed=seed, trials=1500) for seed in range(5)]
+        runs = learn_many(task, "EC1", seeds=range(5), trials=1500)
         solved += [
             (task, "learner", [run.solution for run in runs]),
             (task, "corrective", [corrective_trial(task, "RRR").movements]),

@@ -10,7 +10,7 @@ from coartic import (
     corrective_trial,
     execute,
     hand_sequences,
-    learn,
+    learn_many,
     load_task,
     reference,
 )
@@ -22,8 +22,7 @@ from tests.support.strategies import PAPER_CELLS, tiny_task
 
 @pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
 def test_best_trials_re_execute_exactly(name, condition):
-    for seed in range(4):
-        run = learn(load_task(name), condition, seed=seed, trials=1500)
+    for run in learn_many(load_task(name), condition, seeds=range(4), trials=1500):
         again = execute(run.task, run.solution)
         assert again.reward == run.reward
         assert again.hands == run.hands

@@ -82,9 +82,14 @@ def test_a_goal_in_line_with_a_straight_arm_is_reached_by_the_base_alone():
     assert plan.configurations[0] - task.q0 == pytest.approx([1.9] + 9 * [0.0], abs=1e-4)
 
 
-@pytest.mark.parametrize("cost", ["path-length", "squared-changes"])
-@pytest.mark.parametrize("hands", list(itertools.product(("left", "right"), repeat=2)))
-@pytest.mark.parametrize("still", [False, True])
+@pytest.mark.parametrize(
+    ("cost", "hands", "still"),
+    [  # any two of them in every combination
+        (("path-length", "squared-changes")[(number + still) % 2], hands, still)
+        for number, hands in enumerate(itertools.product(("left", "right"), repeat=2))
+        for still in (False, True)
+    ],
+)
 def test_plans_agree_with_another_optimiser(cost, hands, still):
     task = small_task()
     instance = Instance.of(task, hands, still=still, radius=task.radius)
@@ -120,7 +125,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
         start + 0.1 * rng.standard_normal(start.shape),
         method="SLSQP",
         constraints={"type": "ineq", "fun": inside},
-        options={"maxiter": 500, "ftol": 1e-12},
+        options={"maxiter": 500, "ftol": 1e-10},
     )
     assert min(inside(found.x)) > -1e-8
     assert plan.cost <= found.fun + 1e-5
@@ -224,9 +229,10 @@ def test_whole_ticks_are_what_is_executed():
 @pytest.mark.parametrize("name", ["ascending", "two-armed-2"])
 @pytest.mark.parametrize("other_arm", ["free", "still"])
 def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, name, other_arm):
-    task = load_task(name)
+    task, hands = load_task(name), "given"
+    if name == "two-armed-2":
+        task, hands = changed(name, goals=task.goals[:3], initial_hands="RRR"), "RLR"
     session = Session(task, 0, method.told, trusted=True)
-    hands = {"ascending": "given", "two-armed-2": "RLRR"}[name]
     parameters = method.Parameters(other_arm=other_arm, nodes=40, graphs=1, chains=1, hands=hands)
     result = method(parameters).solve(session)
     execution = execute(task, result.solution)
@@ -288,16 +294,16 @@ def test_the_rest_of_a_piece_lies_ahead_whether_arrival_costs_a_tick(tick):
 
 def test_of_too_many_hand_sequences_a_beam_is_planned():
     """As many as are asked for, as if all were; all where there are no more."""
-    task = load_task("two-armed-1")
+    task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)), initial_hands="RRR")
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}
-    for most in (3, 16, 64):
+    for most in (3, 8, 64):
         parameters = method.Parameters(
             nodes=40, graphs=1, chains=1, noisy_starts=0, most_sequences=most
         )
         result = method(parameters).solve(Session(task, 0, method.told, trusted=True))
         costs[most] = result.details["costs"]
     assert len(costs[3]) == 3
-    assert len(costs[16]) == 16
-    assert costs[64] == costs[16]
-    assert costs[3].items() <= costs[16].items()
+    assert len(costs[8]) == 8
+    assert costs[64] == costs[8]
+    assert costs[3].items() <= costs[8].items()

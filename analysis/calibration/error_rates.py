@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -74,6 +74,7 @@ class Population:
         return lambda rng: self.centred(rng) / 10 + shift
 
 
+@cache
 def populations() -> tuple[Population, ...]:
     """Normal, skewed, and mixtures like learned rewards of the two-armed tasks.
 

@@ -15,6 +15,7 @@ from coartic.analysis.statistics.spread import sd
 from coartic.analysis.words import tally
 from coartic.method import Information
 from coartic.record import SEARCH
+from coartic.robot import Array
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
@@ -148,6 +149,12 @@ def _row(study: Study, cell: CellRuns) -> MethodRow:
 
 def median(values: pd.Series) -> float:
     """Of the values that are known; NaN where none is, as for runs that crashed."""
-    known = values.to_numpy(dtype=np.float64, na_value=np.nan)
+    known = numbers(values)
     known = known[~np.isnan(known)]
     return float(np.median(known)) if len(known) else math.nan
+
+
+def numbers(values: pd.Series) -> Array:
+    """A column (n,), NaN where a value is missing."""
+    found: Array = values.to_numpy(dtype=np.float64, na_value=np.nan)
+    return found

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coartic.analysis.comparisons.methods import STILL, solve_times
+from coartic.analysis.comparisons.methods import STILL, numbers, solve_times
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.results.optima import ARMS, locks_base
 from coartic.robot import Array
@@ -86,11 +86,9 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     found = {}
     for cell in study.cells.values():
         runs = cell.runs
-        times = solve_times(cell.good).reindex(runs.index)
-        totals = [times if name == "solve_s" else runs[name] for name in SPENDS]
-        table = np.column_stack(
-            [spent.to_numpy(dtype=np.float64, na_value=np.nan) for spent in totals]
-        ).tolist()
+        own_times = solve_times(cell.good).reindex(runs.index)
+        columns = (own_times if name == "solve_s" else runs[name] for name in SPENDS)
+        table = zip(*(numbers(column).tolist() for column in columns), strict=True)
         rows = zip(
             map(str, runs.run_id), table, runs.status, runs.reward, runs.parameters, strict=True
         )

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from coartic import PAPER, MotionModel, Task, learn_many
 from coartic.exploration import ExplorationCondition
@@ -49,7 +49,9 @@ class Learned(NamedTuple):
 
     def with_hands(self, hands: str | None) -> NDArray[np.float64]:
         """Rewards of the runs that learned a sequence; of all for None."""
-        chosen = np.array([hands in (None, own) for own in self.hands], dtype=bool)
+        if hands is None:
+            return self.rewards
+        chosen = np.array([hands == own for own in self.hands], dtype=bool)
         return np.asarray(self.rewards[chosen])
 
 
@@ -142,7 +144,7 @@ class Order:
         parts = float(above.var(ddof=1)) + 1e-9, float(below.var(ddof=1)) + 1e-9
         theirs = sum(part / n for part, n in zip(parts, self.runs, strict=True))
         ours = parts[0] / len(above) + parts[1] / len(below)
-        wanted = 0.0 if self.p_below is None else float(stats.norm.isf(self.p_below))
+        wanted = 0.0 if self.p_below is None else -float(special.ndtri(self.p_below))
         missing = difference - wanted * math.sqrt(theirs)
         return difference, min(0.0, missing / math.sqrt(theirs + ours))
 
