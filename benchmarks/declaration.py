@@ -111,11 +111,14 @@ def reason_against(method: type[Method], task: Task, parameters: Mapping[str, An
 
 
 def built_in_methods(module: str) -> tuple[type[Method], ...]:
-    """The methods of a module of this project. Raises MethodFileError where there are none."""
+    """The methods of a module of this project. Raises MethodFileError where it is not there."""
     try:
-        methods: tuple[type[Method], ...] = importlib.import_module(module).METHODS
-    except (ImportError, AttributeError):
-        raise MethodFileError(f"{module} has no methods here") from None
+        found = importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name is None or not f"{module}.".startswith(f"{error.name}."):
+            raise  # what it imports
+        raise MethodFileError("it is not installed on this worker") from None
+    methods: tuple[type[Method], ...] = found.METHODS
     return methods
 
 

@@ -116,17 +116,18 @@ def _lots(
 ) -> Iterator[Sequence[RunSpec]]:
     """Runs that are performed side by side; results do not depend on which these are.
 
-    Lots that do not go round among the workers are divided, so that each has its part, but not
-    into lots smaller than :data:`LEAST_TOGETHER`: a run beside many takes a fraction of its time
-    alone.
+    Where there are few, each worker has its part; of many, the last lots are divided that would
+    not go round. But lots are not made smaller than :data:`LEAST_TOGETHER`: a run beside many
+    takes a fraction of its time alone.
     """
+    share = max(math.ceil(len(specs) / workers), LEAST_TOGETHER)
     lots: list[list[RunSpec]] = []
     for _, group in groupby(specs, key=lambda spec: id(spec.setting)):
         together: list[RunSpec] = []
         for spec in group:
             if spec.run_id in alone:
                 lots.append([spec])
-            elif together and len(together) < spec.setting.most_together:
+            elif together and len(together) < min(spec.setting.most_together, share):
                 together.append(spec)
             else:
                 together = [spec]

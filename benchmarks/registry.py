@@ -53,6 +53,8 @@ MODULES = (
     "coartic.baselines.optimum",
 )
 """Where this project's methods are, each in its module's ``METHODS``."""
+MODULE_OF = {method.name: module for module in MODULES for method in built_in_methods(module)}
+"""Where each built-in method is, by id."""
 BUILT_IN: tuple[type[Method], ...] = tuple(
     method for module in MODULES for method in built_in_methods(module)
 )
@@ -123,8 +125,9 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     found = dict(_built_in())
 
     def add(foreign: Foreign, origin: str) -> None:
-        origin, code = plain(origin, LONGEST_LINE), ""
-        for declaration in _described(foreign, origin):
+        origin = plain(origin, LONGEST_LINE)
+        described, code = _described(foreign, origin), foreign_code(foreign)
+        for declaration in described:
             name = declaration.name
             if name.startswith(RESERVED):
                 raise MethodFileError(
@@ -135,7 +138,6 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
                 raise MethodFileError(
                     f"{origin}: method id {name!r} is already taken ({found[name].origin})"
                 )
-            code = code or foreign_code(foreign)  # of all methods of a file
             found[name] = Entry(declaration, origin, code, foreign)
 
     for point in metadata.entry_points(group=ENTRY_POINTS):

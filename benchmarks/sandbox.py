@@ -38,7 +38,7 @@ LARGEST_ANSWER = 128 << 20
 LAST_WORDS = 4096
 """Bytes that are kept of what a process prints."""
 _END_LIMIT_S = 10.0
-_CHUNK = 1 << 20  # bytes read at once: each read waits for whoever is busy here
+_CHUNK = 1 << 20  # bytes that a line is put together of: by Python, each part waits its turn
 _LOOK_S = 0.1  # between looks at the clock
 _LAST_S = 1.0  # for what a process had said when it ended
 _RETRIES = 2  # fresh processes for a run whose process was killed

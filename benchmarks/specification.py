@@ -10,7 +10,7 @@ from typing import Any
 from coartic import PAPER, MotionModel, Task
 from coartic.benchmarks.code_identity import built_in_sources
 from coartic.benchmarks.provenance import command
-from coartic.benchmarks.registry import CLASSES, Entry
+from coartic.benchmarks.registry import MODULE_OF, Entry
 from coartic.record import RECORD_FORMAT, Asked, Specification
 
 
@@ -70,7 +70,7 @@ class Setting:
         return {
             "specification": self.asked.model_dump(mode="json"),
             "code": code,
-            "module": None if foreign else CLASSES[name].__module__,
+            "module": None if foreign else MODULE_OF[name],
             "sources": built_in_sources(code),
             "links": self.task.robot.most_links,
             "told": list(self.entry.declared.told),

@@ -143,14 +143,14 @@ def _times(
         alone.rewards, together[0].rewards
     ):
         raise SystemExit(f"{name}: two sides disagree")
-    floors = [prices.floor_us(task, condition, run) for run in together]
+    floors = [prices.floor_us(task, condition, run) for run in full]
     return Times(
         name,
         slow_us,
         _us([alone]),
         _us(together),
         _us(full),
-        sum(floors) / runs,
+        sum(floors) / len(full),
     )
 
 

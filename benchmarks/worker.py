@@ -64,7 +64,7 @@ def answer(question: dict[str, Any]) -> Any:
     foreign = Foreign(**question["foreign"])
     if what == "describe":
         return [declared(method).model_dump(mode="json") for method in _foreign_methods(foreign)]
-    method = _method(question["method"], _methods(foreign))
+    method = _method(question["method"], foreign)
     if what == "complete":
         return completed(method, question["parameters"])
     if what == "applies":
@@ -131,7 +131,7 @@ def perform(job: dict[str, Any]) -> dict[str, Any]:
 def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) -> type[Method]:
     """The method of a job, with the job's code. Raises ForeignCodeError otherwise."""
     try:
-        method = _method(name, _methods(foreign, job["module"]))
+        method = _method(name, foreign, job.get("module"))
         if foreign is None and job["sources"] == built_in_sources(job["code"]):
             return method  # to the letter what the job's code was made of
         code = built_in_code(method.__module__) if foreign is None else _foreign_code(foreign)
@@ -223,16 +223,18 @@ def _foreign_code(foreign: Foreign) -> str:
     return foreign_code(foreign)
 
 
-def _methods(foreign: Foreign | None, module: str = "") -> Sequence[type[Method]]:
-    """Those of one module, if they are this project's: what others import is no use to them."""
-    return built_in_methods(module) if foreign is None else _foreign_methods(foreign)
-
-
-def _method(name: str, methods: Sequence[type[Method]]) -> type[Method]:
+def _method(name: str, foreign: Foreign | None, module: str | None = None) -> type[Method]:
+    """Of this project's methods those of one module alone are imported."""
+    if foreign is not None:
+        methods, missing = _foreign_methods(foreign), f"{foreign.where} defines no method {name!r}"
+    elif module is not None:
+        methods, missing = [*built_in_methods(module)], "it is not installed on this worker"
+    else:
+        methods, missing = [], "another version asks for it; install the same everywhere"
     for method in methods:
         if method.name == name:
             return method
-    raise MethodFileError("it is not installed on this worker")
+    raise MethodFileError(missing)
 
 
 def main() -> None:

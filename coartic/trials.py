@@ -202,12 +202,11 @@ def _checked_hands(task: Task, hands: str | Sequence[str], count: int) -> NDArra
     each: list[Any] = list(hands) if several else [hands]
     letters = set(letters_of(task.hands))
     codes: dict[str, list[int]] = {}
-    for sequence in each:
-        if not isinstance(sequence, str) or sequence not in codes:
-            fits = isinstance(sequence, str) and len(sequence) == len(task.goals)
-            if not fits or not set(sequence) <= letters:
-                raise ValueError(f"hands {sequence!r} do not fit task {task.name!r}")
-            codes[sequence] = [HANDS.index(hand) for hand in hands_of(sequence)]
+    no_texts = [sequence for sequence in each if not isinstance(sequence, str)]
+    for sequence in no_texts or dict.fromkeys(each):
+        if no_texts or len(sequence) != len(task.goals) or not set(sequence) <= letters:
+            raise ValueError(f"hands {sequence!r} do not fit task {task.name!r}")
+        codes[sequence] = [HANDS.index(hand) for hand in hands_of(sequence)]
     if several and len(each) != count:
         raise ValueError(f"{len(each)} hand sequences for {count} trials")
     rows = [codes[sequence] for sequence in (each if several else each * count)]

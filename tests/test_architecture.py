@@ -95,6 +95,18 @@ def test_help_needs_no_compiler():
     assert not imported & {"coartic.baselines", "coartic.analysis"}
 
 
+def test_a_worker_imports_its_method_alone():
+    """What other methods import would take as long as all else of a worker's start."""
+    program = """
+import gc, sys
+gc.disable()
+from coartic.benchmarks.worker import _method
+assert _method("dual-process/EC1", None, "coartic.dual_process").name == "dual-process/EC1"
+assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.registry"} & set(sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
+
+
 def test_one_kinematic_module():
     """No cosine or sine is taken outside the robot and the functions handed to it."""
     home = {"coartic/robot.py", "coartic/trigonometry.py"}

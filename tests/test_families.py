@@ -444,7 +444,6 @@ SMALL = Selection(
 
 
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.usefixtures("in_this_process")
 def test_a_small_suite(tmp_path):
     """Every record holds the whole task, and thereby the hash of the instance's file."""
     report = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)

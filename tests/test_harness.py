@@ -390,6 +390,11 @@ def test_a_worker_with_other_code_refuses():
     job["specification"] = {**job["specification"], "method": "not-here"}
     with pytest.raises(ForeignCodeError, match="'not-here': it is not installed on this worker"):
         perform(job)
+    with pytest.raises(ForeignCodeError, match="it is not installed on this worker"):
+        perform({**spec.job(), "module": "coartic.baselines.not_here"})
+    older = {key: value for key, value in spec.job().items() if key != "module"}
+    with pytest.raises(ForeignCodeError, match="another version asks for it"):
+        perform(older)
     far = {"kind": "file", "where": "far.py", "source": "import no_such_module_here"}
     broken = {**spec.job(), "foreign": far}
     with pytest.raises(ForeignCodeError, match="cannot be run: ModuleNotFoundError"):

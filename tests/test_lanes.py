@@ -13,13 +13,14 @@ from coartic.benchmarks.harness import _lots, perform_missing, records_of
 from coartic.benchmarks.sandbox import failure
 from coartic.benchmarks.specification import Limits
 from coartic.benchmarks.store import Store
+from coartic.benchmarks.suites import Cell
 from coartic.compiled import entry
 from coartic.corrective import _errors
 from coartic.lanes import LANES, board, lanes_for, near, place
 from coartic.movement import Goal
 from coartic.trigonometry import LARGEST
 from tests.support.strategies import UNEVEN
-from tests.support.suites import InProcess, paper_cells, run_specs
+from tests.support.suites import KNOWN, InProcess, paper_cells, run_specs
 
 SOON_FAILED = MotionModel(max_iterations=60)
 
@@ -192,6 +193,16 @@ def test_long_runs_are_fewer_side_by_side():
         4,
         1,
     ]
+
+
+def test_few_runs_of_several_cells_are_divided_among_workers():
+    cells = [
+        Cell(load_task("ascending"), KNOWN[name])
+        for name in ("dual-process/EC1", "corrective-alone/given")
+    ]
+    planned = [spec for _, spec in run_specs(cells, runs=20, seed=0, trials=3)]
+    assert [len(lot) for lot in _lots(planned, set(), 2)] == [11, 9, 1]
+    assert [len(lot) for lot in _lots(planned, {planned[3].run_id}, 2)] == [11, 1, 8, 1]
 
 
 @pytest.mark.parametrize(

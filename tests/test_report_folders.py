@@ -192,7 +192,7 @@ def test_labels_with_commas_are_quoted():
     assert labels_in(text, "--methods") == ["a/b", "a/b x=1, y=2", "a/c"]
 
 
-def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, few_figures, read_once):
+def test_what_cannot_be_reported(monkeypatch, capsys, tmp_path, odd, few_figures):
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").write_text("x")
     assert "not a results folder" in refused(monkeypatch, capsys, "report", tmp_path / "empty")
@@ -235,7 +235,7 @@ def everything(folder):
 
 
 def test_a_report_is_made_again_where_nobody_changed_it(
-    monkeypatch, capsys, tmp_path, tmp_path_factory, few_figures, read_once
+    monkeypatch, capsys, tmp_path, tmp_path_factory, few_figures
 ):
     home, results = tmp_path / "report", tmp_path_factory.mktemp("small")
     run_and_write(results, [Cell(tiny_task(), KNOWN["dual-process/EC4"])], runs=1, trials=5)

@@ -345,6 +345,8 @@ def test_pairing_by_seed():
     assert b.tolist() == [-30, -10]
     with pytest.raises(ValueError, match="one-to-one"):
         statistics.paired_by_seed(pd.concat([first, first]), second)
+    with pytest.raises(ValueError, match="one-to-one"):
+        statistics.paired_by_seed(first, pd.concat([second, second]))
 
 
 @pytest.mark.parametrize(
