@@ -173,10 +173,18 @@ def _end_with(what):
         os._exit(code)
 
 
+_codes = {}
+
+
 def _ended(pid):
-    """Exit code of a child, as Popen has it, or None."""
-    found, status = os.waitpid(pid, os.WNOHANG)
-    return os.waitstatus_to_exitcode(status) if found else None
+    """Exit code of a child, as Popen has it, or None; however often it is asked for: two threads
+    may ask at once."""
+    if pid not in _codes:
+        found, status = os.waitpid(pid, os.WNOHANG)
+        if not found:
+            return None
+        _codes[pid] = os.waitstatus_to_exitcode(status)
+    return _codes[pid]
 
 
 def main():
@@ -197,6 +205,8 @@ def main():
             elif not (answer := os.fork()):
                 line.close()
                 _end_with(lambda: _begin(question, streams))  # noqa: B023
+            else:
+                _codes.pop(answer, None)  # of an earlier child by that number
             for stream in streams:
                 os.close(stream)
             line.send(json.dumps(answer).encode())
