@@ -112,7 +112,9 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     ``runs`` have a solution. Their whole time stands for methods that mark no solving.
     """
     warm = runs.warm.to_numpy(dtype=bool, na_value=False)
-    times: pd.Series = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
+    solving, whole = numbers(runs.solve_s), numbers(runs.wall_s)
+    marked = np.where(solving > 0, solving, whole)
+    times = pd.Series(marked, runs.index, dtype=runs.solve_s.dtype)
     return times[warm] if warm.any() else times
 
 
@@ -120,7 +122,7 @@ def _row(study: Study, cell: CellRuns) -> MethodRow:
     good, runs = cell.good, cell.runs
     rewards = cell.rewards
     mean = float(rewards.mean()) if len(rewards) else math.nan
-    still = bool(len(good)) and bool((good.other_arm_travel <= STILL).all())
+    still = bool(len(good)) and keeps_still(good)
     locked = locks_base(runs)
     best = None if locked else study.optima.get((cell.task, "free"))
     best_still = study.optima.get((cell.task, "still")) if still and not locked else None
@@ -143,14 +145,22 @@ def _row(study: Study, cell: CellRuns) -> MethodRow:
         corrections=int(good.solution_corrections.sum()),
         **{name: median(runs[name]) for name in _SPENT},
         solve_s=median(solve_times(good)),
-        evaluations=median(runs.forward_kinematics + runs.jacobians),
+        evaluations=_median(numbers(runs.forward_kinematics) + numbers(runs.jacobians)),
     )
+
+
+def keeps_still(good: pd.DataFrame) -> bool:
+    """Whether the arm that is not chosen stands still in every solution of these runs."""
+    return bool((numbers(good.other_arm_travel) <= STILL).all())
 
 
 def median(values: pd.Series) -> float:
     """Of the values that are known; NaN where none is, as for runs that crashed."""
-    known = numbers(values)
-    known = known[~np.isnan(known)]
+    return _median(numbers(values))
+
+
+def _median(values: Array) -> float:
+    known = values[~np.isnan(values)]
     return float(np.median(known)) if len(known) else math.nan
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coartic.analysis.comparisons.methods import STILL, numbers, solve_times
+from coartic.analysis.comparisons.methods import keeps_still, numbers, solve_times
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.results.optima import ARMS, locks_base
 from coartic.robot import Array
@@ -125,11 +125,12 @@ def cells_by_optimum(
     study: Study,
 ) -> Iterator[tuple[str, int, CellRuns, str, list[BestSoFar]]]:
     """The same with other arm and reward of each optimum that the method's solutions keep to."""
+    found = list(cells_by_spend(study))
+    still = {id(cell): keeps_still(cell.good) for cell in study.cells.values()}
     for other_arm in ARMS:
-        for cell, spend, runs in cells_by_spend(study):
+        for cell, spend, runs in found:
             best = study.optima.get((cell.task, other_arm))
-            keeps = other_arm == "free" or (cell.good.other_arm_travel <= STILL).all()
-            if best is not None and runs and keeps:
+            if best is not None and runs and (other_arm == "free" or still[id(cell)]):
                 yield other_arm, best.reward, cell, spend, runs
 
 

@@ -67,9 +67,7 @@ def mean_interval(values: Array) -> tuple[Array, Array, Array]:
     if len(values) < 2:
         nothing = np.full(values.shape[1], math.nan)
         return values.mean(axis=0), nothing, nothing
-    drawn = [np.bincount(draw, minlength=len(values)) for draw in _draws(len(values))]
-    weights = np.array(drawn) / len(values)
-    means = spread.within(weights @ values, values)
+    means = spread.within(_weights(len(values)) @ values, values)
     low, high = np.quantile(means, TAILS, axis=0)
     return spread.mean(values), low, high
 
@@ -87,6 +85,14 @@ def resampled(values: Array) -> Array:
 def _draws(n: int) -> NDArray[np.int64]:
     """Which of n runs are in each bootstrap resample, shape ``(RESAMPLES, n)``."""
     return np.random.default_rng(SEED).integers(n, size=(RESAMPLES, n))
+
+
+@cache
+def _weights(n: int) -> Array:
+    """Share of each of n runs in each bootstrap resample, shape ``(RESAMPLES, n)``."""
+    counts = [np.bincount(draw, minlength=n) for draw in _draws(n)]
+    shares: Array = np.array(counts) / n
+    return shares
 
 
 def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Interval:
