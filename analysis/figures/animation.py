@@ -142,7 +142,7 @@ class _Scene:
             for goal in task.goals
         ]
         for patch in (self._base, *self._goals):
-            axes.add_patch(patch)
+            axes.add_artist(patch)
         self._arms = {
             hand: axes.plot([], [], color="black", linewidth=1.4, **MARKERS[hand])[0]
             for hand in task.hands

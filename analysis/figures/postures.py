@@ -135,14 +135,14 @@ def _draw(axes: Axes, found: Contexts) -> None:
             arrowprops={"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4,
                         "linewidth": 0.8, "linestyle": (0, (3, 2))},
         )  # fmt: skip
-        axes.add_patch(Circle(following, task.radius, fill=False, edgecolor=color))
+        axes.add_artist(Circle(following, task.radius, fill=False, edgecolor=color))
         up = following[1] >= shared[1]
         axes.annotate(
             f"then goal {found.goal + 1}\n({task.label.lower()})", following, (5, 0),
             textcoords="offset points", color=color, va="center", ha="left", fontsize=_LETTERS,
         )  # fmt: skip
         _base(axes, task, mean, color, above=up)
-    axes.add_patch(
+    axes.add_artist(
         Circle(shared, found.tasks[0].radius, fill=False, edgecolor=style.INK, linewidth=1.1)
     )
     axes.annotate(

@@ -30,11 +30,14 @@ MARGIN = 0.45  # length unit around what is drawn
 def draw_robot(
     axes: Axes, task: Task, q: Array, *, marked: Iterable[Hand] = (), color: str = INK
 ) -> None:
-    """Draw base and arms in configuration ``q`` (dof,), joints of ``marked`` arms marked."""
+    """Draw base and arms in configuration ``q`` (dof,), joints of ``marked`` arms marked.
+
+    The limits of ``axes`` are set by whoever draws: patches do not widen them, which takes long.
+    """
     marked = tuple(marked)
     outline = task.robot.base_outline(q)
-    axes.add_patch(Polygon(outline, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5))
-    axes.add_patch(Polygon(outline, fill=False, edgecolor=color, linewidth=0.6, zorder=1.6))
+    axes.add_artist(Polygon(outline, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5))
+    axes.add_artist(Polygon(outline, fill=False, edgecolor=color, linewidth=0.6, zorder=1.6))
     for hand in task.hands:
         style = MARKERS[hand] if hand in marked else {}
         joints = task.robot.joint_positions(q, hand).T
@@ -60,7 +63,7 @@ def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
     for index, (x, y) in enumerate(task.goals, 1):
         side = -1 if numbered_below(task)[index - 1] else 1
         color = INK if current in (None, index) else GREY
-        axes.add_patch(
+        axes.add_artist(
             Circle((x, y), task.radius, fill=False, edgecolor=color, linewidth=0.7, zorder=3)
         )
         axes.annotate(

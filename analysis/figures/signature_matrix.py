@@ -117,11 +117,11 @@ def _draw_cell(axes: Axes, x: int, y: int, value: float, standardised: float) ->
     if math.isnan(value):
         empty = Rectangle((x, y), 1, 1, facecolor="none", edgecolor=style.GREY, linewidth=0)
         empty.set_hatch("/////")
-        axes.add_patch(empty)
+        axes.add_artist(empty)
         return
     shade = standardised / (2 * LIMIT) + 0.5
     color = to_hex(colormaps[_MAP](min(max(shade, 0.0), 1.0)))
-    axes.add_patch(Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3))
+    axes.add_artist(Rectangle((x, y), 1, 1, facecolor=color, edgecolor=color, linewidth=0.3))
     text = axes.text(x + 0.5, y + 0.52, _figures(value), ha="center", va="center")
     text.set(fontsize=6, color=style.on(color))
 

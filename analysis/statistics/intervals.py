@@ -53,6 +53,7 @@ def share(agrees: Sequence[bool]) -> Interval:
     return wilson(count, n) if n > 1 else Interval(count / n)
 
 
+@cache
 def wilson(count: int, total: int, confidence: float = CONFIDENCE) -> Interval:
     """``count`` of ``total`` runs as a share, with Wilson's interval."""
     low, high = stats.binomtest(count, total).proportion_ci(confidence, method="wilson")
