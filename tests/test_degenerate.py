@@ -13,8 +13,8 @@ from hypothesis.extra.numpy import arrays
 
 from coartic import load_task
 from coartic.analysis import study
-from coartic.analysis.figures.register import SECTIONS
-from coartic.analysis.figures.style import ONE
+from coartic.analysis.figures import REGISTER, Figures, register
+from coartic.analysis.figures.style import ONE, on_a_phone
 from coartic.analysis.signatures.context import context_dependence, distance, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import movable, synergy
@@ -106,42 +106,44 @@ def shown(text):
 def test_every_command(name, folders, monkeypatch, capsys, tmp_path):
     folder = folders(name, monkeypatch, capsys)
     other = folders("one run of one trial", monkeypatch, capsys)
-    copy = shutil.copytree(folder, tmp_path / "copy")
-    runs = pd.read_parquet(copy / "runs.parquet")
+    copy = shutil.copytree(folder, tmp_path / "copy")  # before anything is written beside it
+    runs = pd.read_parquet(folder / "runs.parquet")
     run, solved = runs.run_id.iloc[-1], bool((runs.status == "ok").iloc[-1])
     for expected, *arguments in (
-        (0, "analyse", copy),
-        (0, "report", copy),
+        (0, "analyse", folder),
+        (0, "report", folder),
         (0, "compare", copy, folder, "--out", tmp_path / "same.md"),
         (0, "compare", copy, other, "--out", tmp_path / "other.md"),
         (0, "compare", other, copy, "--out", tmp_path / "turned.md"),
-        (0, "cite", copy, "--analysis"),
-        (0, "show", run, "--in", copy),
-        (0, "reproduce", run, "--in", copy),
-        *([] if solved else [(2, "animate", run, "--in", copy, "--out", tmp_path / "run.gif")]),
+        (0, "cite", folder, "--analysis"),
+        (0, "show", run, "--in", folder),
+        (0, "reproduce", run, "--in", folder),
+        *([] if solved else [(2, "animate", run, "--in", folder, "--out", tmp_path / "run.gif")]),
     ):
         code, text, error = call(monkeypatch, capsys, *arguments)
         assert code == expected, (arguments, error)
         assert "Traceback" not in error
         assert not NONSENSE.search(shown(text)), arguments
     assert "identical" in (tmp_path / "same.md").read_text(encoding="utf-8")
-    macros = re.findall(r"(?m)^\\newcommand\{\\(\w+)\}", (copy / "report/numbers.tex").read_text())
+    macros = re.findall(
+        r"(?m)^\\newcommand\{\\(\w+)\}", (folder / "report/numbers.tex").read_text()
+    )
     assert macros or not (runs.status == "ok").any()
     for macro in {*macros[:1], *macros[-1:]}:
-        code, text, error = call(monkeypatch, capsys, "trace", macro, "--in", copy)
+        code, text, error = call(monkeypatch, capsys, "trace", macro, "--in", folder)
         assert code == 0, error
         assert not re.search(r"\b(nan|inf)\b", text)
-    pages = [*copy.glob("*.md"), *tmp_path.glob("*.md"), copy / "report" / "report.md"]
-    for page in [*pages, copy / "report" / "numbers.tex", *copy.glob("report/tables/*.tex")]:
+    pages = [*folder.glob("*.md"), *tmp_path.glob("*.md"), folder / "report" / "report.md"]
+    for page in [*pages, folder / "report" / "numbers.tex", *folder.glob("report/tables/*.tex")]:
         found = NONSENSE.search(page.read_text(encoding="utf-8"))
         assert not found, (page.name, found)
-    for table in copy.glob("*.csv"):
+    for table in folder.glob("*.csv"):
         rows = pd.read_csv(table).select_dtypes("number")
         for column in rows if table.name != "targets.csv" else ():
             assert not np.isinf(rows[column]).any(), (table.name, column)
 
 
-@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.usefixtures("in_this_process", "read_once")
 def test_runs_that_are_equal_have_no_spread_anywhere(folders, monkeypatch, capsys):
     folder = folders("all equal", monkeypatch, capsys)
     assert call(monkeypatch, capsys, "analyse", folder)[0] == 0
@@ -159,12 +161,14 @@ def test_runs_that_are_equal_have_no_spread_anywhere(folders, monkeypatch, capsy
     assert (pd.read_csv(folder / "comparisons.csv").sd_first.dropna() == 0).all()
 
 
-@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.usefixtures("in_this_process", "read_once")
 def test_figures_for_narrow_pages(folders, monkeypatch, capsys):
     """Which the reports above have none of."""
-    drawn = study.load(folders("all equal", monkeypatch, capsys)).figures
-    narrow = [plot for name in SECTIONS for plot in drawn.for_a_phone(name).values()]
-    assert narrow
+    of = study.load(folders("all equal", monkeypatch, capsys))
+    monkeypatch.setattr(register, "REGISTER", [row for row in REGISTER if row.narrows])
+    with on_a_phone():
+        narrow = Figures(of).plots
+    assert {"tasks", "recruitment"} <= {plot.id for plot in narrow}
     for plot in narrow:
         assert plot.figure.get_figwidth() == ONE
         assert not NONSENSE.search(f"{plot.caption} {plot.alt}")

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from coartic import load_task
-from coartic.analysis.claims import CLAIMS, Claim, Finding, judge
+from coartic.analysis.claims import CLAIMS, Claim, Finding, evidence, judge
 from coartic.analysis.claims.catalogue import family_sizes
 from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.power import seen_over_instances
@@ -30,7 +30,7 @@ from coartic.analysis.words import true_minus
 from coartic.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
 from tests.support.reports import document_of, undrawn, without_figures
-from tests.support.suites import run_and_write, suite_of
+from tests.support.suites import paper_cells, run_and_write, suite_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 COUNT = 5
@@ -74,6 +74,12 @@ def study_of(
     )
     results = Results(tmp_path, manifest_for(tasks, runs), runs, sequences)
     return MadeUp(results, **({"optima": known} if optima else {}), **parts)
+
+
+@pytest.fixture
+def fewer_resamples(monkeypatch):
+    """Where a p-value is near a level: a hundred times as many as elsewhere take long."""
+    monkeypatch.setattr(evidence, "MANY", 29_999)
 
 
 RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}
@@ -271,6 +277,15 @@ def verdicts(study, *names):
     return {entry.claim.id: entry for entry in judged}
 
 
+@pytest.mark.usefixtures("fewer_resamples")
+def test_p_near_a_level_is_of_more_resamples():
+    near = np.array([-0.4, 0.5, 2.0, 3.0, 1.5, 0.8])
+    for values, resamples in ((near, 29_999), (-near, 29_999), (near - 1.2, 9_999)):
+        assert f"{resamples} resamples" in evidence.exceeds(values, 0.0, sure=True).method
+        assert "9999 resamples" in evidence.exceeds(values, 0.0).method
+
+
+@pytest.mark.usefixtures("fewer_resamples")
 def test_claims_of_generality(tmp_path):
     study = study_of(tmp_path, {**RISING, EC4: lambda n: -540 - n})
     vars(study)["signs"] = made_up_signs(study)
@@ -313,6 +328,7 @@ def test_hands_are_learned_where_they_differ_from_the_closest(tmp_path):
     assert judged(-0.02).verdict == "cannot tell"
 
 
+@pytest.mark.usefixtures("fewer_resamples")
 def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general(tmp_path):
     falling = study_of(tmp_path, {**RISING, EC4: lambda n: -570 - n})
     arm, rises, hands = (
@@ -331,6 +347,7 @@ def test_development_instances_are_not_judged(tmp_path):
     assert {entry.verdict for entry in study.judged} == {"cannot tell"}
 
 
+@pytest.mark.usefixtures("fewer_resamples")
 def test_claims_of_generality_change_no_verdict_of_the_paper(tmp_path):
     """They are a family of their own, and stand in reports of instances alone."""
     assert family_sizes() == {"paper": 23, "beside": 7, "families": 10}
@@ -382,8 +399,12 @@ def folder(tmp_path_factory):
     return run_and_write(home / "out", suite_of(home, *BLOCKS), runs=3, trials=40)
 
 
-def test_a_small_folder_through_a_report(folder):
-    study = Study(folder)
+@pytest.fixture(scope="module")
+def study(folder):
+    return Study(folder)
+
+
+def test_a_small_folder_through_a_report(study):
     with undrawn(), without_figures(but=OWN_FIGURES):
         document = build(study).document
     assert [figure.id for figure in document.figures()] == list(OWN_FIGURES)
@@ -415,8 +436,8 @@ def test_many_instances_alone_are_reported_together(folder, monkeypatch):
     assert not any(table.id.startswith("main-signatures") for table in document.tables())
 
 
-def test_a_folder_without_instances_has_no_such_section(traced):
-    study = traced
+def test_a_folder_without_instances_has_no_such_section(tmp_path):
+    study = Study(run_and_write(tmp_path, paper_cells(tasks=["ascending"]), runs=1, trials=3))
     assert study.instances is None
     assert study.contrasts == []
     with without_figures(but=OWN_FIGURES):
@@ -427,8 +448,7 @@ def test_a_folder_without_instances_has_no_such_section(traced):
     assert not any("in-general" in name for name in sections)
 
 
-def test_figures_of_families(folder):
-    study = Study(folder)
+def test_figures_of_families(study):
     gaps, exploration = (study.figures[f"{name}-by-family"] for name in ("gaps", "exploration"))
     assert [axes.get_title(loc="left")[-9:] for axes in gaps.axes] == ["one-armed", "two-armed"]
     assert len(exploration.axes) == 3

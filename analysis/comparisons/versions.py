@@ -177,7 +177,9 @@ def _runs(
     first: CellRuns, second: CellRuns, differing: list[str] | None, *, other_code: bool
 ) -> dict[str, Any]:
     """Runs that both have; ``differing``: keys in which the tasks differ, None where in none."""
-    ours, theirs = (dict(zip(cell.runs.seed, cell.runs.result, strict=True)) for cell in (first, second))
+    ours, theirs = (
+        dict(zip(cell.runs.seed, cell.runs.result, strict=True)) for cell in (first, second)
+    )
     both = ours.keys() & theirs.keys()
     remarks = [
         f"{side} solved {len(cell.good)} of {len(cell.runs)}"
