@@ -6,6 +6,7 @@ filled from the tick at which they are hit. Thin lines trace both hands.
 
 from __future__ import annotations
 
+import io
 import math
 import subprocess
 import tempfile
@@ -100,9 +101,12 @@ def animate(
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
-                for row in [*timed.rows, *timed.rows[-1:] * timed.held]:
+                for row in timed.rows:
                     for scene in scenes:
                         scene.show(row)
+                    figure.changed()
+                    writer.grab_frame()
+                for _ in range(timed.held):
                     writer.grab_frame()
             write_outputs({path: film.read_bytes()}, replace=replace)
     except OSError as error:
@@ -122,6 +126,24 @@ def check_output(path: Path, *, replace: bool = False) -> None:
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_outputs([path], replace=replace)
+
+
+class _Film(Figure):
+    """A figure whose picture is drawn once for all frames in which nothing changes."""
+
+    _drawn = b""
+
+    def changed(self) -> None:
+        """What is saved next is another picture."""
+        self._drawn = b""
+
+    def savefig(self, fname: Any, **more: Any) -> None:
+        """Write the picture to a stream: all frames of a film are saved alike."""
+        if not self._drawn:
+            stream = io.BytesIO()
+            super().savefig(stream, **more)
+            self._drawn = stream.getvalue()
+        fname.write(self._drawn)
 
 
 class _Scene:
@@ -173,7 +195,7 @@ class _Scene:
         self._status.set_text(f"reward {f'−{spent}' if spent else 0}   {state}")
 
 
-def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
+def _figure(panels: Sequence[Panel], width: int) -> tuple[_Film, list[_Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
     movements = [panel.trajectory for panel in panels]
     corners = np.array([box(movement.task, movement.configurations) for movement in movements])
@@ -183,7 +205,7 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[Figure, list[_Scene]]:
     wide = inches / count - _LEFT - _RIGHT
     # Even in pixels, as MP4 wants it.
     height = 2 * round((wide * up / across + _ABOVE + _BELOW) * _DPI / 2) / _DPI
-    figure = Figure(figsize=(inches, height), dpi=_DPI)
+    figure = _Film(figsize=(inches, height), dpi=_DPI)
     for index, panel in enumerate(panels):
         left, tall = index / count + _LEFT / inches, 1 - (_ABOVE + _BELOW) / height
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
