@@ -110,22 +110,23 @@ def test_main_tables_have_every_method_and_every_claim(traced):
 
 
 def test_charts_show_what_the_figures_show(traced):
-    found = charts(
-        traced, {"ranking": ranking.standings(traced), "price": traced.reached, "other": None}
-    )
+    standings = ranking.standings(traced)
+    found = charts(traced, {"ranking": standings, "price": traced.reached, "other": None})
     assert found.keys() == {"ranking", "price"}
-    assert found == charts(traced, {"ranking": ranking.standings(traced), "price": traced.reached})
+    assert found == charts(traced, {"ranking": standings, "price": traced.reached})
     for text in found.values():
         chart = json.loads(text)
         assert {param["name"] for param in chart["params"]} >= {"task", "told", "family"}
         assert "http" not in json.dumps({**chart, "$schema": ""})
+        for values in _all_values(chart):
+            del values[2:-2]  # rows are all alike
         alt.LayerChart.from_dict(chart)  # which is checked by the schema of Vega-Lite
     with pytest.raises(ValidationError, match="3 is not"):
         alt.LayerChart.from_dict({"layer": 3})
     drawn = json.loads(found["ranking"])
     lists = [*drawn.get("datasets", {}).values(), *_all_values(drawn)]
     rows = [[value for value in values if not value.get("heading")] for values in lists]
-    assert len(ranking.standings(traced)) in map(len, rows)
+    assert len(standings) in map(len, rows)
 
 
 def _all_values(chart):

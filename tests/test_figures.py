@@ -29,7 +29,6 @@ from coartic.analysis.figures.profiles import profiles
 from coartic.analysis.figures.published import published
 from coartic.analysis.figures.recruitment import recruitment
 from coartic.analysis.figures.register import SECTIONS
-from coartic.analysis.figures.signature_matrix import signature_matrix
 from coartic.analysis.figures.style import ONE, RC, TWO, amount, looks, number, on, widest
 from coartic.analysis.figures.svg import compact, relative
 from coartic.analysis.figures.tasks import tasks_plot
@@ -145,17 +144,13 @@ def test_wide_figures_are_drawn_one_column_wide_as_well(figures):
     assert widest() == TWO
 
 
-def test_an_unknown_name_gets_an_answer(study, alone):
+def test_an_unknown_name_gets_an_answer(study):
     with pytest.raises(KeyError, match="no figure 'learned'; did you mean 'learned-reward'"):
         study.figures["learned"]
     with pytest.raises(KeyError, match="no figure 0; there are"):
         study.figures[0]
     assert 0 not in study.figures
     assert repr(study.figures).startswith("Figures by id, of Study of ")
-    with pytest.raises(KeyError, match="no table 'claim'; did you mean 'claims'"):
-        alone.tables["claim"]
-    with pytest.raises(KeyError, match="no table 0; `list"):
-        alone.tables[0]
 
 
 def test_every_figure_has_its_row_and_its_section(figures):
@@ -189,9 +184,9 @@ def test_a_folder_without_the_learner(alone):
         context(alone)
 
 
-def test_bars_are_means_of_the_runs(study):
-    runs = study.results.runs
-    data = bars(study).data
+def test_bars_are_means_of_the_runs(study, figures):
+    runs, plot = study.results.runs, figures.plot("learned-reward")
+    data = plot.data
     assert len(data) == 7  # three conditions and two, each task with its initial solution
     for row in data[data.method != "initial"].itertuples():
         own = runs[(runs.task == row.task) & (runs.method == row.method)].reward
@@ -206,7 +201,7 @@ def test_bars_are_means_of_the_runs(study):
         assert first.reward[name] == corrective_trial(load_task(name), "RRRR").reward
     assert first.published.to_dict() == {"two-armed-1": -675, "two-armed-2": -357}
     # The bars themselves: from the initial solution to the mean.
-    panel = bars(study).figure.axes[0]
+    panel = plot.figure.axes[0]
     shown = [(bar.get_y(), bar.get_y() + bar.get_height()) for bar in panel.patches]
     expected = data[(data.task == "two-armed-1") & (data.method != "initial")].reward
     assert [bottom for bottom, _ in shown] == [first.reward["two-armed-1"]] * 3
@@ -396,8 +391,8 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     assert shown != [stars(p) for p in raw["motor-equivalent part"]]
 
 
-def test_signature_matrices(study):
-    plots = {plot.id: plot.data for plot in signature_matrix(study)}
+def test_signature_matrices(study, figures):
+    plots = {plot.id: plot.data for plot in figures.of_section("coarticulation")}
     data = plots["signatures-two-armed-1"]
     own = data[data.signature == "hand entropy"]
     frame = study.signatures
@@ -416,15 +411,14 @@ def test_signature_matrices(study):
     assert set(one.standardised.dropna()) == {0.0}
 
 
-def test_frontier_and_profiles(study):
-    plots = {plot.id: plot.data for plot in frontier(study)}
-    last = plots["frontier-trials"].groupby(["task", "method"]).last()
+def test_frontier_and_profiles(study, figures):
+    last = figures.plot("frontier-trials").data.groupby(["task", "method"]).last()
     runs = study.results.runs
     for (task, method), row in last.iterrows():
         own = runs[(runs.task == task) & (runs.method == method)].reward
         assert row["mean"] == pytest.approx(own.astype(float).mean())
         assert row.budget == 120
-    data = profiles(study).data
+    data = figures.plot("profiles").data
     assert set(data.method) == {"learner"}
     learner = {
         "ascending": "EC1", "descending": "EC1", "two-armed-1": "EC4", "two-armed-2": "EC4",
@@ -457,9 +451,9 @@ def test_published_differences(tmp_path):
 
 
 def test_files_are_the_same_every_time(study, tmp_path):
-    plot = bars(study)
-    first = save(plot, tmp_path / "a")
-    second = save(bars(study), tmp_path / "b" / "deep")
+    pd.testing.assert_frame_equal(bars(study).data, study.figures.plot("learned-reward").data)
+    plot, again = (tasks_plot([load_task("ascending")]) for _ in range(2))
+    first, second = save(plot, tmp_path / "a"), save(again, tmp_path / "b" / "deep")
     assert {path.suffix for path in first} == {*FORMATS, ".csv"}
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes(), one.name
@@ -467,7 +461,7 @@ def test_files_are_the_same_every_time(study, tmp_path):
             assert not re.search(rb"CreationDate|dc:date", one.read_bytes())
     assert b"/FontFile2" in first[2].read_bytes()  # TrueType, embedded
     table = pd.read_csv(first[3])
-    assert table.reward.tolist() == pytest.approx(plot.data.reward.tolist())
+    np.testing.assert_allclose(table.x, plot.data.x)
 
 
 def test_files_that_cannot_be_written(study, tmp_path):

@@ -294,6 +294,10 @@ def test_tables_of_a_study_are_those_of_its_report(of_odd, few_figures):
     methods = tables["methods-a-b"].set_index("method").reward
     row = study.method_rows["A_b", "dual-process/EC4"]
     assert methods["dual-process/EC4"] == row.reward
+    with pytest.raises(KeyError, match="no table 'method-a-b'; did you mean 'methods-a-b'"):
+        tables["method-a-b"]
+    with pytest.raises(KeyError, match="no table 0; `list"):
+        tables[0]
 
 
 def test_which_report_is_meant(tmp_path):
