@@ -260,14 +260,14 @@ def _choices(tasks: list[str], told: Iterable[str], families: Iterable[str]) -> 
 
 
 def _chosen(values: list[dict[str, Any]], chosen: Iterable[Any]) -> Any:
-    chart = _chart(values)
+    chart = _chart(tuple(values))  # which Altair does not copy whenever it copies a chart
     for name in (param.param.name for param in chosen):
         any_of_them = "" if name == "task" else f"{name} === 'all' || "
         chart = chart.transform_filter(f"{any_of_them}datum.{name} === {name}")
     return chart
 
 
-def _chart(values: list[dict[str, Any]]) -> Any:
+def _chart(values: Sequence[dict[str, Any]]) -> Any:
     return alt.Chart(alt.InlineData(values=values))
 
 
