@@ -5,13 +5,15 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
@@ -169,11 +171,21 @@ def _settle(figure: Figure) -> None:
 
     It has no layout engine then: with one, every file would draw all twice.
     """
-    for text in figure.findobj(Text):
-        assert isinstance(text, Text)
+    for text in _texts(figure):
         text.set_text("\n".join(map(printed, text.get_text().split("\n"))))
     if (engine := figure.get_layout_engine()) is not None:
         for _ in range(2):  # the first time does not know how tall titles are
             engine.execute(figure)
         with rc_context(_NO_LAYOUT):
             figure.set_layout_engine(None)
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """All words but those at ticks, which are written when they are drawn."""
+    for child in artist.get_children():
+        if isinstance(child, Axis):
+            yield child.label
+        elif isinstance(child, Text):
+            yield child
+        else:
+            yield from _texts(child)
