@@ -211,59 +211,95 @@ def test_what_is_kept_of_a_run_is_bounded(known, shared, monkeypatch):
     assert "it answered with more than 1 MiB" in shared(spec).reason
 
 
-@pytest.mark.parametrize("moment", ["at work", 0.7])
+class Suite:
+    """A command that runs many short lots: something is kept soon, and much is left to do.
+
+    It begins as a fork, or by itself.
+    """
+
+    COMMAND = ("run", "paper", "--tasks", "ascending", "--runs", "2000", "--trials", "1000")
+
+    def __init__(self, folder, jobs, *, by_itself):
+        self._folder, self._mark = folder, f"COARTIC_TEST_MARK={folder}".encode()
+        self._log = folder.with_name(f"{folder.name}.log")
+        environment = os.environ | {"COARTIC_TEST_MARK": str(folder)}
+        words = [*self.COMMAND, "--out", str(folder), "--jobs", str(jobs)]
+        with self._log.open("wb") as log, open(os.devnull, "r+b") as nothing:
+            if by_itself:
+                self.process = subprocess.Popen(
+                    [sys.executable, "-m", "coartic", *words],
+                    stdout=nothing, stderr=log, env=environment,
+                )  # fmt: skip
+            else:
+                streams = [file.fileno() for file in (nothing, nothing, log)]
+                command = ["coartic.cli", *words]
+                self.process = sandbox.subprocess.start(command, environment, streams)
+
+    @property
+    def error(self):
+        return self._log.read_text(encoding="utf-8")
+
+    def marked(self, name=""):
+        """Processes of this suite, from it on down, or that it has left, with their commands;
+        those of a name."""
+        found = {}
+        for entry in Path("/proc").glob("[0-9]*"):
+            try:
+                if self._mark in (entry / "environ").read_bytes():
+                    command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+                    found[int(entry.name)] = command
+            except OSError:
+                continue
+        return {
+            pid: command for pid, command in found.items()
+            if name in command and "resource_tracker" not in command
+        }  # fmt: skip
+
+    def await_processes(self, name, number, seconds):
+        """So many processes of that name, or as many as there are after some seconds."""
+        deadline = time.monotonic() + seconds
+        while len(found := self.marked(name)) < number and time.monotonic() < deadline:
+            assert self.process.poll() is None, self.error
+            time.sleep(0.01)
+        return found
+
+    def await_records(self):
+        deadline = time.monotonic() + 300  # as long as a worker may take to start
+        while not packs_of(self._folder):
+            assert self.process.poll() is None, self.error
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+
+
+@pytest.mark.parametrize("moment", ["at work", "starting"])
 @pytest.mark.parametrize("word", [signal.SIGKILL, signal.SIGINT])
 def test_no_worker_outlives_its_suite(moment, word, tmp_path):
     """Killed or interrupted at work or as it starts, a suite takes its workers along.
 
     ``python -m coartic.benchmarks.kill_resume`` does it at a hundred moments.
     """
-    jobs = "2" if word == signal.SIGINT else "1"  # a suite that ends has to end each of them
-    # Many short lots: something is kept soon, and much is left to do.
-    many = ("--runs", "2000", "--trials", "1000", "--jobs", jobs)
-    suite = subprocess.Popen(
-        [sys.executable, "-m", "coartic", "run", "paper", "--out", tmp_path, *many],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "COARTIC_TEST_MARK": str(tmp_path)},
-    )
-
-    def marked():
-        found = []
-        for entry in Path("/proc").glob("[0-9]*"):
-            try:
-                if f"COARTIC_TEST_MARK={tmp_path}".encode() in (entry / "environ").read_bytes():
-                    found.append((entry / "cmdline").read_bytes().replace(b"\0", b" ").decode())
-            except OSError:
-                continue
-        return [command for command in found if "resource_tracker" not in command]
-
-    deadline = time.monotonic() + 300  # as long as a worker may take to start
+    in_order = word == signal.SIGINT
+    jobs = 2 if in_order and moment == "starting" else 1  # each of them has to be ended
+    suite = Suite(tmp_path / "out", jobs, by_itself=in_order and moment == "at work")
     try:
         if moment == "at work":
-            while not packs_of(tmp_path):
-                assert suite.poll() is None, suite.stderr.read().decode()
-                assert time.monotonic() < deadline
-                time.sleep(0.05)
-            # At least one: a worker about to start a program of its own counts twice.
-            soon = time.monotonic() + 10
-            while not any("coartic.benchmarks.worker" in command for command in marked()):
-                if time.monotonic() > soon:  # between two workers, on a machine at its limits
-                    break
-                time.sleep(0.01)
-            assert marked()
+            suite.await_records()
+            # There is none between two workers, on a machine at its limits.
+            for worker in suite.await_processes("coartic.benchmarks.worker", 1, 10):
+                if not in_order:
+                    os.kill(worker, signal.SIGSTOP)  # or it would see that nobody asks
         else:
-            time.sleep(moment)
+            assert suite.await_processes("coartic.benchmarks.guard", jobs, 300)
+        assert suite.marked()
     finally:
-        suite.send_signal(word)
-        _, error = suite.communicate(timeout=120)
+        os.kill(suite.process.pid, word)
+        code = suite.process.wait(120)
     deadline = time.monotonic() + 60  # however long it took to get to work
-    assert suite.returncode != 0, error
-    if moment == "at work" and word == signal.SIGINT:
-        assert suite.returncode == 130, error
-        assert b" done now " in error
-    while marked():
-        assert time.monotonic() < deadline, marked()
+    assert code == (130 if in_order else -signal.SIGKILL), suite.error
+    if in_order:
+        assert " done now " in suite.error
+    while suite.marked():
+        assert time.monotonic() < deadline, suite.marked()
         time.sleep(0.05)
 
 
@@ -361,12 +397,13 @@ def test_a_run_that_was_disturbed_is_tried_again_in_fresh_processes(
     assert [one.jobs for one in counted.made] == [["x"]] * tries
 
 
-@pytest.mark.usefixtures("sandboxes_by_themselves")
+@pytest.mark.usefixtures("no_sandbox_before")
 def test_a_line_from_elsewhere_is_no_answer():
     """Whoever may write into a worker's stream does not know what it was asked."""
     own = Sandbox()
     try:
         (worker,) = workers()
+        os.kill(worker, signal.SIGSTOP)  # it would answer first
         stream = next(
             path for path in Path(f"/proc/{worker}/fd").iterdir()
             if os.readlink(path) == os.readlink(f"/proc/self/fd/{own._guard.stdout.fileno()}")
@@ -374,7 +411,7 @@ def test_a_line_from_elsewhere_is_no_answer():
         line = b'{"error": null, "answer": 1}\n'
         other = threading.Timer(0.05, lambda: stream.write_bytes(line))
         other.start()
-        answer = own.ask(PREPARE, 60.0)  # loads kernels, which takes longer
+        answer = own.ask(PREPARE, 60.0)
         other.join()
     finally:
         own.close()
