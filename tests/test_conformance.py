@@ -7,8 +7,8 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.results.optima import entries
+from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks import registry as registry_module
-from coartic.benchmarks import reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.registry import registry
@@ -38,21 +38,26 @@ LAWS = [
 ]
 
 
+TRIALS = 30
+"""Half of what a contributor's check makes: enough to learn something, and more than a budget
+allows. Where none succeeds, each takes as long as it may."""
 FEW_TASKS = [load_task("ascending"), tiny_task()]
 """For what breaks a law."""
 ONE_GOAL = [
-    tiny_task(name=name, goals=[goal], initial_hands="R")
+    tiny_task(name=name, goals=[goal], hands=["right"], initial_hands="R")
     for name, goal in (("near", [4.5, 1.0]), ("far", [5.0, 2.0]))
 ]
 """For searches that take seconds on any shipped task; tests/test_optimum.py has those."""
-SHORT_TASKS = [load_task("ascending"), ONE_GOAL[0]]
+TWO_GOALS = [tiny_task(hands=["right"]), ONE_GOAL[0]]
+"""For programmes that are solved for one goal in another way."""
+SHORT_TASKS = [load_task("ascending"), tiny_task(goals=[[4.5, 1.0]], initial_hands="R")]
 """For searches that take seconds on two hands and four goals."""
 TASKS = {
     "optimum/": ONE_GOAL,
     "cma-es/bandit": FEW_TASKS,  # of both hands, as it chooses among hand sequences
     "nullspace-qp/": SHORT_TASKS,
     "posture-based/": SHORT_TASKS,
-    "trajectory-optimisation/path-length": SHORT_TASKS,
+    "trajectory-optimisation/path-length": TWO_GOALS,
     "trajectory-optimisation/": ONE_GOAL,  # the same programme for other costs
 }
 """What some methods are checked on, the first that fits; the others on all shipped tasks."""
@@ -67,10 +72,11 @@ def known():
 
 @pytest.fixture(autouse=True)
 def one_sandbox(monkeypatch):
-    """The broken methods share a process, as this project's do, and the other process that a
-    result is compared with is this one: a start takes longer than all their runs. That each has
-    one of its own is for tests/test_sandbox.py."""
+    """Few trials in few processes. The broken methods share one, as this project's do, and the
+    other process that a result is compared with is this one: a start takes longer than all their
+    runs. That each has one of its own is for tests/test_sandbox.py."""
     own_job = RunSpec.job
+    monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(RunSpec, "job", lambda spec: {**own_job(spec), "owner": None})
     monkeypatch.setattr(reproduce, "supervise", performed)
 
