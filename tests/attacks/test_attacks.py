@@ -78,12 +78,36 @@ def whole(session_folder):
 
 @pytest.fixture
 def copied(whole, tmp_path):
-    """A fresh copy of the finished folder, as often as one is asked for."""
+    """A fresh copy of the finished folder, as often as one is asked for.
+
+    Again, only what is not as it was is copied: what was written since is not as old.
+    """
+    folder = tmp_path / "results"
+    entries = [path.relative_to(whole) for path in whole.rglob("*")]
+
+    def is_there(name):
+        path = folder / name
+        if path.is_symlink() or not path.exists():
+            return False
+        return path.is_dir() if (whole / name).is_dir() else path.stat().st_mtime_ns == 0
 
     def copy():
-        folder = tmp_path / "results"
-        shutil.rmtree(folder, ignore_errors=True)
-        return shutil.copytree(whole, folder, copy_function=shutil.copyfile)
+        folder.mkdir(exist_ok=True)
+        missing = [name for name in entries if not is_there(name)]
+        others = {path.relative_to(folder) for path in folder.rglob("*")} - {*entries}
+        for name in (*missing, *sorted(others, reverse=True)):
+            path = folder / name
+            if path.is_dir() and not path.is_symlink():
+                path.rmdir()
+            else:
+                path.unlink(missing_ok=True)
+        for name in missing:
+            if (whole / name).is_dir():
+                (folder / name).mkdir()
+            else:
+                shutil.copyfile(whole / name, folder / name)
+                os.utime(folder / name, (0, 0))
+        return folder
 
     return copy
 
