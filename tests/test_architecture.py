@@ -1,12 +1,21 @@
 """Imports point one way only, and kinematics has one home."""
 
 import ast
+import importlib
+import json
+import multiprocessing
+import os
+import pkgutil
 import re
+import signal
 import subprocess
 import sys
+import warnings
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
+import psutil
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -73,17 +82,37 @@ def test_the_command_line_uses_all_it_sits_on():
     assert {"coartic", "benchmarks", "analysis"} <= roots
 
 
-PUBLIC = """
+FRESH = """
 import gc, sys
+gc.disable()  # all is imported
 import coartic
-gc.disable()  # while all is imported
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
+from coartic.benchmarks.worker import _method
+assert _method("dual-process/EC1", None, "coartic.dual_process").name == "dual-process/EC1"
+assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.registry"} & set(sys.modules)
+print("worker", flush=True)
 from coartic import *
 from pkgutil import iter_modules
 modules = {module.name for module in iter_modules(coartic.__path__)}
 assert not modules & set(coartic.__all__), "a module would hide what has its name"
-print("public", flush=True)
 """
+
+
+@pytest.fixture(scope="module")
+def fresh():
+    """How the program ended, in a process of its own."""
+    command = [sys.executable, "-c", FRESH]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_a_worker_imports_its_method_alone(fresh):
+    """What other methods import would take as long as all else of a worker's start."""
+    assert fresh.stdout == "worker\n", fresh.stderr
+
+
+def test_the_package_imports_what_is_asked_for(fresh):
+    """Every public name is there, under its own name whatever is imported first."""
+    assert fresh.returncode == 0, fresh.stderr
 
 
 def test_help_needs_no_compiler():
@@ -93,18 +122,6 @@ def test_help_needs_no_compiler():
     imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert not imported & {"numba", "numpy", "pandas", "matplotlib"}
     assert not imported & {"coartic.baselines", "coartic.analysis"}
-
-
-def test_a_worker_imports_its_method_alone():
-    """What other methods import would take as long as all else of a worker's start."""
-    program = """
-import gc, sys
-gc.disable()
-from coartic.benchmarks.worker import _method
-assert _method("dual-process/EC1", None, "coartic.dual_process").name == "dual-process/EC1"
-assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.registry"} & set(sys.modules)
-"""
-    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
 
 
 def test_one_kinematic_module():
@@ -129,74 +146,61 @@ def test_no_module_is_imported_but_undeclared():
             assert f'"{aliases.get(root, root)}>=' in declared, f"{path}: {root}"
 
 
-WITHOUT_POSIX = """
-import importlib, os, pkgutil, signal, sys
-from pathlib import Path
-from types import SimpleNamespace
-
-PACKAGES = sys.argv[2].split(",")
-
 def everything():
-    for name in PACKAGES:
-        package = importlib.import_module(name)
-        for module in pkgutil.walk_packages(package.__path__, f"{name}."):
-            if not module.name.endswith("__main__"):
-                importlib.import_module(module.name)
-
-everything()  # with all the libraries, which know by themselves where they are
-for name in [name for name in sys.modules if name.partition(".")[0] in PACKAGES]:
-    del sys.modules[name]
-for name in ("fcntl", "grp", "pwd", "resource", "termios"):
-    sys.modules[name] = None
-for module, names in (
-    (os, "fork getuid geteuid killpg setsid uname fchmod O_DIRECTORY O_NOFOLLOW"),
-    (signal, "SIGKILL SIGHUP SIGSTOP SIGALRM"),
-):
-    for name in names.split():
-        if hasattr(module, name):
-            delattr(module, name)
-everything()
-
-import json, psutil
-from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import plan_cells, plan_suite
-from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.benchmarks.worker import perform
-from coartic.analysis.results.folder import load_results
-
-class Here:
-    def perform(self, jobs):
-        for job in jobs:
-            said = {"error": None, "answer": perform(job)}
-            yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
-
-psutil.Process.memory_info = lambda process: SimpleNamespace(peak_wset=2**20)
-suite = load_suite("quick")
-cells = select_cells(suite, registry())
-assert len(plan_suite(suite, runs=2, trials=5).planned) > len(cells)
-report = plan_cells(suite, cells[:1], runs=1, trials=5).perform(sys.argv[1], executor=Here())
-(record,) = report.records.values()
-assert record.timing.process_peak_mb == 1.0
-assert load_results(report.folder).runs.reward.tolist() == [record.solution.reward]
-"""
+    package = importlib.import_module("coartic")
+    for module in pkgutil.walk_packages(package.__path__, "coartic."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
 
 
-@pytest.fixture(scope="module")
-def fresh(tmp_path_factory):
-    """How both programs end in one process, which imports all libraries."""
-    out = tmp_path_factory.mktemp("fresh") / "out"
-    command = [sys.executable, "-c", PUBLIC + WITHOUT_POSIX, out, "coartic"]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+def without_posix(out):
+    """Modules are imported, a suite is planned, a record kept and read; in a process of its own,
+    which imports all libraries or has them from this one."""
+    everything()  # with all the libraries, which know by themselves where they are
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("coartic", "tests")]:
+        del sys.modules[name]
+    for name in ("fcntl", "grp", "pwd", "resource", "termios"):
+        sys.modules[name] = None
+    for module, names in (
+        (os, "fork getuid geteuid killpg setsid uname fchmod O_DIRECTORY O_NOFOLLOW"),
+        (signal, "SIGKILL SIGHUP SIGSTOP SIGALRM"),
+    ):
+        for name in names.split():
+            if hasattr(module, name):
+                delattr(module, name)
+    everything()
+
+    from coartic.analysis.results.folder import load_results
+    from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.run import plan_cells, plan_suite
+    from coartic.benchmarks.suites import load_suite, select_cells
+    from coartic.benchmarks.worker import perform
+
+    class Here:
+        def perform(self, jobs):
+            for job in jobs:
+                said = {"error": None, "answer": perform(job)}
+                yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
+
+    psutil.Process.memory_info = lambda process: SimpleNamespace(peak_wset=2**20)
+    suite = load_suite("quick")
+    cells = select_cells(suite, registry())
+    assert len(plan_suite(suite, runs=2, trials=5).planned) > len(cells)
+    report = plan_cells(suite, cells[:1], runs=1, trials=5).perform(out, executor=Here())
+    (record,) = report.records.values()
+    assert record.timing.process_peak_mb == 1.0
+    assert load_results(report.folder).runs.reward.tolist() == [record.solution.reward]
 
 
-def test_the_package_imports_what_is_asked_for(fresh):
-    """Every public name is there, under its own name whatever is imported first."""
-    assert fresh.stdout.startswith("public\n"), fresh.stderr
-
-
-def test_nothing_needs_what_posix_alone_has(fresh):
-    """As on Windows: modules are imported, a suite is planned, a record kept and read."""
-    assert fresh.returncode == 0, fresh.stderr
+def test_nothing_needs_what_posix_alone_has(tmp_path):
+    """As on Windows."""
+    how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    process = how.Process(target=without_posix, args=(tmp_path / "out",))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of threads, which a fork does not have
+        process.start()
+    process.join()
+    assert process.exitcode == 0
 
 
 def test_git_ignores_no_source():
