@@ -22,10 +22,9 @@ import pytest
 from coartic import CoarticError
 from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
-from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
 from tests.support.nursery import Nursery
-from tests.support.suites import KNOWN, paper_cells, run_and_write, same_tables
+from tests.support.suites import paper_cells, run_and_write, same_tables, suite_of
 
 LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 
@@ -248,7 +247,7 @@ def test_workers_that_cannot_perform_runs_are_said_so(cluster, quick, monkeypatc
 
 def test_results_equal_the_local_ones_though_a_worker_dies(cluster, tmp_path):
     cells = paper_cells(tasks=["two-armed-1", "ascending"])
-    local = run_and_write(tmp_path / "local", cells, runs=3, trials=300)
+    local = run_and_write(tmp_path / "local", cells, runs=3, trials=100)
     seen = []
     workers = cluster.workers(2)
 
@@ -259,22 +258,23 @@ def test_results_equal_the_local_ones_though_a_worker_dies(cluster, tmp_path):
             threading.Thread(target=workers[0].kill).start()
 
     far = run_and_write(
-        tmp_path / "far", cells, runs=3, trials=300, executor=Dask(cluster.address), watch=watch
+        tmp_path / "far", cells, runs=3, trials=100, executor=Dask(cluster.address), watch=watch
     )
     assert [worker.alive for worker in workers] == [False, True]
     assert len(seen) == len(set(seen)) == 12
     same_tables(far, local)
 
 
-def test_instances_of_families_on_two_workers(cluster, tmp_path):
-    """Tasks that no file has reach the workers whole."""
-    names, methods = ["two-armed/v1/i003", "aligned/v1/i000"], ["EC4", "corrective-alone/given"]
-    cells = select_cells(load_suite("families"), KNOWN, tasks=names, methods=methods)
-    local = run_and_write(tmp_path / "local", cells, runs=2, trials=200)
-    cluster.workers(2)
-    far = run_and_write(
-        tmp_path / "far", cells, runs=2, trials=200, executor=Dask(cluster.address)
+def test_instances_of_families_reach_a_worker_whole(cluster, tmp_path):
+    """Tasks that no file has."""
+    cells = suite_of(
+        tmp_path,
+        'tasks = ["two-armed/v1/i003", "aligned/v1/i000"]\n'
+        'methods = ["dual-process/EC4", "corrective-alone/given"]',
     )
+    local = run_and_write(tmp_path / "local", cells, runs=2, trials=50)
+    cluster.workers(1)
+    far = run_and_write(tmp_path / "far", cells, runs=2, trials=50, executor=Dask(cluster.address))
     assert len(far.runs) == 6
     same_tables(far, local)
 
