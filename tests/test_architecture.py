@@ -3,20 +3,20 @@
 import ast
 import importlib
 import json
-import multiprocessing
 import os
 import pkgutil
 import re
 import signal
 import subprocess
 import sys
-import warnings
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
 import psutil
 import pytest
+
+from tests.support.forks import apart, forget
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
@@ -157,8 +157,7 @@ def without_posix(out):
     """Modules are imported, a suite is planned, a record kept and read; in a process of its own,
     which imports all libraries or has them from this one."""
     everything()  # with all the libraries, which know by themselves where they are
-    for name in [name for name in sys.modules if name.partition(".")[0] in ("coartic", "tests")]:
-        del sys.modules[name]
+    forget("coartic", "tests")
     for name in ("fcntl", "grp", "pwd", "resource", "termios"):
         sys.modules[name] = None
     for module, names in (
@@ -194,13 +193,7 @@ def without_posix(out):
 
 def test_nothing_needs_what_posix_alone_has(tmp_path):
     """As on Windows."""
-    how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    process = how.Process(target=without_posix, args=(tmp_path / "out",))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of threads, which a fork does not have
-        process.start()
-    process.join()
-    assert process.exitcode == 0
+    apart(without_posix, tmp_path / "out")
 
 
 def test_git_ignores_no_source():

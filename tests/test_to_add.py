@@ -1,12 +1,10 @@
 """The table "to add" of CONTRIBUTING: what is added by its steps alone is in a report."""
 
-import multiprocessing
 import shutil
-import sys
-import warnings
 
 import pytest
 
+from tests.support.forks import apart, forget
 from tests.support.suites import ROOT
 
 METHOD = (ROOT / "tests/example_plugin/coartic_example/__init__.py").read_text(encoding="utf-8")
@@ -82,9 +80,7 @@ def look(house):
 
     In a process of its own. If it is a fork it has imported these packages as they are here.
     """
-    for name in [*sys.modules]:
-        if name.partition(".")[0] == "coartic" or name.startswith("tests.support"):
-            del sys.modules[name]
+    forget("coartic", "tests")
     import coartic
 
     coartic.__path__.insert(0, str(house))  # the other packages come from here
@@ -176,10 +172,4 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
         "[tasks_table(study)]",
         "[tasks_table(study), longest_table(study)]",
     )
-    how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    process = how.Process(target=look, args=(house,))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of threads, which a fork does not have
-        process.start()
-    process.join()
-    assert process.exitcode == 0
+    apart(look, house)
