@@ -50,7 +50,7 @@ def shortest_reach(task):
             constraints={"type": "ineq", "fun": inside},
             method="SLSQP",
         )
-        for _ in range(20)
+        for _ in range(10)
     ]
     return math.ceil(min(math.sqrt(f.fun) for f in found if f.success) / 0.01) + 1
 
@@ -60,9 +60,9 @@ def test_one_goal_is_reached_on_the_shortest_line():
     alone = -corrective_trial(ONE_GOAL, "R").reward
     assert alone > shortest + 5
     for method in cma_es.METHODS:
-        session, _ = solve(method, ONE_GOAL, trials=1500)
+        session, _ = solve(method, ONE_GOAL, trials=800)
         assert shortest - 1 <= -max(session.rewards) <= shortest + 1
-    climbing, _ = solve(random_search.Climbing, ONE_GOAL, trials=1500)
+    climbing, _ = solve(random_search.Climbing, ONE_GOAL, trials=800)
     assert max(climbing.rewards) > -alone
 
 
@@ -218,8 +218,8 @@ def one_by_one(method, task, seed, parameters):
 )
 def test_trials_made_together_are_those_made_one_by_one(method, parameters, task):
     for seed in range(2):
-        session, _ = solve(method, task, seed, trials=500, **parameters)
-        alone = one_by_one(method, task, seed, method.Parameters(trials=500, **parameters))
+        session, _ = solve(method, task, seed, trials=300, **parameters)
+        alone = one_by_one(method, task, seed, method.Parameters(trials=300, **parameters))
         assert session.rewards == alone.rewards
         made, single = session.meter.as_dict(), alone.meter.as_dict()
         assert all(made[name] == single[name] for name in Meter.COUNTS)
