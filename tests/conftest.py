@@ -9,7 +9,6 @@ import sys
 import pytest
 from filelock import FileLock
 from hypothesis import settings
-from joblib import cpu_count
 
 from coartic.benchmarks.guard import THREADS
 
@@ -177,6 +176,8 @@ def pytest_collection_modifyitems(items):
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers():
     """One more than there are cores: some tests wait, for processes or for a clock."""
+    from joblib import cpu_count
+
     return cpu_count() + 1
 
 
