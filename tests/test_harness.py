@@ -425,7 +425,7 @@ def test_robots_of_different_size_share_a_table(tmp_path):
         name="small", robot={"left_links": [2.0], "right_links": [1.0] * 11},
         start={"left": [0.1], "right": [0.1] * 11}, goals=[[3.0, 1.0]], initial_hands="R",
     )  # fmt: skip
-    cells = [Cell(small, KNOWN["dual-process/EC4"]), *paper_cells()[:1]]
+    cells = [Cell(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
     found = run_and_write(tmp_path, cells, trials=20)
     names = list(found.solutions().columns[6:])
     assert names[2:6] == ["left_1", "left_2", "left_3", "left_4"]

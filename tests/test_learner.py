@@ -26,7 +26,7 @@ from coartic import (
 )
 from coartic.learning import TRIALS
 from coartic.robot import HANDS
-from tests.support.strategies import PAPER_CELLS, UNEVEN, tiny_task
+from tests.support.strategies import PAPER_CELLS, tiny_task, uneven_task
 
 
 def same_run(a, b):
@@ -113,21 +113,15 @@ def test_variants_equal_the_slow_learner_trial_by_trial(variant):
 )
 def test_conditions_are_data(chosen, other, hands):
     """Every combination of the condition's fields, on an uneven robot on a rail."""
-    task = tiny_task(
-        robot={
-            "left_links": [0.7],
-            "right_links": [1.2, 0.4, 0.9],
-            "left_shoulder": [-0.3, 0.2],
-        },
-        start={"left": [1.0], "right": [0.5, -0.5, 0.2]},
+    task = uneven_task(
+        [1.0],
+        [0.5, -0.5, 0.2, 1.0],
         locked_base=["x"],
         goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
         initial_hands="RLR",
     )
-    assert task.robot == UNEVEN
     condition = ExplorationCondition("own", ("left", "right"), chosen, other, hands, 0.4, 0.1)
-    trials, seed = (8, 14) if hands == "random" else (6, 11)
-    slow = assert_equals_reference(task, condition, trials, seed)
+    slow = assert_equals_reference(task, condition, 8 if hands == "random" else 6, seed=0)
     assert slow.corrections > len(task.goals)
     assert slow.completed.all() == (hands != "random")  # a random hand fails now and then
     assert bettered(slow) or not other

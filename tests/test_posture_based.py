@@ -13,7 +13,7 @@ from coartic import execute, load_task
 from coartic.baselines.posture_based import OneGoal, TwoGoals
 from coartic.method import MethodError, Session
 from coartic.task import letters_of
-from tests.support.strategies import UNEVEN, tiny_task
+from tests.support.strategies import tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
 STEP = 0.01  # m
@@ -74,9 +74,7 @@ def bent(**changes):
 
 
 def uneven(**changes):
-    start = {"base": [0.1, 0.0], "left": [2.0], "right": [0.6, 0.5, -0.4]}
-    robot = {key: getattr(UNEVEN, key) for key in ("left_links", "right_links", "left_shoulder")}
-    return tiny_task(robot=robot, start=start, **changes)
+    return uneven_task([2.0], [0.6, 0.5, -0.4, 0.2], base=[0.1, 0.0], **changes)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from coartic.readings import (
 )
 from coartic.robot import HANDS, Robot
 from coartic.task import builtin_tasks, checked_task, load_task
-from tests.support.strategies import UNEVEN, tiny_task
+from tests.support.strategies import tiny_task, uneven_task
 
 APPLIED = {
     "model": [PAPER],
@@ -212,13 +212,9 @@ def read_together():
 
 
 def test_the_learner_is_the_slow_one_whatever_is_read_together():
-    task = tiny_task(
-        robot={
-            "left_links": list(UNEVEN.left_links),
-            "right_links": list(UNEVEN.right_links),
-            "left_shoulder": list(UNEVEN.left_shoulder),
-        },
-        start={"left": [1.0], "right": [0.5, -0.5, 0.2]},
+    task = uneven_task(
+        [1.0],
+        [0.5, -0.5, 0.2, 0.1],
         goals=[[1.6, 0.9], [1.2, 1.1], [1.7, 0.7]],
         initial_hands="RLR",
     )

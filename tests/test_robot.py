@@ -9,14 +9,15 @@ from hypothesis.extra.numpy import arrays
 
 from coartic.compiled import entry, joint_chain, joint_lever
 from coartic.robot import HANDS, Robot
+from tests.support import strategies
+from tests.support.strategies import UNEVEN
 
 PAPER_ROBOT = Robot()
-UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9), left_shoulder=(-0.3, 0.2))
 ROBOTS = [PAPER_ROBOT, UNEVEN]
 
 
 def configurations(robot, low=-10.0, high=10.0):
-    return arrays(np.float64, robot.dof, elements=st.floats(low, high))
+    return strategies.configurations(robot, low, high)
 
 
 @pytest.mark.parametrize(
@@ -206,7 +207,10 @@ def test_base_outline():
 
 
 def test_names_and_shapes():
-    assert UNEVEN.joint_names == ("base_x", "base_y", "left_1", "right_1", "right_2", "right_3")
+    assert UNEVEN.joint_names == (
+        *("base_x", "base_y", "left_1"),
+        *(f"right_{k}" for k in range(1, 5)),
+    )
     with pytest.raises(ValueError, match=r"shape \(9,\).*needs \(\.\.\., 10\)"):
         PAPER_ROBOT.forward_kinematics(np.zeros(9), "left")
     with pytest.raises(ValueError, match="unknown hand 'middle'"):

@@ -15,7 +15,7 @@ from coartic import (
 )
 from coartic.errors import SolutionError
 from coartic.reference import move as reference_move
-from tests.support.strategies import PAPER_CELLS, UNEVEN, configurations, tiny_task
+from tests.support.strategies import PAPER_CELLS, configurations, tiny_task, uneven_task
 
 
 def agrees(task, movements):
@@ -60,21 +60,12 @@ def test_corrective_solutions(name):
 def solutions(draw):
     """A task for either robot, with planned, path and corrective movements that miss or hit."""
     uneven = draw(st.booleans())
-    task = tiny_task(
-        goals=[[3.0, 1.0], [3.2, 1.4]],
-        **(
-            {
-                "robot": {
-                    "left_links": list(UNEVEN.left_links),
-                    "right_links": list(UNEVEN.right_links),
-                    "left_shoulder": list(UNEVEN.left_shoulder),
-                },
-                "start": {"base": [0.0, 0.0], "left": [0.1], "right": [0.2, 0.3, -0.4]},
-            }
-            if uneven
-            else {"start": {"base": [0.0, 0.0], "left": [0.3] * 4, "right": [0.2] * 4}}
-        ),
-    )
+    goals = [[3.0, 1.0], [3.2, 1.4]]
+    if uneven:
+        task = uneven_task([0.1], [0.2, 0.3, -0.4, 0.1], goals=goals)
+    else:
+        start = {"base": [0.0, 0.0], "left": [0.3] * 4, "right": [0.2] * 4}
+        task = tiny_task(start=start, goals=goals)
     near = configurations(task.robot, -1.5, 1.5)
     movements = []
     for goal in (1, 2):

@@ -8,18 +8,15 @@ from hypothesis import strategies as st
 from coartic import MotionModel, Movement, corrective_trial, execute, hand_sequences, load_task
 from coartic.task import builtin_tasks, hands_of
 from coartic.trials import make_trials
-from tests.support.strategies import UNEVEN, tiny_task
+from tests.support.strategies import tiny_task, uneven_task
 
 TASKS = [
     *map(load_task, builtin_tasks()),
     tiny_task(),
-    tiny_task(
-        robot={
-            "left_links": UNEVEN.left_links,
-            "right_links": UNEVEN.right_links,
-            "left_shoulder": UNEVEN.left_shoulder,
-        },
-        start={"base": [0.5, -0.5], "left": [0.3], "right": [0.1, 0.4, -0.2]},
+    uneven_task(
+        [0.3],
+        [0.1, 0.4, -0.2, 0.2],
+        base=[0.5, -0.5],
         goals=[[2.0, 1.0], [1.0, 0.5], [1.05, 0.5], [3.0, 0.0]],
         initial_hands="RRRR",
         locked_base=["x"],

@@ -16,7 +16,8 @@ PAPER_CELLS = [
     ("two-armed-2", "EC4"),
 ]
 
-UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9), left_shoulder=(-0.3, 0.2))
+UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9, 0.6), left_shoulder=(-0.3, 0.2))
+"""As many links as the paper's robot at most: its kernels are compiled for that number."""
 
 
 def configurations(robot, low=-4.0, high=4.0):
@@ -33,6 +34,15 @@ def tiny_task(**changes):
     }
     content.update(changes)
     return parse_task({key: value for key, value in content.items() if value is not None}, "tiny")
+
+
+def uneven_task(left, right, base=(0.0, 0.0), **changes):
+    """As :func:`tiny_task`, for an uneven robot, whose arms start with these joints (rad)."""
+    keys = ("left_links", "right_links", "left_shoulder")
+    start = {"base": list(base), "left": left, "right": right}
+    return tiny_task(
+        robot={key: list(getattr(UNEVEN, key)) for key in keys}, start=start, **changes
+    )
 
 
 def changed(like, **update):
