@@ -13,13 +13,14 @@ import hashlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 import numpy as np
+from filelock import FileLock, Timeout
 from llvmlite import binding
 from numba import njit, types
 from numba.core import cgutils
@@ -36,6 +37,8 @@ binding.set_option("coartic", "-unroll-threshold=1000")
 binding.set_option("coartic", "-unroll-peel-max-count=0")
 
 PACKAGE = Path(__file__).parent
+_KEPT_S = 30 * 24 * 3600.0
+_PATIENCE_S = 120.0  # with a process that compiles a kernel, on a slow machine
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -101,10 +104,13 @@ def _cache_folder() -> Path | None:
 
 def _prune(root: Path, current: Path) -> None:
     """Remove machine code of older sources that nobody has used for a month."""
+    before = time.time() - _KEPT_S
     for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
         with contextlib.suppress(OSError):
-            used = max(path.stat().st_atime for path in [folder, *folder.rglob("*")])
-            if folder != current and time.time() - used > 30 * 24 * 3600:
+            if folder == current or folder.stat().st_mtime > before:
+                continue
+            files = [path for path in folder.rglob("*") if path.is_file()]  # a look uses folders
+            if max((path.stat().st_atime for path in files), default=0.0) < before:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -157,6 +163,29 @@ def entry(function: F) -> F:
     finally:
         numba.config.CACHE_DIR = before
     return compiled
+
+
+def compile_together(kernels: Mapping[str, Callable[[], object]]) -> None:
+    """Call kernels for the first time, by name; processes that begin at once share the work.
+
+    What another compiles now comes last, and is loaded once it is done there.
+    """
+    folder, waiting = _cache_folder(), dict(kernels)
+    locks = {name: FileLock(folder / f"{name}.lock") for name in kernels if folder is not None}
+    for patience in (0.0, _PATIENCE_S):
+        for name in [name for name in locks if name in waiting]:
+            try:
+                locks[name].acquire(timeout=patience)
+            except Timeout:
+                continue
+            except (OSError, NotImplementedError):  # no locks here, and nothing to share
+                pass
+            try:
+                waiting.pop(name)()
+            finally:
+                locks[name].release()
+    for call in waiting.values():
+        call()
 
 
 _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy hands it to C

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import addresses
+from coartic.compiled import addresses, compile_together
 from coartic.corrective import correct
 from coartic.errors import LOADED, CoarticError, NotApplicableError, need
 from coartic.exploration import ExplorationCondition, load_condition
@@ -333,14 +333,19 @@ def warm_up(task: Task | None = None, *, learns: bool = True) -> None:
         from coartic.task import load_task
 
         task = load_task("ascending")
-    hand, goal = task.hands[0], task.goals[0]
+    hand, goal, links = task.hands[0], task.goals[0], task.robot.most_links
     hands = letters_of([hand] * len(task.goals))
-    move(task.robot, task.q0, task.q0, hand, goal, task.radius)
-    correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
-    make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
-    if learns:
-        condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        _compile_for(task, condition, PAPER, InitialSearch(hands))
+    condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
+    still = PAPER._replace(max_iterations=0)
+    kernels = {
+        "learn": lambda: _compile_for(task, condition, PAPER, InitialSearch(hands)),
+        "trials": lambda: make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof))),
+        "correct": lambda: correct(task.robot, task.q0, hand, goal, model=still),
+        "move": lambda: move(task.robot, task.q0, task.q0, hand, goal, task.radius),
+    }
+    if not learns:
+        del kernels["learn"]
+    compile_together({f"{name}-{links}": call for name, call in kernels.items()})
 
 
 def _compile_for(

@@ -42,13 +42,12 @@ def session_folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _kernels(session_folder):
-    """Compiled by the first worker, where they are not yet, while the others wait."""
+def _kernels():
+    """Compiled where they are not yet: workers share that, while nothing else is measured."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         from coartic.learning import warm_up
 
-        with FileLock(session_folder / "kernels.lock"):
-            warm_up()
+        warm_up()
 
 
 @pytest.fixture(scope="session", autouse=True)

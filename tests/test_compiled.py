@@ -3,9 +3,12 @@
 import os
 import shutil
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
+import pytest
+from filelock import FileLock
 from numba import njit, types
 
 from coartic import compiled
@@ -82,3 +85,60 @@ def test_a_kernel_is_compiled_once_for_all_numbers():
 
     assert of_some(4) == 14
     assert twice.signatures == [(types.int64,)]
+
+
+def test_machine_code_that_nobody_uses_is_removed(monkeypatch, tmp_path):
+    old = time.time() - 40 * 24 * 3600
+    for name, used in ((16 * "a", old), (16 * "b", time.time())):
+        code = tmp_path / "coartic" / f"kernel-{name}" / "code.nbc"
+        code.parent.mkdir(parents=True)
+        code.touch()
+        os.utime(code, (used, old))
+        os.utime(code.parent, (old, old))
+    monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    current = compiled._cache_folder()
+    assert {*current.parent.iterdir()} == {current, current.parent / f"kernel-{16 * 'b'}"}
+
+
+def test_processes_that_compile_at_once_share_the_work(monkeypatch, tmp_path):
+    """What another compiles comes last, once it is done there."""
+    monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
+    order = []
+
+    def compile_second():
+        order.append("second")
+        other.release()  # as another process does when it is done with the first
+
+    with FileLock(tmp_path / "first.lock", thread_local=False) as other:
+        compiled.compile_together(
+            {"first": lambda: order.append("first"), "second": compile_second}
+        )
+    assert order == ["second", "first"]
+
+
+def test_nothing_waits_for_a_process_that_is_stuck(monkeypatch, tmp_path):
+    monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "_PATIENCE_S", 0.0)
+    order = []
+    with FileLock(tmp_path / "first.lock"):
+        compiled.compile_together(
+            {name: lambda n=name: order.append(n) for name in ("first", "second")}
+        )
+    assert order == ["second", "first"]
+
+
+@pytest.mark.parametrize("folder", [None, Path("/dev/null")], ids=["nowhere", "no locks"])
+def test_without_locks_everything_is_compiled(monkeypatch, folder):
+    monkeypatch.setattr(compiled, "_cache_folder", lambda: folder)
+    order = []
+    compiled.compile_together(
+        {name: lambda n=name: order.append(n) for name in ("first", "second")}
+    )
+    assert order == ["first", "second"]
+
+    def broken():
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        compiled.compile_together({"broken": broken})
