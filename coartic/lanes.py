@@ -20,7 +20,7 @@ from coartic.compiled import inlined, inner, lanewise
 from coartic.robot import BASE_DOF, Arm, Robot, chain
 from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
-LANES = 40
+LANES = 72
 """Most lanes at once: they and their rows stay in the innermost cache."""
 _VECTOR = 8  # lanes that vectors hold; LANES is a multiple of it
 GOING = 0.0

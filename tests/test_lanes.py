@@ -210,9 +210,9 @@ def test_few_runs_of_several_cells_are_divided_among_workers():
     [
         (40, 2, [20, 20]),
         (20, 8, [8, 8, 4]),
-        (100, 2, [40, 40, 10, 10]),
-        (83, 2, [40, 40, 3]),
-        (40, 1, [40]),
+        (2 * LANES + 20, 2, [LANES, LANES, 10, 10]),
+        (2 * LANES + 3, 2, [LANES, LANES, 3]),
+        (LANES, 1, [LANES]),
     ],
 )
 def test_a_cell_is_divided_among_workers(runs, workers, sizes):
