@@ -4,10 +4,12 @@ import multiprocessing
 import sys
 import warnings
 
+_LIMIT_S = 120.0
+
 
 def apart(what, *arguments):
     """What a function of a module returns, in a fork of this process (a fresh one where there are
-    none). Raises ChildProcessError where it fails, after its traceback."""
+    none). Raises ChildProcessError where it fails, after its traceback, or never ends."""
     how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     found, said = how.Pipe(duplex=False)
     process = how.Process(target=_say, args=(said, what, arguments))
@@ -16,6 +18,8 @@ def apart(what, *arguments):
         process.start()
     said.close()
     try:
+        if not found.poll(_LIMIT_S):
+            process.kill()
         return found.recv()
     except EOFError:
         raise ChildProcessError("it ended without an answer") from None
