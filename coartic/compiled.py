@@ -103,14 +103,12 @@ def _cache_folder() -> Path | None:
 
 
 def _prune(root: Path, current: Path) -> None:
-    """Remove machine code of older sources that nobody has used for a month."""
-    before = time.time() - _KEPT_S
+    """Remove machine code of older sources that nobody has begun with for a month."""
+    with contextlib.suppress(OSError):
+        os.utime(current)
     for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
         with contextlib.suppress(OSError):
-            if folder == current or folder.stat().st_mtime > before:
-                continue
-            files = [path for path in folder.rglob("*") if path.is_file()]  # a look uses folders
-            if max((path.stat().st_atime for path in files), default=0.0) < before:
+            if folder.stat().st_mtime < time.time() - _KEPT_S:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -165,25 +163,32 @@ def entry(function: F) -> F:
     return compiled
 
 
-def compile_together(kernels: Mapping[str, Callable[[], object]]) -> None:
+def compile_together(kernels: Mapping[str, Callable[[], object]], variant: str) -> None:
     """Call kernels for the first time, by name; processes that begin at once share the work.
 
-    What another compiles now comes last, and is loaded once it is done there.
+    What another compiles now comes last, and is loaded once it is done there. ``variant`` says
+    what they are compiled for: a lock is of a name, as Numba has one index of all its variants.
     """
-    folder, waiting = _cache_folder(), dict(kernels)
-    locks = {name: FileLock(folder / f"{name}.lock") for name in kernels if folder is not None}
-    for patience in (0.0, _PATIENCE_S):
-        for name in [name for name in locks if name in waiting]:
+    folder, deadline = _cache_folder(), time.monotonic() + _PATIENCE_S
+    waiting = dict(kernels)
+    done = {name: folder / f"{name}-{variant}.done" for name in kernels if folder is not None}
+    for name in [name for name, mark in done.items() if mark.exists()]:
+        waiting.pop(name)()
+    for patient in (False, True) if done else ():
+        for name in list(waiting):
+            lock = FileLock(done[name].with_name(f"{name}.lock"))
             try:
-                locks[name].acquire(timeout=patience)
+                lock.acquire(timeout=max(0.0, deadline - time.monotonic()) if patient else 0.0)
             except Timeout:
                 continue
             except (OSError, NotImplementedError):  # no locks here, and nothing to share
                 pass
             try:
                 waiting.pop(name)()
+                with contextlib.suppress(OSError):
+                    done[name].touch()
             finally:
-                locks[name].release()
+                lock.release()
     for call in waiting.values():
         call()
 

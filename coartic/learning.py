@@ -333,19 +333,22 @@ def warm_up(task: Task | None = None, *, learns: bool = True) -> None:
         from coartic.task import load_task
 
         task = load_task("ascending")
-    hand, goal, links = task.hands[0], task.goals[0], task.robot.most_links
+    hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
-    condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-    still = PAPER._replace(max_iterations=0)
-    kernels = {
-        "learn": lambda: _compile_for(task, condition, PAPER, InitialSearch(hands)),
-        "trials": lambda: make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof))),
-        "correct": lambda: correct(task.robot, task.q0, hand, goal, model=still),
-        "move": lambda: move(task.robot, task.q0, task.q0, hand, goal, task.radius),
-    }
+
+    def learner() -> None:
+        condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
+        _compile_for(task, condition, PAPER, InitialSearch(hands))
+
+    def movements() -> None:
+        move(task.robot, task.q0, task.q0, hand, goal, task.radius)
+        correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
+        make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
+
+    kernels = {"learner": learner, "movements": movements}
     if not learns:
-        del kernels["learn"]
-    compile_together({f"{name}-{links}": call for name, call in kernels.items()})
+        del kernels["learner"]
+    compile_together(kernels, str(task.robot.most_links))
 
 
 def _compile_for(

@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from filelock import FileLock
@@ -43,6 +44,7 @@ def test_a_user_without_a_home(monkeypatch, tmp_path):
     def homeless():
         raise RuntimeError("Could not determine home directory.")
 
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled.Path, "home", homeless)
     monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
@@ -88,43 +90,54 @@ def test_a_kernel_is_compiled_once_for_all_numbers():
 
 
 def test_machine_code_that_nobody_uses_is_removed(monkeypatch, tmp_path):
-    old = time.time() - 40 * 24 * 3600
-    for name, used in ((16 * "a", old), (16 * "b", time.time())):
-        code = tmp_path / "coartic" / f"kernel-{name}" / "code.nbc"
-        code.parent.mkdir(parents=True)
-        code.touch()
-        os.utime(code, (used, old))
-        os.utime(code.parent, (old, old))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     current = compiled._cache_folder()
-    assert {*current.parent.iterdir()} == {current, current.parent / f"kernel-{16 * 'b'}"}
+    old, other = (current.with_name(f"kernel-{16 * name}") for name in "ab")
+    for folder, days in ((old, 40), (other, 20), (current, 40)):
+        (folder / "code").mkdir(parents=True)
+        os.utime(folder, 2 * (time.time() - days * 24 * 3600,))
+    assert compiled._cache_folder() == current  # used now
+    assert {*current.parent.iterdir()} == {current, other}
 
 
-def test_processes_that_compile_at_once_share_the_work(monkeypatch, tmp_path):
-    """What another compiles comes last, once it is done there."""
+@pytest.fixture
+def order(monkeypatch, tmp_path):
+    """What was called, in order, of two kernels in a cache of their own."""
     monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
-    order = []
+    return []
 
-    def compile_second():
+
+def both(order):
+    return {name: lambda name=name: order.append(name) for name in ("first", "second")}
+
+
+def test_processes_that_compile_at_once_share_the_work(order, tmp_path):
+    """What another compiles comes last, once it is done there."""
+
+    def second():
         order.append("second")
         other.release()  # as another process does when it is done with the first
 
     with FileLock(tmp_path / "first.lock", thread_local=False) as other:
-        compiled.compile_together(
-            {"first": lambda: order.append("first"), "second": compile_second}
-        )
+        compiled.compile_together({**both(order), "second": second}, "4")
     assert order == ["second", "first"]
 
 
-def test_nothing_waits_for_a_process_that_is_stuck(monkeypatch, tmp_path):
-    monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
+def test_what_is_compiled_is_loaded_by_all_at_once(order, tmp_path):
+    compiled.compile_together(both(order), "4")
+    with FileLock(tmp_path / "first.lock"), FileLock(tmp_path / "second.lock"):
+        compiled.compile_together(both(order), "4")
+    assert order == ["first", "second"] * 2
+
+
+def test_nothing_waits_for_a_process_that_is_stuck(order, monkeypatch, tmp_path):
+    """For another number of links, too: there is one index of both."""
     monkeypatch.setattr(compiled, "_PATIENCE_S", 0.0)
-    order = []
+    compiled.compile_together(both([]), "3")
     with FileLock(tmp_path / "first.lock"):
-        compiled.compile_together(
-            {name: lambda n=name: order.append(n) for name in ("first", "second")}
-        )
+        compiled.compile_together(both(order), "4")
     assert order == ["second", "first"]
 
 
@@ -132,13 +145,11 @@ def test_nothing_waits_for_a_process_that_is_stuck(monkeypatch, tmp_path):
 def test_without_locks_everything_is_compiled(monkeypatch, folder):
     monkeypatch.setattr(compiled, "_cache_folder", lambda: folder)
     order = []
-    compiled.compile_together(
-        {name: lambda n=name: order.append(n) for name in ("first", "second")}
-    )
+    compiled.compile_together(both(order), "4")
     assert order == ["first", "second"]
 
     def broken():
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        compiled.compile_together({"broken": broken})
+        compiled.compile_together({"broken": broken}, "4")

@@ -134,6 +134,16 @@ def test_conditions_are_data(chosen, other, hands):
         assert set(slow.completed) == {True, False}
 
 
+def test_arms_of_more_links_than_the_papers():
+    robot = {"left_links": [0.8, 0.7], "right_links": [0.8] * 5}
+    start = {"left": [0.3, 0.2], "right": [0.1, 0.2, -0.1, 0.2, 0.1]}
+    goals = [[4.0, 1.0], [3.5, 1.5]]
+    task = tiny_task(robot=robot, start=start, goals=goals, initial_hands="RL")
+    slow = assert_equals_reference(task, CONDITIONS["EC4"], trials=4, seed=6)
+    assert slow.corrections > len(task.goals)
+    assert bettered(slow)
+
+
 @pytest.mark.parametrize(
     ("name", "condition", "initial"),
     [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -88,7 +88,7 @@ def _draws(n: int) -> NDArray[np.int64]:
     return np.random.default_rng(SEED).integers(n, size=(RESAMPLES, n))
 
 
-@cache
+@lru_cache(8)
 def _weights(n: int) -> Array:
     """Share of each of n runs in each bootstrap resample, shape ``(RESAMPLES, n)``."""
     counts = [np.bincount(draw, minlength=n) for draw in _draws(n)]

@@ -20,6 +20,7 @@ def apart(what, *arguments):
     try:
         if not found.poll(_LIMIT_S):
             process.kill()
+            raise ChildProcessError(f"it did not answer within {_LIMIT_S:g} s")
         return found.recv()
     except EOFError:
         raise ChildProcessError("it ended without an answer") from None
