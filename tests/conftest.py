@@ -43,7 +43,7 @@ def session_folder(tmp_path_factory):
 
 @pytest.fixture(scope="session", autouse=True)
 def _kernels():
-    """Compiled where they are not yet: workers share that, while nothing else is measured."""
+    """Compiled or loaded before the first test, on no test's clock; workers share the work."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         from coartic.learning import warm_up
 
