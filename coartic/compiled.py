@@ -21,7 +21,6 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from filelock import FileLock, Timeout
-from llvmlite import binding
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -29,12 +28,6 @@ from numpy.typing import NDArray
 
 from coartic.robot import chain, lever
 from coartic.trigonometry import cosine, sine
-
-# Loops over the links of an arm are unrolled, or the loop over lanes around them could not be
-# made of vector instructions: LLVM's own bound ends that at four links.
-binding.set_option("coartic", "-unroll-threshold=1000")
-# Nor is the first lane taken out of a loop over whole vectors, which would leave seven over.
-binding.set_option("coartic", "-unroll-peel-max-count=0")
 
 PACKAGE = Path(__file__).parent
 _KEPT_S = 30 * 24 * 3600.0
