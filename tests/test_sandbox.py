@@ -212,12 +212,13 @@ def test_what_is_kept_of_a_run_is_bounded(known, shared, monkeypatch):
 
 
 class Suite:
-    """A command that runs many short lots: something is kept soon, and much is left to do.
+    """A command that runs many short lots: something is kept soon, and minutes are left to do,
+    for a disk may be busy for seconds before it keeps the first.
 
     It begins as a fork, or by itself.
     """
 
-    COMMAND = ("run", "paper", "--tasks", "ascending", "--runs", "2000", "--trials", "1000")
+    COMMAND = ("run", "paper", "--tasks", "ascending", "--runs", "20_000", "--trials", "1000")
 
     def __init__(self, folder, jobs, *, by_itself):
         self._folder, self._mark = folder, f"COARTIC_TEST_MARK={folder}".encode()
