@@ -218,7 +218,7 @@ class Suite:
     It begins as a fork, or by itself.
     """
 
-    COMMAND = ("run", "paper", "--tasks", "ascending", "--runs", "20_000", "--trials", "1000")
+    COMMAND = ("run", "paper", "--tasks", "ascending", "--runs", "20000", "--trials", "1000")
 
     def __init__(self, folder, jobs, *, by_itself):
         self._folder, self._mark = folder, f"COARTIC_TEST_MARK={folder}".encode()
