@@ -293,7 +293,7 @@ def test_no_worker_outlives_its_suite(moment, word, tmp_path):
             assert suite.await_processes("coartic.benchmarks.guard", jobs, 300)
         assert suite.marked()
     finally:
-        os.kill(suite.process.pid, word)
+        suite.process.send_signal(word)  # none where it has ended
         code = suite.process.wait(120)
     deadline = time.monotonic() + 60  # however long it took to get to work
     assert code == (130 if in_order else -signal.SIGKILL), suite.error
