@@ -186,6 +186,11 @@ def compile_together(kernels: Mapping[str, Callable[[], object]], variant: str) 
         call()
 
 
+def record_of(fields: Mapping[str, Any]) -> np.dtype[np.void]:
+    """Type of a record as kernels read it: what it holds lies together, at places they know."""
+    return np.dtype(list(fields.items()), align=True)
+
+
 _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy hands it to C
 _BITS = types.NumPyRandomBitGeneratorType("bit_generator")
 _GENERATOR = types.NumPyRandomGeneratorType("generator")
@@ -221,8 +226,9 @@ def generator_at(addresses: Any, run: int) -> Any:
 
 @inlined
 def fill_row(row: Any, values: Any) -> None:
-    """row[:] = values, without the slices' checks, which cost seconds to compile."""
-    for j in range(len(row)):
+    """row[:] = values, or as many of them as both have, without the slices' checks, which cost
+    seconds to compile."""
+    for j in range(min(len(row), len(values))):
         row[j] = values[j]
 
 

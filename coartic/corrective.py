@@ -18,24 +18,22 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from coartic.compiled import entry, inlined, inner, joint_chain, joint_lever, lanewise
 from coartic.lanes import (
     GOING,
     board,
     copy_lanes,
-    ends_of,
     fill,
     lanes_for,
     leave,
     near,
     place,
+    runs_for,
     whole,
     winding,
 )
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import checked_goal, configuration
+from coartic.movement import checked_goal, configuration, largest_square
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 from coartic.trigonometry import LARGEST
 
@@ -127,17 +125,6 @@ def _stay_near(at: Any, count: int, how: Any) -> None:
             at.pulled[i] = 1.0 if moved else 0.0
 
 
-@inner
-def largest_square(length: float) -> float:
-    """The largest number whose square root, as it is rounded, does not exceed a length."""
-    square = length * length
-    while math.sqrt(square) > length:
-        square = np.nextafter(square, 0.0)
-    while math.sqrt(np.nextafter(square, math.inf)) <= length:
-        square = np.nextafter(square, math.inf)
-    return square
-
-
 @lanewise
 def _errors(at: Any, count: int, goal: Any, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
@@ -180,12 +167,10 @@ def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int,
 
 
 @inner
-def correct_lanes(
-    lanes: Any, count: int, goal: Any, how: Any, model: Any, found: Any, ends: Any
-) -> None:
+def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs: Any) -> None:
     """Let **A** descend in the first ``count`` lanes until each has ended.
 
-    Each run's ``found`` (N, dof) becomes what its lane ends with, and its ``ends`` says how.
+    The ``target`` of each run becomes what its lane ends with; the rest of its record says how.
     """
     at = lanes.at
     if how.nullspace_gain > 0.0:
@@ -205,21 +190,24 @@ def correct_lanes(
             for lane in range(count - 1, -1, -1):
                 if at.fate[lane] == GOING and iteration < model.max_iterations:
                     continue
-                run = at.run[lane]
-                leave(at, lane, found[run])
-                ends.converged[run] = at.fate[lane] == _CONVERGED
-                ends.iterations[run] = iteration + (at.fate[lane] == _STUCK)
-                ends.evaluations[run] += ends.iterations[run] + 1
+                run = runs[at.run[lane]]
+                leave(at, lane, run.target)
+                run.converged = at.fate[lane] == _CONVERGED
+                run.iterations = iteration + (at.fate[lane] == _STUCK)
+                run.evaluations += run.iterations + 1
                 count -= 1
                 fill(lanes.corrected, lane, count)
+                ended -= 1
+                if ended == 0:
+                    break
         iteration += 1
 
 
 @entry
-def _correct_one(q: Any, arm: Any, goal: Any, how: Any, model: Any, lanes: Any, ends: Any) -> None:
-    """Correct ``q`` in place."""
-    board(lanes.at, 0, 0, q, arm)
-    correct_lanes(lanes, 1, goal, how, model, q.reshape((1, len(q))), ends)
+def _correct_one(arm: Any, goal: Any, how: Any, model: Any, lanes: Any, runs: Any) -> None:
+    """Correct the target of the only run."""
+    board(lanes.at, 0, 0, runs[0].target, arm)
+    correct_lanes(lanes, 1, goal, how, model, runs)
 
 
 @inner
@@ -275,15 +263,15 @@ def correct(
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     if not 0.0 <= nullspace_gain <= 1.0:
         raise ValueError(f"nullspace_gain is {nullspace_gain}; it must be 0 to 1")
-    position = configuration(robot, q)
-    ends = ends_of(1)
+    runs = runs_for(1, robot)
+    run, own = runs[0], slice(robot.dof)
+    run["target"][own] = configuration(robot, q)
     _correct_one(
-        position,
         robot.arm(hand),
         checked_goal(goal),
         Corrector("x" not in locked_base, "y" not in locked_base, float(nullspace_gain)),
         checked_model(model),
         lanes_for(robot),
-        ends,
+        runs,
     )
-    return Correction(position, bool(ends.converged[0]), int(ends.iterations[0]))
+    return Correction(run["target"][own], bool(run["converged"]), int(run["iterations"]))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.compiled import entry, fill_row, inner
-from coartic.lanes import LANES, depart, ends_of, lanes_for
+from coartic.lanes import LANES, depart, lanes_for, runs_for
 from coartic.model import MotionModel, checked_model
 from coartic.movement import LARGEST, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
@@ -58,11 +58,9 @@ class _Rows(NamedTuple):
 class _Work(NamedTuple):
     """What the kernel works on."""
 
-    q: Any  # (N, dof)
-    target: Any  # (N, dof)
+    runs: Any  # (N,) records: see runs_for
     row: Any  # (N,) the movement that is made next; -1 where none is
     hit: Any  # (N,)
-    ends: Any
     lanes: Any
 
 
@@ -71,59 +69,51 @@ def _move_chosen(number: int, arrives: bool, problem: Any, rows: Any, work: Any)
     """Move the solutions that have a row, in lots of as many as there are lanes."""
     goal = goal_of(problem, number)
     count = 0
-    for run in range(len(work.q)):
-        if work.row[run] >= 0:
-            arm = arm_of(problem, rows.hands[run, number])
-            depart(work.lanes.at, count, run, work.q[run], work.target[run], arm)
+    for number_of_run in range(len(work.runs)):
+        run = work.runs[number_of_run]
+        if work.row[number_of_run] >= 0:
+            arm = arm_of(problem, rows.hands[number_of_run, number])
+            depart(work.lanes.at, count, number_of_run, run.q, run.target, arm)
             count += 1
-        if count == LANES or (run == len(work.q) - 1 and count > 0):
-            move_lanes(
-                work.lanes,
-                count,
-                goal,
-                arrives,
-                problem.model,
-                work.q,
-                work.target,
-                work.ends,
-            )
+        if count == LANES or (number_of_run == len(work.runs) - 1 and count > 0):
+            move_lanes(work.lanes, count, goal, arrives, problem.model, work.runs)
             count = 0
 
 
 @entry
 def _execute(problem: Any, rows: Any, work: Any) -> None:
     """Execute all solutions, goal by goal."""
-    for run in range(len(work.q)):
-        fill_row(work.q[run], problem.start)
+    for run in range(len(work.runs)):
+        fill_row(work.runs[run].q, problem.start)
     for number in range(len(problem.goals)):
         most = 0
-        for run in range(len(work.q)):  # whether the goal is hit where the robot stands
+        for run in range(len(work.runs)):  # whether the goal is hit where the robot stands
             work.row[run] = 0 if rows.going[run] else -1
-            fill_row(work.target[run], work.q[run])
+            fill_row(work.runs[run].target, work.runs[run].q)
             most = max(most, rows.first[run, number + 1] - rows.first[run, number])
         _move_chosen(number, True, problem, rows, work)
-        for run in range(len(work.q)):
-            work.hit[run] = work.ends.hit[run]
+        for run in range(len(work.runs)):
+            work.hit[run] = work.runs[run].hit
         for place in range(most):
             for arrives in (True, False):
-                for run in range(len(work.q)):
+                for run in range(len(work.runs)):
                     row = rows.first[run, number] + place
                     needed = rows.going[run] and row < rows.first[run, number + 1]
                     needed = needed and rows.arrives[row] == arrives
                     needed = needed and (not work.hit[run] or (place == 0 and arrives))
                     work.row[run] = row if needed else -1
                     if needed:
-                        fill_row(work.target[run], rows.targets[row])
+                        fill_row(work.runs[run].target, rows.targets[row])
                 _move_chosen(number, arrives, problem, rows, work)
-                for run in range(len(work.q)):
+                for run in range(len(work.runs)):
                     if work.row[run] >= 0:
-                        rows.ticks[work.row[run]] = work.ends.ticks[run]
-                        work.hit[run] = work.ends.hit[run]
-        for run in range(len(work.q)):
+                        rows.ticks[work.row[run]] = work.runs[run].ticks
+                        work.hit[run] = work.runs[run].hit
+        for run in range(len(work.runs)):
             # A goal that no movement was needed for is hit on the way: a case of its own.
             made = rows.ticks[rows.first[run, number]] >= 0
             rows.going[run] = rows.going[run] and work.hit[run] and made
-            fill_row(rows.reached[run, number], work.q[run])
+            fill_row(rows.reached[run, number], work.runs[run].q)
 
 
 def execute_straight(
@@ -162,9 +152,8 @@ def execute_straight(
         reached=np.empty(shape),
         going=_fit(task, targets, starts, most_steps * model.step),
     )
-    q, target = np.zeros((2, shape[0], shape[2]))
     row, hit = np.zeros(shape[0], np.int64), np.zeros(shape[0], np.bool_)
-    work = _Work(q, target, row, hit, ends_of(shape[0]), lanes_for(task.robot))
+    work = _Work(runs_for(shape[0], task.robot), row, hit, lanes_for(task.robot))
     _execute(problem_of(task, model), rows, work)
     ticks = [None if count < 0 else count for count in rows.ticks.tolist()]
     spans = pairwise(starts.tolist())

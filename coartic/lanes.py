@@ -15,8 +15,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coartic.compiled import inlined, inner, lanewise
+from coartic.compiled import inlined, inner, lanewise, record_of
 from coartic.robot import BASE_DOF, Arm, Robot, chain
 from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
@@ -39,20 +40,30 @@ class Lanes(NamedTuple):
     """Those of one that moves."""
 
 
-class Ends(NamedTuple):
-    """How the lanes of runs ended, by run."""
-
-    hit: Any  # (N,) whether the hand is within the goal's radius
-    ticks: Any  # (N,) of the movement
-    converged: Any  # (N,) whether the corrective process was
-    iterations: Any  # (N,) of the corrective process
-    evaluations: Any  # (N,) of forward kinematics, in all
+def width_of(robot: Robot) -> int:
+    """Figures of a configuration in records: of the robot's, and then zeros, as many as with two
+    arms like the longer one, so that kernels are compiled once for a number of links."""
+    return BASE_DOF + 2 * robot.most_links
 
 
-def ends_of(runs: int) -> Ends:
-    """Room for the ends of so many runs."""
-    flags, counts = np.zeros((2, runs), np.bool_), np.zeros((3, runs), np.int64)
-    return Ends(flags[0], counts[0], flags[1], counts[1], counts[2])
+def runs_for(count: int, robot: Robot) -> NDArray[np.void]:
+    """Room for so many runs that are moved and corrected, a record each."""
+    return np.zeros(count, _run(width_of(robot)))
+
+
+@cache
+def _run(width: int) -> np.dtype[np.void]:
+    fields = {
+        "q": (np.float64, width),  # where the robot is
+        "target": (np.float64, width),  # where it is to go, or what a correction has found
+        "acting": np.bool_,  # whether the run is among those that are moved or corrected next
+        "hit": np.bool_,  # whether the hand is within the goal's radius
+        "converged": np.bool_,  # whether the corrective process did
+        "ticks": np.int64,  # of the movement
+        "iterations": np.int64,  # of the corrective process
+        "evaluations": np.int64,  # of forward kinematics, in all
+    }
+    return record_of(fields)
 
 
 def lanes_for(robot: Robot) -> Lanes:
@@ -82,7 +93,7 @@ def _layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
         "distance": (),  # from start to target; its square, before the arm sets off
-        **dict.fromkeys(("step", "last", "whole", "speed", "bend"), ()),
+        **dict.fromkeys(("step", "last", "whole", "slowness", "bend"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing

@@ -22,11 +22,20 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coartic.compiled import entry, fill_row, generator_at, inlined, inner, joint_chain
+from coartic.compiled import (
+    entry,
+    fill_row,
+    generator_at,
+    inlined,
+    inner,
+    joint_chain,
+    record_of,
+)
 from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
-from coartic.lanes import LANES, Ends, Lanes, board, depart, ends_of, lanes_for
+from coartic.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
 from coartic.movement import Scratch, move_lanes, scratch_for
 from coartic.problem import arm_of, goal_of
 from coartic.robot import HANDS
@@ -43,8 +52,8 @@ class Rules(NamedTuple):
     """An exploration condition on a robot, as the kernel reads it."""
 
     hands: Any  # (1 or 2,) hands available
-    follows: Any  # (2, dof) for each chosen hand: joint takes its current value
-    explored: Any  # (2, dof) for each chosen hand: joint is perturbed
+    follows: Any  # (2, width) for each chosen hand: joint takes its current value
+    explored: Any  # (2, width) for each chosen hand: joint is perturbed
     exploration: int
     epsilon: float
     noise_sd: float
@@ -60,24 +69,12 @@ class Rules(NamedTuple):
     discount: float
 
 
-class Tables(NamedTuple):
-    """What each run learns, by goal, previous hand (left, right, none) and hand."""
-
-    value: Any  # Q, (N, G, 3, 2)
-    target: Any  # q*, (N, G, 3, 2, dof)
-
-
 class Log(NamedTuple):
     """The movements of one trial of each run, and where it stood when each goal was hit."""
 
     count: Any  # (N,)
-    goal: Any  # (N, 2 G)
-    hand: Any
-    kind: Any
-    ticks: Any
-    target: Any  # (N, 2 G, dof)
-    hands: Any  # (N, G)
-    reached: Any  # (N, G, dof)
+    movements: Any  # (N, 2 G) records of goal, hand, kind, ticks and target
+    hits: Any  # (N, G) records of hand and q
 
 
 class Kept(NamedTuple):
@@ -113,26 +110,15 @@ PARTS = 10
 class Work(NamedTuple):
     """What the trials of the runs work on, each now at the same goal of the same trial."""
 
-    q: Any  # (N, dof) where the robot is
-    target: Any  # (N, dof) where it is to go
-    hand: Any  # (N,) chosen for this goal
-    previous: Any  # (N,) hand of the goal before
-    stored: Any  # (N,) whether the hand has a stored target
-    aimed: Any  # (N,) whether it moves to a target of its own before A acts
-    going: Any  # (N,) whether the trial has not failed
-    acting: Any  # (N,) whether the run is among those that are moved or corrected next
-    total: Any  # (N,) ticks of the trial
-    counts: Any  # (N, counters)
-    ends: Ends
+    runs: Any  # (N,) records: see runs_for
+    trials: Any  # (N,) records: see _TRIAL
     lanes: Lanes
     scratch: Scratch
 
 
 def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
     """The rules of a condition on the robot of a task."""
-    dof = task.robot.dof
-    follows = np.zeros((2, dof), dtype=np.bool_)
-    explored = np.zeros((2, dof), dtype=np.bool_)
+    follows, explored = np.zeros((2, 2, width_of(task.robot)), dtype=np.bool_)
     base = np.array(["x" not in task.locked_base, "y" not in task.locked_base])
     for chosen, hand in enumerate(HANDS):
         own, others = task.robot.joints(hand), task.robot.joints(HANDS[1 - chosen])
@@ -160,46 +146,48 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
     )
 
 
-def empty_tables(runs: int, goals: int, dof: int) -> Tables:
-    """Tables in which nothing is learned."""
-    shape = (runs, goals, 3, 2)
-    return Tables(np.full(shape, -np.inf), np.full((*shape, dof), np.nan))
+def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
+    """Tables in which nothing is learned, ``(N, G, 3, 2)``.
+
+    By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q, and
+    ``target``, q*.
+    """
+    known = record_of({"value": np.float64, "target": (np.float64, width_of(task.robot))})
+    tables = np.empty((runs, len(task.goals), 3, 2), known)
+    tables["value"], tables["target"] = -np.inf, np.nan
+    return tables
 
 
-def empty_log(runs: int, goals: int, dof: int) -> Log:
+def empty_log(runs: int, task: Task) -> Log:
     """Logs without movements."""
-    goal, hand, kind, ticks = np.zeros((4, runs, 2 * goals), dtype=np.int64)
-    return Log(
-        count=np.zeros(runs, dtype=np.int64),
-        goal=goal,
-        hand=hand,
-        kind=kind,
-        ticks=ticks,
-        target=np.zeros((runs, 2 * goals, dof)),
-        hands=np.zeros((runs, goals), dtype=np.int64),
-        reached=np.zeros((runs, goals, dof)),
-    )
+    goals, q = len(task.goals), (np.float64, width_of(task.robot))
+    numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
+    movement = record_of({**numbers, "target": q})
+    hit = record_of({"hand": np.int64, "q": q})
+    count = np.zeros(runs, dtype=np.int64)
+    return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
+
+
+_TRIAL = record_of(
+    {
+        "hand": np.int64,  # chosen for this goal
+        "previous": np.int64,  # hand of the goal before
+        "stored": np.bool_,  # whether the hand has a stored target
+        "aimed": np.bool_,  # whether it moves to a target of its own before A acts
+        "going": np.bool_,  # whether the trial has not failed
+        "total": np.int64,  # ticks
+        "counts": (np.int64, len(COUNT)),  # of all trials of the run
+    }
+)
 
 
 def work_for(runs: int, task: Task) -> Work:
     """Work space of runs, all counters 0. ValueError for more than there are lanes."""
     if runs > LANES:
         raise ValueError(f"{runs} runs at once; there are {LANES} lanes")
-    q, target = np.zeros((2, runs, task.robot.dof))
-    hand, previous, total = np.zeros((3, runs), dtype=np.int64)
-    stored, aimed, going, acting = np.zeros((4, runs), dtype=np.bool_)
     return Work(
-        q=q,
-        target=target,
-        hand=hand,
-        previous=previous,
-        stored=stored,
-        aimed=aimed,
-        going=going,
-        acting=acting,
-        total=total,
-        counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
-        ends=ends_of(runs),
+        runs=runs_for(runs, task.robot),
+        trials=np.zeros(runs, _TRIAL),
         lanes=lanes_for(task.robot),
         scratch=scratch_for(task.robot),
     )
@@ -209,8 +197,8 @@ def work_for(runs: int, task: Task) -> Work:
 def _goal_distance(run: int, number: int, hand: int, problem: Any, work: Any) -> float:
     arm = arm_of(problem, hand)
     scratch = work.scratch
-    joint_chain(work.q[run], arm, scratch.xs, scratch.ys)
-    work.counts[run, COUNT.evaluations] += 1
+    joint_chain(work.runs[run].q, arm, scratch.xs, scratch.ys)
+    work.trials[run].counts[COUNT.evaluations] += 1
     tip = len(arm.links)
     dx = problem.goals[number, 0] - scratch.xs[tip]
     dy = problem.goals[number, 1] - scratch.ys[tip]
@@ -218,19 +206,19 @@ def _goal_distance(run: int, number: int, hand: int, problem: Any, work: Any) ->
 
 
 @inner
-def _greedy(values: Any, hands: Any) -> int:
+def _greedy(entries: Any, hands: Any) -> int:
     """Hand of the highest value; the first of equals."""
     best = hands[0]
     for hand in hands[1:]:
-        if values[hand] > values[best]:
+        if entries[hand].value > entries[best].value:
             best = hand
     return int(best)
 
 
 @inner
-def _equal(values: Any, hands: Any) -> bool:
+def _equal(entries: Any, hands: Any) -> bool:
     """Whether there are two hands, of equal value."""
-    return len(hands) > 1 and bool(values[hands[0]] == values[hands[1]])
+    return len(hands) > 1 and bool(entries[hands[0]].value == entries[hands[1]].value)
 
 
 @inner
@@ -261,14 +249,14 @@ def _untied(run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any
         left = _goal_distance(run, number, 0, problem, work)
         hand = 1 if _goal_distance(run, number, 1, problem, work) < left else 0
     elif rules.ties == 4:
-        hand = 1 if work.previous[run] == 1 else 0
+        hand = 1 if work.trials[run].previous == 1 else 0
     return hand
 
 
 @inlined
-def _before(run: int, rules: Any, work: Any) -> int:
+def _before(trial: Any, rules: Any) -> int:
     """What the tables know of the goal before: its hand, or nothing."""
-    return NO_HAND if rules.goal_alone else int(work.previous[run])
+    return NO_HAND if rules.goal_alone else int(trial.previous)
 
 
 @inlined
@@ -276,8 +264,9 @@ def _choose_hands(
     number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
     """The hand of every run: greedy, or with probability ε an explored one."""
-    for run in range(len(work.q)):
-        if not work.going[run]:
+    for run in range(len(work.trials)):
+        trial = work.trials[run]
+        if not trial.going:
             continue
         hand = -1
         if explore and rules.exploration != 0:
@@ -288,11 +277,11 @@ def _choose_hands(
                 else:
                     hand = _closest_hand(run, number, problem, rules, rng, work)
         if hand < 0:
-            values = tables.value[run, number, _before(run, rules, work)]
-            hand = _greedy(values, rules.hands)
-            if rules.ties != 0 and _equal(values, rules.hands):
+            entries = tables[run, number, _before(trial, rules)]
+            hand = _greedy(entries, rules.hands)
+            if rules.ties != 0 and _equal(entries, rules.hands):
                 hand = _untied(run, number, problem, rules, generator_at(rngs, run), work)
-        work.hand[run] = hand
+        trial.hand = hand
 
 
 @inlined
@@ -319,95 +308,95 @@ def _aim(
 ) -> None:
     """Where something is learned, set the target; elsewhere see whether the goal is hit."""
     goal = goal_of(problem, number)
-    for run in range(len(work.q)):
-        work.acting[run] = False
-        if not work.going[run]:
+    for n in range(len(work.runs)):
+        run, trial = work.runs[n], work.trials[n]
+        run.acting = False
+        if not trial.going:
             continue
-        hand, before = work.hand[run], _before(run, rules, work)
-        stored = tables.target[run, number, before, hand]
-        work.stored[run] = work.aimed[run] = tables.value[run, number, before, hand] > -math.inf
-        if not work.stored[run] and rules.explores_unknown and explore and not first:
-            work.aimed[run] = True
-            stored = work.q[run]
-        if not work.aimed[run]:
-            distance = _goal_distance(run, number, hand, problem, work)
-            work.ends.hit[run] = distance <= problem.radius
+        hand = trial.hand
+        known = tables[n, number, _before(trial, rules), hand]
+        stored = known.target
+        trial.stored = trial.aimed = known.value > -math.inf
+        if not trial.stored and rules.explores_unknown and explore and not first:
+            trial.aimed = True
+            stored = run.q
+        if not trial.aimed:
+            run.hit = _goal_distance(n, number, hand, problem, work) <= problem.radius
             continue
-        rng = generator_at(rngs, run)
-        _set_target(work.target[run], work.q[run], stored, hand, explore, rules, rng)
+        _set_target(run.target, run.q, stored, hand, explore, rules, generator_at(rngs, n))
         if explore and rules.bias > 0.0:
             # The mean of η moves into the direction in which **A** would step from q*(s, a).
             arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd
             explored = rules.explored[hand]
-            shift_kernel(work.target[run], stored, arm, goal, explored, length, work.scratch)
-            work.counts[run, COUNT.evaluations] += 1
-            work.counts[run, COUNT.biased] += 1
-        work.acting[run] = True
+            shift_kernel(run.target, stored, arm, goal, explored, length, work.scratch)
+            trial.counts[COUNT.evaluations] += 1
+            trial.counts[COUNT.biased] += 1
+        run.acting = True
 
 
 @inlined
-def _record(log: Any, run: int, number: int, hand: int, kind: int, ticks: int, q: Any) -> None:
-    row = log.count[run]
-    log.goal[run, row] = number
-    log.hand[run, row] = hand
-    log.kind[run, row] = kind
-    log.ticks[run, row] = ticks
-    fill_row(log.target[run, row], q)
-    log.count[run] = row + 1
+def _record(log: Any, n: int, number: int, hand: int, kind: int, ticks: int, q: Any) -> None:
+    movement = log.movements[n, log.count[n]]
+    movement.goal = number
+    movement.hand = hand
+    movement.kind = kind
+    movement.ticks = ticks
+    fill_row(movement.target, q)
+    log.count[n] += 1
 
 
 @inlined
 def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
     """Move the acting runs to their targets and log it."""
-    lanes, ends = work.lanes, work.ends
     count = 0
-    for run in range(len(work.q)):
-        if work.acting[run]:
-            arm = arm_of(problem, work.hand[run])
-            depart(lanes.at, count, run, work.q[run], work.target[run], arm)
+    for n in range(len(work.runs)):
+        run = work.runs[n]
+        if run.acting:
+            arm = arm_of(problem, work.trials[n].hand)
+            depart(work.lanes.at, count, n, run.q, run.target, arm)
             count += 1
     goal = goal_of(problem, number)
     stops = kind == LEARNED or problem.model.corrective_arrival
-    move_lanes(lanes, count, goal, stops, problem.model, work.q, work.target, ends)
-    for run in range(len(work.q)):
-        if work.acting[run]:
-            ticks = ends.ticks[run]
-            work.total[run] += ticks
-            work.counts[run, COUNT.ticks] += ticks
-            _record(log, run, number, work.hand[run], kind, ticks, work.target[run])
-            if kind == CORRECTIVE and not ends.hit[run]:
-                work.counts[run, COUNT.failed] += 1
-                work.going[run] = False
+    move_lanes(work.lanes, count, goal, stops, problem.model, work.runs)
+    for n in range(len(work.runs)):
+        run, trial = work.runs[n], work.trials[n]
+        if run.acting:
+            trial.total += run.ticks
+            trial.counts[COUNT.ticks] += run.ticks
+            _record(log, n, number, trial.hand, kind, run.ticks, run.target)
+            if kind == CORRECTIVE and not run.hit:
+                trial.counts[COUNT.failed] += 1
+                trial.going = False
 
 
 @inlined
 def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None:
     """Set the targets of runs that missed to what **A** finds; trials fail where it does not."""
-    lanes, ends = work.lanes, work.ends
     count = 0
-    for run in range(len(work.q)):
-        work.acting[run] = False
-        if not work.going[run]:
+    for n in range(len(work.runs)):
+        run, trial = work.runs[n], work.trials[n]
+        run.acting = False
+        if not trial.going:
             continue
-        if ends.hit[run]:
-            if not work.aimed[run]:
-                _record(log, run, number, work.hand[run], CORRECTIVE, 0, work.q[run])
-        elif work.stored[run] and not rules.corrects:
-            work.counts[run, COUNT.failed] += 1
-            work.going[run] = False
+        if run.hit:
+            if not trial.aimed:
+                _record(log, n, number, trial.hand, CORRECTIVE, 0, run.q)
+        elif trial.stored and not rules.corrects:
+            trial.counts[COUNT.failed] += 1
+            trial.going = False
         else:
-            fill_row(work.target[run], work.q[run])
-            board(lanes.at, count, run, work.q[run], arm_of(problem, work.hand[run]))
+            fill_row(run.target, run.q)
+            board(work.lanes.at, count, n, run.q, arm_of(problem, trial.hand))
             count += 1
-            work.acting[run] = True
+            run.acting = True
     goal = goal_of(problem, number)
-    correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
-    for run in range(len(work.q)):
-        if work.acting[run]:
-            work.counts[run, COUNT.iterations] += ends.iterations[run]
-            converged = ends.converged[run]
-            work.counts[run, COUNT.corrections if converged else COUNT.failed] += 1
-            work.acting[run] = work.going[run] = converged
+    correct_lanes(work.lanes, count, goal, problem.corrector, problem.model, work.runs)
+    for n in range(len(work.runs)):
+        run, trial = work.runs[n], work.trials[n]
+        if run.acting:
+            trial.counts[COUNT.iterations] += run.iterations
+            trial.counts[COUNT.corrections if run.converged else COUNT.failed] += 1
+            run.acting = trial.going = run.converged
 
 
 @inner
@@ -423,16 +412,18 @@ def _trial(
     work: Any,
 ) -> None:
     """One trial of every run into ``log``; the ``first`` one with ``first_hands``."""
-    for run in range(len(work.q)):
-        fill_row(work.q[run], problem.start)
-        work.previous[run] = NO_HAND
-        work.going[run] = True
-        work.total[run] = 0
-        work.ends.evaluations[run] = 0
-        log.count[run] = 0
+    for n in range(len(work.runs)):
+        run, trial = work.runs[n], work.trials[n]
+        fill_row(run.q, problem.start)
+        run.evaluations = 0
+        trial.previous = NO_HAND
+        trial.going = True
+        trial.total = 0
+        log.count[n] = 0
     for number in range(len(problem.goals)):
         if first:
-            work.hand[:] = first_hands[number]
+            for n in range(len(work.trials)):
+                work.trials[n].hand = first_hands[number]
         else:
             _choose_hands(number, explore, problem, rules, tables, rngs, work)
         _aim(number, first, explore, problem, rules, tables, rngs, work)
@@ -440,13 +431,14 @@ def _trial(
             if kind == CORRECTIVE:
                 _correct(number, problem, rules, log, work)
             _move(number, kind, problem, log, work)
-        for run in range(len(work.q)):
-            if work.going[run]:
-                log.hands[run, number] = work.hand[run]
-                fill_row(log.reached[run, number], work.q[run])
-                work.previous[run] = work.hand[run]
-    for run in range(len(work.q)):
-        work.counts[run, COUNT.evaluations] += work.ends.evaluations[run]
+        for n in range(len(work.runs)):
+            trial = work.trials[n]
+            if trial.going:
+                hit = log.hits[n, number]
+                hit.hand = trial.previous = trial.hand
+                fill_row(hit.q, work.runs[n].q)
+    for n in range(len(work.runs)):
+        work.trials[n].counts[COUNT.evaluations] += work.runs[n].evaluations
 
 
 @inlined
@@ -454,52 +446,50 @@ def _update(run: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
     """Credit what was visited with the reward of the trial, or each goal with its return."""
     row = log.count[run]
     later = 0.0
-    for number in range(log.hands.shape[1] - 1, -1, -1):
+    for number in range(log.hits.shape[1] - 1, -1, -1):
         credit = reward
         if rules.by_subtask:
             ticks = 0
-            while row > 0 and log.goal[run, row - 1] == number:
+            while row > 0 and log.movements[run, row - 1].goal == number:
                 row -= 1
-                ticks += log.ticks[run, row]
+                ticks += log.movements[run, row].ticks
             credit = later = rules.discount * later - ticks
-        hand = log.hands[run, number]
-        before = log.hands[run, number - 1] if number > 0 and not rules.goal_alone else NO_HAND
-        value = tables.value[run, number, before, hand]
-        if credit > value or (rules.update_equal and credit == value):
-            tables.value[run, number, before, hand] = credit
-            fill_row(tables.target[run, number, before, hand], log.reached[run, number])
+        hit = log.hits[run, number]
+        knows = number > 0 and not rules.goal_alone
+        before = log.hits[run, number - 1].hand if knows else NO_HAND
+        known = tables[run, number, before, hit.hand]
+        if credit > known.value or (rules.update_equal and credit == known.value):
+            known.value = credit
+            fill_row(known.target, hit.q)
 
 
 @inlined
 def _copy(run: int, source: Any, destination: Any) -> None:
     for row in range(source.count[run]):
-        destination.goal[run, row] = source.goal[run, row]
-        destination.hand[run, row] = source.hand[run, row]
-        destination.kind[run, row] = source.kind[run, row]
-        destination.ticks[run, row] = source.ticks[run, row]
-        fill_row(destination.target[run, row], source.target[run, row])
+        destination.movements[run, row] = source.movements[run, row]
     destination.count[run] = source.count[run]
 
 
 @inner
-def _learn_from(trial: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
+def _learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*."""
     others = max(1, kept.rewards.shape[1] - 1)
-    part = 0 if trial == 0 else 1 + (trial - 1) * PARTS // others
-    for run in range(len(work.q)):
-        kept.corrections[run, part] = work.counts[run, COUNT.corrections]
-        reward = -work.total[run]
-        kept.rewards[run, trial] = reward
-        kept.completed[run, trial] = work.going[run]
-        if not work.going[run]:
+    part = 0 if number == 0 else 1 + (number - 1) * PARTS // others
+    for run in range(len(work.trials)):
+        trial = work.trials[run]
+        kept.corrections[run, part] = trial.counts[COUNT.corrections]
+        reward = -trial.total
+        kept.rewards[run, number] = reward
+        kept.completed[run, number] = trial.going
+        if not trial.going:
             continue
-        if trial == 0:
+        if number == 0:
             _copy(run, log, kept.first)
-        if trial > 0 or rules.first_learns:
+        if number > 0 or rules.first_learns:
             _update(run, float(reward), rules, tables, log)
         best = kept.best_trial[run]
         if best < 0 or reward > kept.rewards[run, best]:
-            kept.best_trial[run] = trial
+            kept.best_trial[run] = number
             _copy(run, log, kept.best)
 
 
@@ -522,11 +512,11 @@ def learn_kernel(
     trials = kept.rewards.shape[1]
     for trial in range(trials + 1):
         replay = trial == trials
-        for run in range(len(work.q) if replay else 0):  # which is not part of the runs
-            fill_row(kept.counts[run], work.counts[run])
+        for run in range(len(work.trials) if replay else 0):  # which is not part of the runs
+            fill_row(kept.counts[run], work.trials[run].counts)
         _trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
         if not replay:
             _learn_from(trial, rules, tables, kept, log, work)
-    for run in range(len(work.q)):
-        kept.replayed[run] = work.going[run]
+    for run in range(len(work.trials)):
+        kept.replayed[run] = work.trials[run].going
         _copy(run, log, kept.replay)

@@ -263,11 +263,11 @@ class _Learning:
         seeds: Sequence[int],
         trials: int,
     ) -> None:
-        runs, goals, dof = len(seeds), len(task.goals), task.robot.dof
+        runs = len(seeds)
         self._task, self._condition, self._model = task, condition, model
         self._search, self._seeds = search, seeds
         codes = [HANDS.index(hand) for hand in hands_of(search.hands)]
-        self._tables = empty_tables(runs, goals, dof)
+        self._tables = empty_tables(runs, task)
         self._kept = Kept(
             rewards=np.zeros((runs, trials), dtype=np.int64),
             completed=np.zeros((runs, trials), dtype=np.bool_),
@@ -275,9 +275,9 @@ class _Learning:
             replayed=np.zeros(runs, dtype=np.bool_),
             counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
             corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
-            first=empty_log(runs, goals, dof),
-            best=empty_log(runs, goals, dof),
-            replay=empty_log(runs, goals, dof),
+            first=empty_log(runs, task),
+            best=empty_log(runs, task),
+            replay=empty_log(runs, task),
         )
         self._work = work_for(runs, task)
         self._generators = [np.random.default_rng(seed) for seed in seeds]
@@ -287,7 +287,7 @@ class _Learning:
             rules_of(task, condition),
             self._tables,
             self._kept,
-            empty_log(runs, goals, dof),
+            empty_log(runs, task),
             addresses(self._generators),
             self._work,
         )
@@ -300,7 +300,8 @@ class _Learning:
         return [self._run(number, wall, cpu) for number in range(len(self._seeds))]
 
     def _run(self, number: int, wall: float, cpu: float) -> LearningRun:
-        kept, runs = self._kept, len(self._seeds)
+        kept, tables, runs = self._kept, self._tables[number], len(self._seeds)
+        dof = self._task.robot.dof
         best_trial = int(kept.best_trial[number])
         return LearningRun(
             task=self._task,
@@ -310,12 +311,12 @@ class _Learning:
             initial_search=self._search,
             rewards=np.ma.array(kept.rewards[number], mask=~kept.completed[number]),
             best_trial=best_trial if best_trial >= 0 else None,
-            initial=_movements(kept.first, number),
-            solution=_movements(kept.best, number),
-            replay=_movements(kept.replay, number),
+            initial=_movements(kept.first, number, dof),
+            solution=_movements(kept.best, number, dof),
+            replay=_movements(kept.replay, number, dof),
             replay_completed=bool(kept.replayed[number]),
-            values=self._tables.value[number],
-            targets=self._tables.target[number],
+            values=np.ascontiguousarray(tables["value"]),
+            targets=np.ascontiguousarray(tables["target"][..., :dof]),
             corrections=np.diff(np.maximum.accumulate(kept.corrections[number]), prepend=0),
             counters=_counters(kept.rewards.shape[1], kept.counts[number]),
             wall_s=wall / runs,
@@ -374,16 +375,16 @@ def _counters(trials: int, counts: NDArray[np.int64]) -> Counters:
     )
 
 
-def _movements(log: Log, run: int) -> tuple[Movement, ...]:
+def _movements(log: Log, run: int, dof: int) -> tuple[Movement, ...]:
     return tuple(
         Movement(
-            goal=int(log.goal[run, row]) + 1,
-            hand=HANDS[log.hand[run, row]],
-            kind="learned" if log.kind[run, row] == LEARNED else "corrective",
-            target=np.array(log.target[run, row]),
-            ticks=int(log.ticks[run, row]),
+            goal=int(made["goal"]) + 1,
+            hand=HANDS[made["hand"]],
+            kind="learned" if made["kind"] == LEARNED else "corrective",
+            target=np.array(made["target"][:dof]),
+            ticks=int(made["ticks"]),
         )
-        for row in range(int(log.count[run]))
+        for made in log.movements[run, : log.count[run]]
     )
 
 

@@ -29,11 +29,12 @@ from coartic.lanes import (
     GOING,
     copy_lanes,
     depart,
-    ends_of,
     fill,
     lanes_for,
     place,
+    runs_for,
     whole,
+    width_of,
     winding,
 )
 from coartic.model import PAPER, MotionModel, checked_model
@@ -43,6 +44,11 @@ from coartic.robot import BASE_DOF, Array, Hand, Robot
 # positions (1e-14 for the paper's robot, 1e-11 at coordinates of 10 000), far below any
 # step. It holds for figures up to LARGEST, so larger ones are refused.
 _CLEARANCE = 1e-9
+# The bounds are in single precision, whose rounding (6e-8) these outweigh.
+_single = np.float32
+_LESS, _FEWER, _UNDERFLOW = _single(1.0 - 1e-6), _single(1.0 - 1e-5), _single(1e-18)
+_NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
+_MORE = 1.0 + 1e-6
 _HIT, _MISSED = 1.0, 2.0  # fates of a lane
 LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
 
@@ -60,7 +66,7 @@ class Scratch(NamedTuple):
 
     xs: Any  # (n + 1,) for the longer arm
     ys: Any
-    step: Any  # (dof,)
+    step: Any  # (width,)
 
 
 class MoveResult(NamedTuple):
@@ -79,25 +85,39 @@ class MoveResult(NamedTuple):
 def scratch_for(robot: Robot) -> Scratch:
     """Work space large enough for either arm of ``robot``."""
     longest = robot.most_links
-    return Scratch(np.empty(longest + 1), np.empty(longest + 1), np.empty(robot.dof))
+    return Scratch(np.empty(longest + 1), np.empty(longest + 1), np.empty(width_of(robot)))
+
+
+@inner
+def largest_square(length: float) -> float:
+    """The largest number whose square root, as it is rounded, does not exceed a length."""
+    square = length * length
+    while math.sqrt(square) > length:
+        square = np.nextafter(square, 0.0)
+    while math.sqrt(np.nextafter(square, math.inf)) <= length:
+        square = np.nextafter(square, math.inf)
+    return square
 
 
 @lanewise
-def clear_steps(gap: float, closing: float, speed: float, bend: float) -> float:
-    """Number of steps during which a gap provably stays open.
+def clear_steps(square: float, radius: float, closing: float, slowness: float, bend: float) -> Any:
+    """Number of steps during which the hand provably stays out of a disc.
 
-    ``gap`` > 0 is the distance to a disc's rim, ``closing`` the rate at which it
-    shrinks now, ``speed`` the bound s and ``bend`` the bound c of the module's text.
+    ``square`` is that of the distance d to its centre, ``closing`` d times the closing speed u;
+    ``slowness`` is 1 / s, and ``bend`` c of the module's text. In single precision, in which
+    roots and quotients, most of the work, cost a third.
     """
-    gap -= _CLEARANCE
-    root = math.sqrt(closing * closing + 2.0 * bend * gap)
-    approaching = closing > 0.0
-    way = 2.0 * gap if approaching else root - closing
-    rate = closing + root if approaching else bend
-    curved = way / rate if rate > 0.0 else math.inf
-    straight = gap / speed if speed > 0.0 else math.inf
-    steps = max(straight, curved) * (1.0 - 1e-9)
-    return steps if gap > 0.0 else 0.0
+    distance = np.sqrt(_single(square))
+    gap = distance * _LESS - _single(radius * _MORE + _CLEARANCE)
+    toward, turn = _single(closing), _single(bend) * distance
+    twice = (gap + gap) * distance
+    root = np.sqrt(toward * toward + turn * twice)
+    approaching = toward > _NOTHING
+    way = twice if approaching else root - toward
+    rate = toward + root if approaching else turn
+    curved = way / (rate + _UNDERFLOW)
+    steps = max(gap * _single(slowness), curved) * _FEWER
+    return steps if (gap > _NOTHING) & (root < _OVERFLOW) else _NOTHING
 
 
 @lanewise
@@ -118,7 +138,7 @@ def _set_off(at: Any, count: int, model: Any) -> bool:
             speed += at.length[k, i] * abs(rate)
             bend += at.length[k, i] * rate * rate
         at.base_rate[0, i], at.base_rate[1, i] = base_x, base_y
-        at.distance[i], at.speed[i], at.bend[i] = distance, speed, bend
+        at.distance[i], at.slowness[i], at.bend[i] = distance, 1.0 / speed, bend
         last = np.ceil(distance / model.step)
         at.step[i], at.last[i] = 0.0, last
         at.whole[i] = -1.0 if model.whole_last_step & (last > 0.0) else last
@@ -140,36 +160,40 @@ def _go(at: Any, count: int, model: Any) -> None:
 
 
 @lanewise
-def _look(at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any) -> int:
-    """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended."""
+def _look(
+    at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any, hit: float, arrived: float
+) -> int:
+    """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended.
+
+    ``hit`` and ``arrived`` are the largest squares of distances to the goal and to the end
+    at which a movement stops.
+    """
     ended = 0
     tip = len(at.length)
     for i in range(whole(count)):
-        goal_dx = goal.x - at.x[tip, i]
-        goal_dy = goal.y - at.y[tip, i]
-        goal_distance = math.sqrt(goal_dx * goal_dx + goal_dy * goal_dy)
         velocity_x = at.base_rate[0, i]
         velocity_y = at.base_rate[1, i]
         for k in range(tip):
             velocity_x -= at.rate[k, i] * (at.y[k + 1, i] - at.y[k, i])
             velocity_y += at.rate[k, i] * (at.x[k + 1, i] - at.x[k, i])
-        closing = (velocity_x * goal_dx + velocity_y * goal_dy) / goal_distance
-        clear = clear_steps(goal_distance - goal.radius, closing, at.speed[i], at.bend[i])
+        dx, dy = goal.x - at.x[tip, i], goal.y - at.y[tip, i]
+        to_goal = dx * dx + dy * dy
+        closing = velocity_x * dx + velocity_y * dy
+        clear = clear_steps(to_goal, goal.radius, closing, at.slowness[i], at.bend[i])
         stop = at.step[i] == at.last[i]
         if stop_on_arrival:
-            end_dx = at.end[0, i] - at.x[tip, i]
-            end_dy = at.end[1, i] - at.y[tip, i]
-            end_distance = math.sqrt(end_dx * end_dx + end_dy * end_dy)
-            stop |= end_distance <= model.arrival_tolerance
-            closing = (velocity_x * end_dx + velocity_y * end_dy) / end_distance
-            gap = end_distance - model.arrival_tolerance
-            clear = min(clear, clear_steps(gap, closing, at.speed[i], at.bend[i]))
+            dx, dy = at.end[0, i] - at.x[tip, i], at.end[1, i] - at.y[tip, i]
+            to_end = dx * dx + dy * dy
+            stop |= to_end <= arrived
+            closing = velocity_x * dx + velocity_y * dy
+            rim = model.arrival_tolerance
+            clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         fate = _MISSED if stop else GOING
-        fate = _HIT if goal_distance <= goal.radius else fate
+        fate = _HIT if to_goal <= hit else fate
         early = (at.step[i] == 0.0) & (at.last[i] > 0.0)
         fate = GOING if model.first_step & early else fate
         # Every step up to step + clear is clear of both discs.
-        after = min(at.step[i] + 1.0 + math.floor(min(clear, at.last[i])), at.last[i])
+        after = min(at.step[i] + 1.0 + np.floor(min(clear, at.last[i])), at.last[i])
         at.step[i] = after if fate == GOING else at.step[i]
         at.fate[i] = fate
         ended += 0 if (fate == GOING) | (i >= count) else 1
@@ -183,17 +207,16 @@ def move_lanes(
     goal: Any,
     stop_on_arrival: bool,
     model: Any,
-    q: Any,
-    target: Any,
-    ends: Any,
+    runs: Any,
 ) -> None:
     """Move the first ``count`` lanes until each has ended.
 
-    Each run's configuration in ``q`` (N, dof), from which it departed to that in ``target``,
-    becomes the one in which it stopped; its ``ends`` says how.
+    Each run's ``q``, from which it departed to its ``target``, becomes the configuration in
+    which it stopped; the rest of its record says how.
     """
     at = lanes.at
     evaluations = 0
+    hit, arrived = largest_square(goal.radius), largest_square(model.arrival_tolerance)
     is_near = _set_off(at, count, model)
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
@@ -205,41 +228,36 @@ def move_lanes(
         _go(at, count, model)
         place(at, count, is_near)
         evaluations += 1
-        if _look(at, count, goal, stop_on_arrival, model) == 0:
+        ended = _look(at, count, goal, stop_on_arrival, model, hit, arrived)
+        if ended == 0:
             continue
         for lane in range(count - 1, -1, -1):
             if at.fate[lane] == GOING:
                 continue
-            run = at.run[lane]
-            arrived = at.step[lane] == at.whole[lane]
-            fraction = 0.0 if arrived else at.step[lane] * model.step / at.distance[lane]
-            for j in range(q.shape[1]):
-                between = q[run, j] + fraction * (target[run, j] - q[run, j])
-                q[run, j] = target[run, j] if arrived else between
-            ends.hit[run] = at.fate[lane] == _HIT
-            ends.ticks[run] = int(at.step[lane]) + model.arrival_tick
-            ends.evaluations[run] += evaluations
+            run = runs[at.run[lane]]
+            q, target = run.q, run.target
+            whole = at.step[lane] == at.whole[lane]
+            fraction = 0.0 if whole else at.step[lane] * model.step / at.distance[lane]
+            for j in range(len(q)):
+                between = q[j] + fraction * (target[j] - q[j])
+                q[j] = target[j] if whole else between
+            run.hit = at.fate[lane] == _HIT
+            run.ticks = int(at.step[lane]) + model.arrival_tick
+            run.evaluations += evaluations
             count -= 1
             fill(lanes.moved, lane, count)
+            ended -= 1
+            if ended == 0:
+                break
 
 
 @entry
 def _move_one(
-    q: Any,
-    target: Any,
-    arm: Any,
-    goal: Any,
-    stop_on_arrival: bool,
-    model: Any,
-    lanes: Any,
-    ends: Any,
+    arm: Any, goal: Any, stop_on_arrival: bool, model: Any, lanes: Any, runs: Any
 ) -> None:
-    """Move ``q`` in place."""
-    depart(lanes.at, 0, 0, q, target, arm)
-    shape = (1, len(q))
-    move_lanes(
-        lanes, 1, goal, stop_on_arrival, model, q.reshape(shape), target.reshape(shape), ends
-    )
+    """Move the only run."""
+    depart(lanes.at, 0, 0, runs[0].q, runs[0].target, arm)
+    move_lanes(lanes, 1, goal, stop_on_arrival, model, runs)
 
 
 def move(
@@ -261,20 +279,18 @@ def move(
     ``LARGEST``. Source: paper, *Generating Movement for
     Each Goal*.
     """
-    position = configuration(robot, q)
-    end = configuration(robot, target)
-    ends = ends_of(1)
+    runs = runs_for(1, robot)
+    run, own = runs[0], slice(robot.dof)
+    run["q"][own], run["target"][own] = configuration(robot, q), configuration(robot, target)
     _move_one(
-        position,
-        end,
         robot.arm(hand),
         checked_goal(goal, radius),
         stop_on_arrival,
         checked_model(model),
         lanes_for(robot),
-        ends,
+        runs,
     )
-    return MoveResult(position, int(ends.ticks[0]), bool(ends.hit[0]), int(ends.evaluations[0]))
+    return MoveResult(run["q"][own], int(run["ticks"]), bool(run["hit"]), int(run["evaluations"]))
 
 
 def follow(

@@ -16,7 +16,7 @@ import numpy as np
 
 from coartic.compiled import entry, fill_row, inner
 from coartic.corrective import correct_lanes
-from coartic.lanes import board, depart, ends_of, lanes_for
+from coartic.lanes import board, depart, lanes_for, runs_for
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import LARGEST, Goal, move_lanes
 from coartic.problem import arm_of, problem_of
@@ -40,34 +40,32 @@ class _Path(NamedTuple):
     ticks: Any  # (G + 1,), NaN after a failure
     hand: Any  # (G,) by which a goal was hit; -1 before the first trial
     goal: Any  # (G, 2)
-    here: Any  # (1, dof) where the robot is
-    target: Any  # (1, dof) and where it is to go
 
 
 @inner
-def _hit(g: int, problem: Any, path: Any, lanes: Any, ends: Any) -> None:
+def _hit(g: int, problem: Any, path: Any, lanes: Any, runs: Any) -> None:
     """From before goal ``g`` of a path to after it."""
     goal = Goal(path.goal[g, 0], path.goal[g, 1], problem.radius)
-    arm, q, target = arm_of(problem, path.hand[g]), path.here, path.target
+    arm, run = arm_of(problem, path.hand[g]), runs[0]
     path.ticks[g + 1] = path.ticks[g]
-    fill_row(q[0], path.q[g])
-    fill_row(target[0], path.q[g])
+    fill_row(run.q, path.q[g])
+    fill_row(run.target, path.q[g])
     if not math.isnan(path.ticks[g]):
         # A movement to where the robot is tells whether it stands in the goal already.
-        depart(lanes.at, 0, 0, q[0], target[0], arm)
-        move_lanes(lanes, 1, goal, False, problem.model, q, target, ends)
-        if not ends.hit[0]:
-            board(lanes.at, 0, 0, q[0], arm)
-            correct_lanes(lanes, 1, goal, problem.corrector, problem.model, target, ends)
-            if ends.converged[0]:
-                depart(lanes.at, 0, 0, q[0], target[0], arm)
+        depart(lanes.at, 0, 0, run.q, run.target, arm)
+        move_lanes(lanes, 1, goal, False, problem.model, runs)
+        if not run.hit:
+            board(lanes.at, 0, 0, run.q, arm)
+            correct_lanes(lanes, 1, goal, problem.corrector, problem.model, runs)
+            if run.converged:
+                depart(lanes.at, 0, 0, run.q, run.target, arm)
                 stops = problem.model.corrective_arrival
-                move_lanes(lanes, 1, goal, stops, problem.model, q, target, ends)
-                path.ticks[g + 1] += ends.ticks[0]
-            if not ends.hit[0]:
+                move_lanes(lanes, 1, goal, stops, problem.model, runs)
+                path.ticks[g + 1] += run.ticks
+            if not run.hit:
                 path.ticks[g + 1] = math.nan
-                q[:] = math.nan
-    fill_row(path.q[g + 1], q[0])
+                run.q[:] = math.nan
+    fill_row(path.q[g + 1], run.q)
 
 
 @entry
@@ -79,7 +77,7 @@ def _try_all(
     reached: Any,
     path: Any,
     lanes: Any,
-    ends: Any,
+    runs: Any,
 ) -> None:
     length = goals.shape[1]
     for number in range(len(goals)):
@@ -91,7 +89,7 @@ def _try_all(
                 same &= (path.hand[g] == hand) & (path.goal[g, 0] == x) & (path.goal[g, 1] == y)
                 if not same:
                     path.hand[g], path.goal[g, 0], path.goal[g, 1] = hand, x, y
-                    _hit(g, problem, path, lanes, ends)
+                    _hit(g, problem, path, lanes, runs)
                 fill_row(reached[number, sequence, g], path.q[g + 1])
             rewards[number, sequence] = -path.ticks[length]
 
@@ -124,8 +122,6 @@ def corrective_trials(
         ticks=np.zeros(shape[2] + 1),
         hand=np.full(shape[2], -1),
         goal=np.zeros((shape[2], 2)),
-        here=np.empty((1, task.robot.dof)),
-        target=np.empty((1, task.robot.dof)),
     )
     codes = [[HANDS.index(hand) for hand in hands_of(hands)] for hands in sequences]
     _try_all(
@@ -135,6 +131,6 @@ def corrective_trials(
         *made,
         path,
         lanes_for(task.robot),
-        ends_of(1),
+        runs_for(1, task.robot),
     )
     return made

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from coartic.compiled import entry, fill_row, inlined, inner
 from coartic.corrective import correct_lanes
-from coartic.lanes import LANES, Ends, Lanes, board, depart, ends_of, lanes_for
+from coartic.lanes import LANES, Lanes, board, depart, lanes_for, runs_for
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.movement import LARGEST, move_lanes
 from coartic.problem import arm_of, goal_of, problem_of
@@ -59,11 +59,8 @@ class _Made(NamedTuple):
 class _Work(NamedTuple):
     """What a lot of trials works on, each now at the same goal."""
 
-    q: Any  # (N, dof)
-    target: Any  # (N, dof)
+    runs: Any  # (N,) records: see runs_for
     going: Any  # (N,) whether no goal was missed so far
-    acting: Any  # (N,) whether it is among those that are moved next
-    ends: Ends
     lanes: Lanes
 
 
@@ -80,11 +77,11 @@ def _empty(target: Any) -> bool:
 def _depart(first: int, number: int, problem: Any, made: Any, work: Any) -> int:
     """Put the acting trials on their way; how many."""
     count = 0
-    for trial in range(len(work.q)):
-        if work.acting[trial]:
-            q, target = work.q[trial], work.target[trial]
+    for trial in range(len(work.runs)):
+        run = work.runs[trial]
+        if run.acting:
             arm = arm_of(problem, made.hands[first + trial, number])
-            depart(work.lanes.at, count, trial, q, target, arm)
+            depart(work.lanes.at, count, trial, run.q, run.target, arm)
             count += 1
     return count
 
@@ -94,72 +91,74 @@ def _attempt(first: int, number: int, problem: Any, made: Any, work: Any) -> Non
     """Move to the targets; a trial without one moves to where it is."""
     goal = goal_of(problem, number)
     for given in (True, False):
-        for trial in range(len(work.q)):
-            work.acting[trial] = work.going[trial]
-            if not work.going[trial]:
+        for trial in range(len(work.runs)):
+            run = work.runs[trial]
+            run.acting = work.going[trial]
+            if not run.acting:
                 continue
             target = made.targets[first + trial, number]
-            work.acting[trial] = given != _empty(target)
-            if work.acting[trial]:
+            run.acting = given != _empty(target)
+            if run.acting:
                 for j in range(len(target)):
-                    at = work.q[trial, j]
-                    work.target[trial, j] = at if math.isnan(target[j]) else target[j]
+                    run.target[j] = run.q[j] if math.isnan(target[j]) else target[j]
                 if given:
-                    fill_row(target, work.target[trial])
+                    fill_row(target, run.target)
         count = _depart(first, number, problem, made, work)
-        move_lanes(work.lanes, count, goal, given, problem.model, work.q, work.target, work.ends)
-        for trial in range(len(work.q)):
-            if work.acting[trial] and given:
-                made.ticks[first + trial] += work.ends.ticks[trial]
+        move_lanes(work.lanes, count, goal, given, problem.model, work.runs)
+        for trial in range(len(work.runs)):
+            if work.runs[trial].acting and given:
+                made.ticks[first + trial] += work.runs[trial].ticks
 
 
 @inlined
 def _finish(first: int, number: int, problem: Any, made: Any, work: Any) -> None:
     """Have **A** finish what was missed."""
-    goal, lanes, ends = goal_of(problem, number), work.lanes, work.ends
+    goal, lanes = goal_of(problem, number), work.lanes
     count = 0
-    for trial in range(len(work.q)):
-        work.acting[trial] = work.going[trial] and not ends.hit[trial]
-        if work.acting[trial]:
-            fill_row(work.target[trial], work.q[trial])
+    for trial in range(len(work.runs)):
+        run = work.runs[trial]
+        run.acting = work.going[trial] and not run.hit
+        if run.acting:
+            fill_row(run.target, run.q)
             arm = arm_of(problem, made.hands[first + trial, number])
-            board(lanes.at, count, trial, work.q[trial], arm)
+            board(lanes.at, count, trial, run.q, arm)
             count += 1
-    correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.target, ends)
-    for trial in range(len(work.q)):
-        if work.acting[trial]:
-            made.iterations[0] += ends.iterations[trial]
-            made.corrections[0] += ends.converged[trial]
-            work.acting[trial] = ends.converged[trial]
+    correct_lanes(lanes, count, goal, problem.corrector, problem.model, work.runs)
+    for trial in range(len(work.runs)):
+        run = work.runs[trial]
+        if run.acting:
+            made.iterations[0] += run.iterations
+            made.corrections[0] += run.converged
+            run.acting = run.converged
     count = _depart(first, number, problem, made, work)
     stops = problem.model.corrective_arrival
-    move_lanes(lanes, count, goal, stops, problem.model, work.q, work.target, ends)
-    for trial in range(len(work.q)):
-        if work.acting[trial]:
-            made.ticks[first + trial] += ends.ticks[trial]
+    move_lanes(lanes, count, goal, stops, problem.model, work.runs)
+    for trial in range(len(work.runs)):
+        if work.runs[trial].acting:
+            made.ticks[first + trial] += work.runs[trial].ticks
 
 
 @inlined
 def _make_lot(first: int, problem: Any, made: Any, work: Any) -> None:
     """Make the trials from ``first`` on, as many as there is room for."""
     goals = len(problem.goals)
-    for trial in range(len(work.q)):
-        fill_row(work.q[trial], problem.start)
+    for trial in range(len(work.runs)):
+        fill_row(work.runs[trial].q, problem.start)
         work.going[trial] = first + trial < len(made.targets)
     for number in range(goals):
         _attempt(first, number, problem, made, work)
         _finish(first, number, problem, made, work)
-        for trial in range(len(work.q)):
-            work.going[trial] = work.going[trial] and work.ends.hit[trial]
+        for trial in range(len(work.runs)):
+            work.going[trial] = work.going[trial] and work.runs[trial].hit
             if work.going[trial]:
-                fill_row(made.reached[first + trial, number], work.q[trial])
+                fill_row(made.reached[first + trial, number], work.runs[trial].q)
                 made.completed[first + trial] = number == goals - 1
 
 
 @entry
 def _make(problem: Any, made: Any, work: Any) -> None:
     """Make every trial of ``made.hands`` and ``made.targets``, and fill the rest."""
-    for first in range(0, len(made.targets), len(work.q)):
+    for first in range(0, len(made.targets), len(work.runs)):
         _make_lot(first, problem, made, work)
 
 
@@ -186,14 +185,13 @@ def make_trials(
     )
     work = _work_for(max(min(len(given), LANES), 1), task)
     _make(problem_of(task, model), made, work)
-    counts = (made.corrections[0], made.iterations[0], work.ends.evaluations.sum())
+    counts = (made.corrections[0], made.iterations[0], work.runs["evaluations"].sum())
     return Trials(made.ticks, made.completed, given, made.reached, *map(int, counts))
 
 
 def _work_for(trials: int, task: Task) -> _Work:
-    q, target = np.zeros((2, trials, task.robot.dof))
-    going, acting = np.zeros((2, trials), dtype=np.bool_)
-    return _Work(q, target, going, acting, ends_of(trials), lanes_for(task.robot))
+    runs = runs_for(trials, task.robot)
+    return _Work(runs, np.zeros(trials, dtype=np.bool_), lanes_for(task.robot))
 
 
 def _checked_hands(task: Task, hands: str | Sequence[str], count: int) -> NDArray[np.int64]:

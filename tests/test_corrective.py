@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct, reference
 from coartic.compiled import entry, joint_chain, joint_lever
-from coartic.corrective import largest_square, shift_kernel
-from coartic.movement import Goal, scratch_for
+from coartic.corrective import shift_kernel
+from coartic.movement import Goal, largest_square, scratch_for
 from coartic.robot import HANDS
 from tests.support.strategies import UNEVEN, configurations
 

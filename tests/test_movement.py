@@ -230,21 +230,35 @@ def test_skips_most_steps():
 
 
 @entry
-def _cleared(gap, closing, speed, bend):
-    return clear_steps(gap, closing, speed, bend)
+def _cleared(square, radius, closing, slowness, bend):
+    return clear_steps(square, radius, closing, slowness, bend)
 
 
-def test_the_bound_keeps_its_promise():
+@pytest.mark.parametrize("largest", [0.0, 6.0, 13.0])  # powers of 10
+def test_the_bound_keeps_its_promise(largest):
     """In the steps it clears, no motion within the bounds can close the gap."""
     rng = np.random.default_rng(16)
-    for _ in range(5000):
-        gap, speed, bend = rng.uniform(0, 3), rng.uniform(0, 0.1), rng.uniform(0, 1e-3)
+    powers = rng.uniform([-9.0, -9.0, -20.0, -20.0], largest, (5000, 4))
+    kept = 0
+    for distance, share, speed, bend in 10.0**powers:
+        radius = distance * (1.0 - min(share, 1.0))
         closing = rng.uniform(-1, 1) * speed
-        steps = _cleared(gap, closing, speed, bend)
-        assert min(speed * steps, closing * steps + bend * steps**2 / 2) < gap - 5e-10
+        steps = float(_cleared(distance**2, radius, closing * distance, 1.0 / speed, bend))
+        steps = min(steps, 1e12)  # more than a movement can have
+        moved = min(speed * steps, closing * steps + bend * steps**2 / 2)
+        assert steps == 0.0 or moved < distance - radius - 5e-10
+        kept += steps > 0.0
+    assert kept > 1000
     for gap in (0.0, 1e-10, 1e-9):  # too near to call
-        assert _cleared(gap, 0.01, 0.01, 1e-3) == 0.0
-    assert _cleared(1.0, 0.0, 0.0, 0.0) == np.inf
+        assert _cleared((0.1 + gap) ** 2, 0.1, 0.01, 1e2, 1e-3) == 0.0
+    assert _cleared(1.0, 0.0, 0.0, np.inf, 0.0) > 1e17
+
+
+def test_the_bound_clears_nearly_all_it_may():
+    """Of a straight approach, and of motions that turn as much as they can."""
+    for u, c in ((0.01, 0.0), (0.0, 1e-4), (-0.01, 1e-4), (0.01, 1e-4)):
+        exact = 0.5 / u if c == 0.0 else (np.sqrt(u * u + 2 * c * 0.5) - u) / c
+        assert _cleared(1.0, 0.5, u, 0.0, c) == pytest.approx(exact, rel=2e-5)
 
 
 def test_equals_every_step_at_the_largest_figures():
