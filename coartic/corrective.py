@@ -274,4 +274,4 @@ def correct(
         lanes_for(robot),
         runs,
     )
-    return Correction(run["target"][own], bool(run["converged"]), int(run["iterations"]))
+    return Correction(run["target"][own].copy(), bool(run["converged"]), int(run["iterations"]))

@@ -69,13 +69,13 @@ def _move_chosen(number: int, arrives: bool, problem: Any, rows: Any, work: Any)
     """Move the solutions that have a row, in lots of as many as there are lanes."""
     goal = goal_of(problem, number)
     count = 0
-    for number_of_run in range(len(work.runs)):
-        run = work.runs[number_of_run]
-        if work.row[number_of_run] >= 0:
-            arm = arm_of(problem, rows.hands[number_of_run, number])
-            depart(work.lanes.at, count, number_of_run, run.q, run.target, arm)
+    for n in range(len(work.runs)):
+        run = work.runs[n]
+        if work.row[n] >= 0:
+            arm = arm_of(problem, rows.hands[n, number])
+            depart(work.lanes.at, count, n, run.q, run.target, arm)
             count += 1
-        if count == LANES or (number_of_run == len(work.runs) - 1 and count > 0):
+        if count == LANES or (n == len(work.runs) - 1 and count > 0):
             move_lanes(work.lanes, count, goal, arrives, problem.model, work.runs)
             count = 0
 
@@ -83,37 +83,37 @@ def _move_chosen(number: int, arrives: bool, problem: Any, rows: Any, work: Any)
 @entry
 def _execute(problem: Any, rows: Any, work: Any) -> None:
     """Execute all solutions, goal by goal."""
-    for run in range(len(work.runs)):
-        fill_row(work.runs[run].q, problem.start)
+    for n in range(len(work.runs)):
+        fill_row(work.runs[n].q, problem.start)
     for number in range(len(problem.goals)):
         most = 0
-        for run in range(len(work.runs)):  # whether the goal is hit where the robot stands
-            work.row[run] = 0 if rows.going[run] else -1
-            fill_row(work.runs[run].target, work.runs[run].q)
-            most = max(most, rows.first[run, number + 1] - rows.first[run, number])
+        for n in range(len(work.runs)):  # whether the goal is hit where the robot stands
+            work.row[n] = 0 if rows.going[n] else -1
+            fill_row(work.runs[n].target, work.runs[n].q)
+            most = max(most, rows.first[n, number + 1] - rows.first[n, number])
         _move_chosen(number, True, problem, rows, work)
-        for run in range(len(work.runs)):
-            work.hit[run] = work.runs[run].hit
+        for n in range(len(work.runs)):
+            work.hit[n] = work.runs[n].hit
         for place in range(most):
             for arrives in (True, False):
-                for run in range(len(work.runs)):
-                    row = rows.first[run, number] + place
-                    needed = rows.going[run] and row < rows.first[run, number + 1]
+                for n in range(len(work.runs)):
+                    row = rows.first[n, number] + place
+                    needed = rows.going[n] and row < rows.first[n, number + 1]
                     needed = needed and rows.arrives[row] == arrives
-                    needed = needed and (not work.hit[run] or (place == 0 and arrives))
-                    work.row[run] = row if needed else -1
+                    needed = needed and (not work.hit[n] or (place == 0 and arrives))
+                    work.row[n] = row if needed else -1
                     if needed:
-                        fill_row(work.runs[run].target, rows.targets[row])
+                        fill_row(work.runs[n].target, rows.targets[row])
                 _move_chosen(number, arrives, problem, rows, work)
-                for run in range(len(work.runs)):
-                    if work.row[run] >= 0:
-                        rows.ticks[work.row[run]] = work.runs[run].ticks
-                        work.hit[run] = work.runs[run].hit
-        for run in range(len(work.runs)):
+                for n in range(len(work.runs)):
+                    if work.row[n] >= 0:
+                        rows.ticks[work.row[n]] = work.runs[n].ticks
+                        work.hit[n] = work.runs[n].hit
+        for n in range(len(work.runs)):
             # A goal that no movement was needed for is hit on the way: a case of its own.
-            made = rows.ticks[rows.first[run, number]] >= 0
-            rows.going[run] = rows.going[run] and work.hit[run] and made
-            fill_row(rows.reached[run, number], work.runs[run].q)
+            made = rows.ticks[rows.first[n, number]] >= 0
+            rows.going[n] = rows.going[n] and work.hit[n] and made
+            fill_row(rows.reached[n, number], work.runs[n].q)
 
 
 def execute_straight(

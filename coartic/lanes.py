@@ -93,7 +93,7 @@ def _layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
         "distance": (),  # from start to target; its square, before the arm sets off
-        **dict.fromkeys(("step", "last", "whole", "slowness", "bend"), ()),
+        **dict.fromkeys(("step", "last", "whole", "slowness", "bend", "clearance"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing

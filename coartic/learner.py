@@ -153,8 +153,8 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     ``target``, q*.
     """
     known = record_of({"value": np.float64, "target": (np.float64, width_of(task.robot))})
-    tables = np.empty((runs, len(task.goals), 3, 2), known)
-    tables["value"], tables["target"] = -np.inf, np.nan
+    tables = np.zeros((runs, len(task.goals), 3, 2), known)
+    tables["value"], tables["target"][..., : task.robot.dof] = -np.inf, np.nan
     return tables
 
 
@@ -194,11 +194,11 @@ def work_for(runs: int, task: Task) -> Work:
 
 
 @inlined
-def _goal_distance(run: int, number: int, hand: int, problem: Any, work: Any) -> float:
+def _goal_distance(n: int, number: int, hand: int, problem: Any, work: Any) -> float:
     arm = arm_of(problem, hand)
     scratch = work.scratch
-    joint_chain(work.runs[run].q, arm, scratch.xs, scratch.ys)
-    work.trials[run].counts[COUNT.evaluations] += 1
+    joint_chain(work.runs[n].q, arm, scratch.xs, scratch.ys)
+    work.trials[n].counts[COUNT.evaluations] += 1
     tip = len(arm.links)
     dx = problem.goals[number, 0] - scratch.xs[tip]
     dy = problem.goals[number, 1] - scratch.ys[tip]
@@ -227,12 +227,12 @@ def _random_hand(hands: Any, rng: Any) -> int:
 
 
 @inlined
-def _closest_hand(run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+def _closest_hand(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
     nearest = rules.hands[0]
-    nearest_distance = _goal_distance(run, number, nearest, problem, work)
+    nearest_distance = _goal_distance(n, number, nearest, problem, work)
     tie = False
     for hand in rules.hands[1:]:
-        distance = _goal_distance(run, number, hand, problem, work)
+        distance = _goal_distance(n, number, hand, problem, work)
         tie = abs(distance - nearest_distance) <= rules.rounding
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
@@ -240,16 +240,16 @@ def _closest_hand(run: int, number: int, problem: Any, rules: Any, rng: Any, wor
 
 
 @inlined
-def _untied(run: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+def _untied(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
     """Which of two hands of equal value, where it is not always the left one."""
     hand = 1
     if rules.ties == 2:
         hand = _random_hand(rules.hands, rng)
     elif rules.ties == 3:
-        left = _goal_distance(run, number, 0, problem, work)
-        hand = 1 if _goal_distance(run, number, 1, problem, work) < left else 0
+        left = _goal_distance(n, number, 0, problem, work)
+        hand = 1 if _goal_distance(n, number, 1, problem, work) < left else 0
     elif rules.ties == 4:
-        hand = 1 if work.trials[run].previous == 1 else 0
+        hand = 1 if work.trials[n].previous == 1 else 0
     return hand
 
 
@@ -264,23 +264,23 @@ def _choose_hands(
     number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
     """The hand of every run: greedy, or with probability ε an explored one."""
-    for run in range(len(work.trials)):
-        trial = work.trials[run]
+    for n in range(len(work.trials)):
+        trial = work.trials[n]
         if not trial.going:
             continue
         hand = -1
         if explore and rules.exploration != 0:
-            rng = generator_at(rngs, run)
+            rng = generator_at(rngs, n)
             if rng.random() < rules.epsilon:
                 if rules.exploration == 1:
                     hand = _random_hand(rules.hands, rng)
                 else:
-                    hand = _closest_hand(run, number, problem, rules, rng, work)
+                    hand = _closest_hand(n, number, problem, rules, rng, work)
         if hand < 0:
-            entries = tables[run, number, _before(trial, rules)]
+            entries = tables[n, number, _before(trial, rules)]
             hand = _greedy(entries, rules.hands)
             if rules.ties != 0 and _equal(entries, rules.hands):
-                hand = _untied(run, number, problem, rules, generator_at(rngs, run), work)
+                hand = _untied(n, number, problem, rules, generator_at(rngs, n), work)
         trial.hand = hand
 
 
@@ -442,55 +442,55 @@ def _trial(
 
 
 @inlined
-def _update(run: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
+def _update(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
     """Credit what was visited with the reward of the trial, or each goal with its return."""
-    row = log.count[run]
+    row = log.count[n]
     later = 0.0
     for number in range(log.hits.shape[1] - 1, -1, -1):
         credit = reward
         if rules.by_subtask:
             ticks = 0
-            while row > 0 and log.movements[run, row - 1].goal == number:
+            while row > 0 and log.movements[n, row - 1].goal == number:
                 row -= 1
-                ticks += log.movements[run, row].ticks
+                ticks += log.movements[n, row].ticks
             credit = later = rules.discount * later - ticks
-        hit = log.hits[run, number]
+        hit = log.hits[n, number]
         knows = number > 0 and not rules.goal_alone
-        before = log.hits[run, number - 1].hand if knows else NO_HAND
-        known = tables[run, number, before, hit.hand]
+        before = log.hits[n, number - 1].hand if knows else NO_HAND
+        known = tables[n, number, before, hit.hand]
         if credit > known.value or (rules.update_equal and credit == known.value):
             known.value = credit
             fill_row(known.target, hit.q)
 
 
 @inlined
-def _copy(run: int, source: Any, destination: Any) -> None:
-    for row in range(source.count[run]):
-        destination.movements[run, row] = source.movements[run, row]
-    destination.count[run] = source.count[run]
+def _copy(n: int, source: Any, destination: Any) -> None:
+    for row in range(source.count[n]):
+        destination.movements[n, row] = source.movements[n, row]
+    destination.count[n] = source.count[n]
 
 
 @inner
-def _learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
-    """Keep the rewards of a trial; where it was completed, update Q and q*."""
+def _learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
+    """Keep the rewards of a trial after so many; where it was completed, update Q and q*."""
     others = max(1, kept.rewards.shape[1] - 1)
-    part = 0 if number == 0 else 1 + (number - 1) * PARTS // others
-    for run in range(len(work.trials)):
-        trial = work.trials[run]
-        kept.corrections[run, part] = trial.counts[COUNT.corrections]
+    part = 0 if earlier == 0 else 1 + (earlier - 1) * PARTS // others
+    for n in range(len(work.trials)):
+        trial = work.trials[n]
+        kept.corrections[n, part] = trial.counts[COUNT.corrections]
         reward = -trial.total
-        kept.rewards[run, number] = reward
-        kept.completed[run, number] = trial.going
+        kept.rewards[n, earlier] = reward
+        kept.completed[n, earlier] = trial.going
         if not trial.going:
             continue
-        if number == 0:
-            _copy(run, log, kept.first)
-        if number > 0 or rules.first_learns:
-            _update(run, float(reward), rules, tables, log)
-        best = kept.best_trial[run]
-        if best < 0 or reward > kept.rewards[run, best]:
-            kept.best_trial[run] = number
-            _copy(run, log, kept.best)
+        if earlier == 0:
+            _copy(n, log, kept.first)
+        if earlier > 0 or rules.first_learns:
+            _update(n, float(reward), rules, tables, log)
+        best = kept.best_trial[n]
+        if best < 0 or reward > kept.rewards[n, best]:
+            kept.best_trial[n] = earlier
+            _copy(n, log, kept.best)
 
 
 @entry
@@ -512,11 +512,11 @@ def learn_kernel(
     trials = kept.rewards.shape[1]
     for trial in range(trials + 1):
         replay = trial == trials
-        for run in range(len(work.trials) if replay else 0):  # which is not part of the runs
-            fill_row(kept.counts[run], work.trials[run].counts)
+        for n in range(len(work.trials) if replay else 0):  # which is not part of the runs
+            fill_row(kept.counts[n], work.trials[n].counts)
         _trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
         if not replay:
             _learn_from(trial, rules, tables, kept, log, work)
-    for run in range(len(work.trials)):
-        kept.replayed[run] = work.trials[run].going
-        _copy(run, log, kept.replay)
+    for n in range(len(work.trials)):
+        kept.replayed[n] = work.trials[n].going
+        _copy(n, log, kept.replay)

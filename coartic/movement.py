@@ -40,15 +40,13 @@ from coartic.lanes import (
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
-# Distance kept clear beyond what the bounds ask for: far above the rounding of
-# positions (1e-14 for the paper's robot, 1e-11 at coordinates of 10 000), far below any
-# step. It holds for figures up to LARGEST, so larger ones are refused.
-_CLEARANCE = 1e-9
-# The bounds are in single precision, whose rounding (6e-8) these outweigh.
+# Distance kept clear beyond what the bounds ask for, which is more where positions are rounded by
+# more: a joint's share of how far from 0 they, and the angles of the arm times its length, can be.
+_CLEARANCE, _ROUNDING = 1e-9, 1e-15
+# The bounds are in single precision: these outweigh its rounding (6e-8) and what it takes for 0.
 _single = np.float32
-_LESS, _FEWER, _UNDERFLOW = _single(1.0 - 1e-6), _single(1.0 - 1e-5), _single(1e-18)
+_LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_MORE = 1.0 + 1e-6
 _HIT, _MISSED = 1.0, 2.0  # fates of a lane
 LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
 
@@ -100,15 +98,15 @@ def largest_square(length: float) -> float:
 
 
 @lanewise
-def clear_steps(square: float, radius: float, closing: float, slowness: float, bend: float) -> Any:
+def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
     """Number of steps during which the hand provably stays out of a disc.
 
-    ``square`` is that of the distance d to its centre, ``closing`` d times the closing speed u;
-    ``slowness`` is 1 / s, and ``bend`` c of the module's text. In single precision, in which
-    roots and quotients, most of the work, cost a third.
+    ``square`` is that of the distance d to its centre, of which ``rim`` is too near, ``closing``
+    d times the closing speed u; ``slowness`` is 1 / s, and ``bend`` c of the module's text. In
+    single precision, in which roots and quotients, most of the work, cost a third.
     """
     distance = np.sqrt(_single(square))
-    gap = distance * _LESS - _single(radius * _MORE + _CLEARANCE)
+    gap = distance * _LESS - _single(rim)
     toward, turn = _single(closing), _single(bend) * distance
     twice = (gap + gap) * distance
     root = np.sqrt(toward * toward + turn * twice)
@@ -130,9 +128,9 @@ def _set_off(at: Any, count: int, model: Any) -> bool:
         base_x = (at.target[0, i] - at.start[0, i]) * per_step
         base_y = (at.target[1, i] - at.start[1, i]) * per_step
         speed = math.sqrt(base_x * base_x + base_y * base_y)
-        bend = 0.0
-        rate = 0.0
+        reach, rate, bend = 0.0, 0.0, 0.0
         for k in range(len(at.length)):
+            reach += at.length[k, i]
             rate += (at.target[BASE_DOF + k, i] - at.start[BASE_DOF + k, i]) * per_step
             at.rate[k, i] = rate
             speed += at.length[k, i] * abs(rate)
@@ -145,6 +143,10 @@ def _set_off(at: Any, count: int, model: Any) -> bool:
         # No joint turns farther than at the farther end, and, where it passes it, a step.
         most = winding(at.start, i) + winding(at.target, i) + model.step * len(at.length)
         far += 0 if most < trigonometry.LARGEST else 1
+        away = reach * (1.0 + most) + model.step
+        for j in range(BASE_DOF):
+            away += abs(at.start[j, i]) + abs(at.target[j, i]) + abs(at.shoulder[j, i])
+        at.clearance[i] = _CLEARANCE + _ROUNDING * len(at.x) * away
     return far == 0
 
 
@@ -179,14 +181,15 @@ def _look(
         dx, dy = goal.x - at.x[tip, i], goal.y - at.y[tip, i]
         to_goal = dx * dx + dy * dy
         closing = velocity_x * dx + velocity_y * dy
-        clear = clear_steps(to_goal, goal.radius, closing, at.slowness[i], at.bend[i])
+        rim = goal.radius + at.clearance[i]
+        clear = clear_steps(to_goal, rim, closing, at.slowness[i], at.bend[i])
         stop = at.step[i] == at.last[i]
         if stop_on_arrival:
             dx, dy = at.end[0, i] - at.x[tip, i], at.end[1, i] - at.y[tip, i]
             to_end = dx * dx + dy * dy
             stop |= to_end <= arrived
             closing = velocity_x * dx + velocity_y * dy
-            rim = model.arrival_tolerance
+            rim = model.arrival_tolerance + at.clearance[i]
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         fate = _MISSED if stop else GOING
         fate = _HIT if to_goal <= hit else fate
@@ -236,11 +239,11 @@ def move_lanes(
                 continue
             run = runs[at.run[lane]]
             q, target = run.q, run.target
-            whole = at.step[lane] == at.whole[lane]
-            fraction = 0.0 if whole else at.step[lane] * model.step / at.distance[lane]
+            at_end = at.step[lane] == at.whole[lane]
+            fraction = 0.0 if at_end else at.step[lane] * model.step / at.distance[lane]
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
-                q[j] = target[j] if whole else between
+                q[j] = target[j] if at_end else between
             run.hit = at.fate[lane] == _HIT
             run.ticks = int(at.step[lane]) + model.arrival_tick
             run.evaluations += evaluations
@@ -290,7 +293,9 @@ def move(
         lanes_for(robot),
         runs,
     )
-    return MoveResult(run["q"][own], int(run["ticks"]), bool(run["hit"]), int(run["evaluations"]))
+    return MoveResult(
+        run["q"][own].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
+    )
 
 
 def follow(

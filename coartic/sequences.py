@@ -64,8 +64,9 @@ def _hit(g: int, problem: Any, path: Any, lanes: Any, runs: Any) -> None:
                 path.ticks[g + 1] += run.ticks
             if not run.hit:
                 path.ticks[g + 1] = math.nan
-                run.q[:] = math.nan
     fill_row(path.q[g + 1], run.q)
+    if math.isnan(path.ticks[g + 1]):
+        path.q[g + 1, :] = math.nan
 
 
 @entry

@@ -230,8 +230,8 @@ def test_skips_most_steps():
 
 
 @entry
-def _cleared(square, radius, closing, slowness, bend):
-    return clear_steps(square, radius, closing, slowness, bend)
+def _cleared(square, rim, closing, slowness, bend):
+    return clear_steps(square, rim, closing, slowness, bend)
 
 
 @pytest.mark.parametrize("largest", [0.0, 6.0, 13.0])  # powers of 10
@@ -243,15 +243,19 @@ def test_the_bound_keeps_its_promise(largest):
     for distance, share, speed, bend in 10.0**powers:
         radius = distance * (1.0 - min(share, 1.0))
         closing = rng.uniform(-1, 1) * speed
-        steps = float(_cleared(distance**2, radius, closing * distance, 1.0 / speed, bend))
+        rim = radius + 1e-9
+        steps = float(_cleared(distance**2, rim, closing * distance, 1.0 / speed, bend))
         steps = min(steps, 1e12)  # more than a movement can have
         moved = min(speed * steps, closing * steps + bend * steps**2 / 2)
         assert steps == 0.0 or moved < distance - radius - 5e-10
         kept += steps > 0.0
     assert kept > 1000
     for gap in (0.0, 1e-10, 1e-9):  # too near to call
-        assert _cleared((0.1 + gap) ** 2, 0.1, 0.01, 1e2, 1e-3) == 0.0
-    assert _cleared(1.0, 0.0, 0.0, np.inf, 0.0) > 1e17
+        assert _cleared((0.1 + gap) ** 2, 0.1 + 1e-9, 0.01, 1e2, 1e-3) == 0.0
+    assert _cleared(1.0, 0.5, 0.0, np.inf, 0.0) == np.inf  # nothing moves
+    # What is too small, or too large, for single precision is not mistaken for nothing.
+    assert _cleared(4e-12, 1e-6, 1e-23, 2e17, 0.0) < 1e-6 / 5e-18
+    assert _cleared(1e24, 0.0, -1e20, 0.0, 1e-3) == 0.0
 
 
 def test_the_bound_clears_nearly_all_it_may():
@@ -269,6 +273,23 @@ def test_equals_every_step_at_the_largest_figures():
         point = q + rng.random() * (target - q)
         goal = ROBOT.forward_kinematics(point, "left") + rng.normal(size=2) * 0.1
         assert_equals_every_step(ROBOT, q, target, "left", goal, 0.1)
+
+
+@pytest.mark.parametrize(("angle", "radius", "step"), [(1e5, 1e-4, 1e-6), (1e5, 1e-2, 1e-4)])
+def test_equals_every_step_where_positions_are_rounded_most(angle, radius, step):
+    """Long links at large angles: what is clear by the bounds is so by more than rounding."""
+    rng = np.random.default_rng(18)
+    robot = Robot(left_links=(1e4, 0.5), right_links=(1.0,))
+    model = MotionModel(step=step, arrival_tolerance=0.0)
+    for _ in range(300):
+        q = np.array([*rng.uniform(-1, 1, 2), rng.uniform(0.6, 1) * angle, 0.0, 0.0])
+        target, steps = q.copy(), rng.integers(20, 400)
+        target[0] += steps * step
+        target[2] += 3 * rng.integers(-3, 4) * np.spacing(q[2])
+        point = q + rng.integers(10, steps + 1) / steps * (target - q)
+        x, y = robot.forward_kinematics(point, "left")
+        goal = (x + radius + rng.normal() * 1e-9, y)
+        assert_equals_every_step(robot, q, target, "left", goal, radius, False, model)
 
 
 def test_inputs_are_left_alone_and_checked():

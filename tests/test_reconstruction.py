@@ -16,6 +16,7 @@ from scipy import stats
 from coartic import (
     PAPER,
     CoarticError,
+    Task,
     corrective_trial,
     hand_sequences,
     learn,
@@ -52,17 +53,27 @@ TASK = load_task("two-armed-1")
 NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
 
 
-def test_trials_are_those_that_are_made_one_by_one() -> None:
+def with_a_shorter_left_arm(task: Task) -> Task:
+    """Its left arm has two links of the length of all."""
+    content = task.model_dump(mode="json")
+    half = sum(task.robot.left_links) / 2
+    robot = {**content["robot"], "left_links": [half, half]}
+    start = {**content["start"], "left": content["start"]["left"][:2]}
+    return parse_task({**content, "robot": robot, "start": start}, "uneven")
+
+
+@pytest.mark.parametrize("task", [TASK, with_a_shorter_left_arm(TASK)], ids=["even", "uneven"])
+def test_trials_are_those_that_are_made_one_by_one(task: Task) -> None:
     rng = np.random.default_rng(1)
-    goals = TASK.goal_array + rng.uniform(-0.4, 0.4, (3, 4, 2))
+    goals = task.goal_array + rng.uniform(-0.4, 0.4, (3, 4, 2))
     goals[1, :2] = goals[0, :2]  # begins as the one before
     model = PAPER._replace(max_iterations=300)  # some fail
-    sequences = hand_sequences(TASK)
-    found = corrective_trials(TASK, sequences, goals, model=model)
+    sequences = hand_sequences(task)
+    found = corrective_trials(task, sequences, goals, model=model)
     failed = 0
     for (n, places), (s, hands) in itertools.product(enumerate(goals), enumerate(sequences)):
-        task = TASK.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
-        alone = corrective_trial(task, hands, model=model)
+        moved = task.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
+        alone = corrective_trial(moved, hands, model=model)
         if not alone.completed:
             failed += 1
             assert math.isnan(found.rewards[n, s])
