@@ -272,7 +272,7 @@ def select_cells(
     does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
     by one name, and where nothing is left to run.
     """
-    methods = [method for name in methods for method in _full_names(name, known)]
+    methods = [method for name in methods for method in methods_named(name, known)]
     files = [Path(name) for name in tasks if name.endswith(".toml")]
     named = [name for name in tasks if not name.endswith(".toml")]
     own = _own_tasks(files)
@@ -308,10 +308,11 @@ def select_cells(
     return chosen
 
 
-def _full_names(name: str, known: Registry) -> list[str]:
-    """The id of a method; a condition of the learner goes by its own name as well.
+def methods_named(name: str, known: Registry) -> list[str]:
+    """Ids of the methods that a name stands for.
 
-    ``optimum/*`` names all that begin so.
+    A condition of the learner goes by its own name as well; ``optimum/*`` names all that begin
+    so. Raises CoarticError where there is none.
     """
     name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
     found = [method for method in known if fnmatchcase(method, name)] if "*" in name else [name]

@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import inspect
 import json
 import os
 import pkgutil
@@ -80,6 +81,16 @@ def test_the_command_line_uses_all_it_sits_on():
     files = (ROOT / "coartic" / "cli").glob("*.py")
     roots = {package_of(name) for path in files for name in imported(path)}
     assert {"coartic", "benchmarks", "analysis"} <= roots
+
+
+def test_commands_are_thin():
+    """No command is longer than 40 lines: what it does lies below."""
+    from coartic.cli import app
+
+    commands = [command.callback for command in app.registered_commands]
+    lengths = {each.__name__: len(inspect.getsource(each).splitlines()) for each in commands}
+    assert len(lengths) > 15
+    assert {name: length for name, length in lengths.items() if length > 40} == {}
 
 
 FRESH = """

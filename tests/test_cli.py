@@ -249,6 +249,17 @@ def test_check(monkeypatch, capsys):
         "pass  limits: kept", "FAIL  information: it used 'Jacobian'", "",
         "test/peeks: 1 of 2 laws hold.",
     ]  # fmt: skip
+    asked.clear()
+    _, text, _ = call(monkeypatch, capsys, "check", "EC4")
+    assert asked == ["dual-process/EC4"]
+    _, text, _ = call(monkeypatch, capsys, "check", "cma-es/*")
+    assert asked == ["dual-process/EC4", "cma-es/bandit", "cma-es/every"]
+    assert text.splitlines()[2:6] == [
+        "", "cma-es/bandit: 1 of 2 laws hold.", "", "pass  limits: kept",
+    ]  # fmt: skip
+    code, _, said = call(monkeypatch, capsys, "check", "ascending")
+    assert code == 2
+    assert said.endswith("A task is checked by its file.\n")
 
 
 def test_show_and_reproduce(monkeypatch, capsys, tmp_path, in_this_process):

@@ -59,6 +59,22 @@ def _lines() -> Iterator[str]:
     yield from ("", "## Margins", "", "Each is set once.", "")
     for name, said in REASONS.items():
         yield f"- *{name}* {said['value']:g}: {said['reason']}"
+    yield from _power(sizes["paper"])
+    for section, claims in itertools.groupby(CLAIMS, lambda claim: claim.section):
+        yield from ("", f"## {section}", "")
+        for claim in claims:
+            yield from _claim(claim)
+    yield from ("", "## The paper, sentence by sentence", "")
+    yield from ("| place | sentence | judged by, or why not |", "| --- | --- | --- |")
+    for said in SENTENCES:
+        becomes = ", ".join(said.get("claims", ())) or (
+            f"Held by {said['held']}" if "held" in said else said["open"]
+        )
+        yield f"| {said['place']} | “{said['quote']}” | {becomes} |"
+
+
+def _power(tested: int) -> Iterator[str]:
+    """What tests see of so many claims with a test on the paper's own cells."""
     yield from ("", "## Power", "")
     yield (
         f"With {RUNS} runs a cell, as the paper has, the chance that a claim comes out "
@@ -77,7 +93,7 @@ def _lines() -> Iterator[str]:
     for name, chances in powers(CLAIMS, {}).items():
         both = " | ".join(f"{chance:.0%}" for chance in chances)
         yield f"| {name} | {both} | {needed[name] or f'more than {TRIED[-1]}'} |"
-    level = LEVEL / sizes["paper"]
+    level = LEVEL / tested
     one, two = (smallest_difference(1.0, sd, RUNS, level) for sd in (0.0, 1.0))
     yield ""
     yield (
@@ -91,17 +107,6 @@ def _lines() -> Iterator[str]:
         "how much instances differ: a folder states the true effect that is seen with "
         f"{POWER:.0%}."
     )
-    for section, claims in itertools.groupby(CLAIMS, lambda claim: claim.section):
-        yield from ("", f"## {section}", "")
-        for claim in claims:
-            yield from _claim(claim)
-    yield from ("", "## The paper, sentence by sentence", "")
-    yield from ("| place | sentence | judged by, or why not |", "| --- | --- | --- |")
-    for said in SENTENCES:
-        becomes = ", ".join(said.get("claims", ())) or (
-            f"Held by {said['held']}" if "held" in said else said["open"]
-        )
-        yield f"| {said['place']} | “{said['quote']}” | {becomes} |"
 
 
 def _claim(claim: Claim) -> Iterator[str]:

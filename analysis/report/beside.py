@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coartic.analysis.comparisons.versions import VersionComparison
+from coartic.analysis.comparisons.versions import compare_versions
 from coartic.analysis.markup import escaped
 from coartic.analysis.report.answers import cells_found, claims_found, price, strips, winners
 from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Section, Strip
@@ -12,8 +12,9 @@ from coartic.analysis.report.pages.versions import versions_document
 from coartic.analysis.study import Study
 
 
-def beside(document: Document, first: Study, second: Study, found: VersionComparison) -> Document:
+def beside(document: Document, first: Study, second: Study) -> Document:
     """The report of the first folder, which begins with both beside each other."""
+    found = compare_versions(first, second)
     cards = tuple(_card(side, study) for side, study in zip("ab", (first, second), strict=True))
     differing = []
     for section in versions_document(found).sections:

@@ -63,30 +63,8 @@ def charts(study: Study, shown: Mapping[str, pd.DataFrame]) -> dict[str, str]:
 
 def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     """Gap of every method with its interval; by task, by family, by what a method is told."""
-    tasks = list(dict.fromkeys(map(str, data.task)))
-    rows = list(map(Standing._make, data.itertuples(index=False, name=None)))
-    values = [
-        {
-            **{"task": row.task, "name": spoken_name(row.method), "id": row.method},
-            **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
-            **{"told": row.told, "family": row.family, "runs": row.runs},
-            **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
-            "interval": "none: run once"
-            if math.isnan(row.low)
-            else f"{row.low:.2f} to {row.high:.2f}",
-            "learner": learner(str(row.method)),
-        }
-        for row in rows
-    ]
-    values += [  # a row above each group, with its name
-        {
-            **{"task": task, "told": told, "family": family, "name": told},
-            **{"heading": True, "place": 1000 * GROUPS.index(told) - 1},
-        }
-        for task, told, family in dict.fromkeys((row.task, row.told, row.family) for row in rows)
-    ]
-    chosen = _choices(tasks, data.told, data.family)
-    every = _chosen(values, chosen)
+    chosen = _choices(list(dict.fromkeys(map(str, data.task))), data.told, data.family)
+    every = _chosen(_ranked(data), chosen)
     base = every.transform_filter("!datum.heading")
     order = alt.EncodingSortField("place", op="min", order="ascending")
     bold: Any = {
@@ -124,35 +102,39 @@ def ranking_chart(study: Study, data: pd.DataFrame) -> Any:
     return _finished(parts, alt.Step(_ROW), said, *chosen)
 
 
+def _ranked(data: pd.DataFrame) -> list[dict[str, Any]]:
+    """What is drawn of every method and task, and a row above each group with its name."""
+    rows = list(map(Standing._make, data.itertuples(index=False, name=None)))
+    values = [
+        {
+            **{"task": row.task, "name": spoken_name(row.method), "id": row.method},
+            **{"place": 1000 * GROUPS.index(row.told) + float(row.gap)},
+            **{"told": row.told, "family": row.family, "runs": row.runs},
+            **{"gap": _number(row.gap), "low": _number(row.low), "high": _number(row.high)},
+            "interval": "none: run once"
+            if math.isnan(row.low)
+            else f"{row.low:.2f} to {row.high:.2f}",
+            "learner": learner(str(row.method)),
+        }
+        for row in rows
+    ]
+    headings = [
+        {
+            **{"task": task, "told": told, "family": family, "name": told},
+            **{"heading": True, "place": 1000 * GROUPS.index(told) - 1},
+        }
+        for task, told, family in dict.fromkeys((row.task, row.told, row.family) for row in rows)
+    ]
+    return values + headings
+
+
 def price_chart(study: Study, data: pd.DataFrame) -> Any:
     """Levels of reward reached within a budget; by task, family, what is told, and spend."""
     told_of = _told(study)
     tasks = list(dict.fromkeys(map(str, data.task)))
     tasks.sort(key=lambda task: task != ALL_TASKS)
-    main = _main(data)
     labels = list(dict.fromkeys(map(str, data.method)))
     looks = style.looks([look_alike(label) for label in labels])
-    positive = data[data.budget > 0].groupby("spend").budget
-    edges = {str(name): (float(own.min()), float(own.max())) for name, own in positive}
-    values: list[dict[str, Any]] = []
-    keys = ["task", "method", "spend"]
-    for (task, method, spend), own in data.groupby(keys, sort=False):
-        least, most = edges[str(spend)]
-        known = own.low.notna().all()
-        values.append(
-            {
-                **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
-                **{"told": told_of[str(method)], "family": family_of(str(method))},
-                **{"main": method in main, "runs": int(own.runs.iloc[0])},
-                "end": _number(most),
-                "budget": [_number(max(b, least / 2)) for b in own.budget],
-                "share": [_number(100 * share) for share in own.share],
-                "low": [_number(100 * low) if known else None for low in own.low],
-                "high": [_number(100 * high) if known else None for high in own.high],
-            }
-        )
-    for place in {(value["task"], value["spend"]) for value in values}:
-        _placed([v for v in values if (v["task"], v["spend"]) == place and v["main"]])
     spends = [spend for spend in SPENDS if (data.spend == spend).any()]
     names = [NAMES[name] for name in spends]
     against = alt.binding_select(options=spends, labels=names, name="Against ")
@@ -162,7 +144,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
     near = alt.selection_point(
         name="near", fields=["name"], on="pointerover", clear="pointerout", empty=False
     )
-    base = _chosen(values, chosen[:3])
+    base = _chosen(_reached(data, told_of), chosen[:3])
     base = base.transform_filter("datum.spend === spend")
     base = base.transform_filter("every || datum.main || family !== 'all'")
     ends = base
@@ -171,11 +153,7 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
         interval="isValid(datum.low) ? format(datum.low, '.0f') + ' to ' + "
         "format(datum.high, '.0f')  + ' %' : 'none: too few runs'"
     )
-    names = [spoken_name(label) for label in labels]
-    color = _colors(labels, looks)
-    dashes = (looks[look_alike(label)].dash for label in labels)
-    lines = [[1, 0] if dash == style.SOLID else list(dash[1]) for dash in dashes]
-    dash: Any = alt.StrokeDash("name:N", scale=alt.Scale(domain=names, range=lines), legend=None)
+    color, dash = _colors(labels, looks), _dashes(labels, looks)
     axis = alt.Axis(format="~s", tickCount=6, grid=False)
     x: Any = alt.X("budget:Q", scale=alt.Scale(type="log", nice=False), title=None, axis=axis)
     y: Any = alt.Y(
@@ -202,17 +180,36 @@ def price_chart(study: Study, data: pd.DataFrame) -> Any:
         .encode(x=alt.X("end:Q"), y=alt.Y("label:Q"), text="name:N", color=color)
     )
     half = _chart([{"y": 50}]).mark_rule(strokeDash=[2, 3], color=_INK, opacity=0.6)
-    named = json_text(NAMES)
-    words = f"({named})[spend] + ' (logarithmic; left edge: none)'"
-    title = _chart([{}]).transform_calculate(words=words)
-    title = title.mark_text(
-        x=alt.expr("width / 2"), y=_TALL + 30, color=_INK, fontSize=11, limit=0
-    )
-    layers = alt.layer(
-        half.encode(y=alt.Y("y:Q")), band, line, points, last, title.encode(text="words:N")
-    )
+    layers = alt.layer(half.encode(y=alt.Y("y:Q")), band, line, points, last, _spend_title())
     said = "Share of levels of reward reached within a budget, by method."
     return _finished(layers, _TALL, said, *chosen, every)
+
+
+def _reached(data: pd.DataFrame, told_of: Mapping[str, str]) -> list[dict[str, Any]]:
+    """The curve of every method, task and spend, with a place for its name where it is shown."""
+    main = _main(data)
+    positive = data[data.budget > 0].groupby("spend").budget
+    edges = {str(name): (float(own.min()), float(own.max())) for name, own in positive}
+    values: list[dict[str, Any]] = []
+    keys = ["task", "method", "spend"]
+    for (task, method, spend), own in data.groupby(keys, sort=False):
+        least, most = edges[str(spend)]
+        known = own.low.notna().all()
+        values.append(
+            {
+                **{"task": task, "name": spoken_name(str(method)), "id": method, "spend": spend},
+                **{"told": told_of[str(method)], "family": family_of(str(method))},
+                **{"main": method in main, "runs": int(own.runs.iloc[0])},
+                "end": _number(most),
+                "budget": [_number(max(b, least / 2)) for b in own.budget],
+                "share": [_number(100 * share) for share in own.share],
+                "low": [_number(100 * low) if known else None for low in own.low],
+                "high": [_number(100 * high) if known else None for high in own.high],
+            }
+        )
+    for place in {(value["task"], value["spend"]) for value in values}:
+        _placed([v for v in values if (v["task"], v["spend"]) == place and v["main"]])
+    return values
 
 
 def _main(data: pd.DataFrame) -> set[str]:
@@ -231,6 +228,24 @@ def _colors(labels: Sequence[str], looks: Mapping[str, Any]) -> Any:
     paints = [_INK if color == style.INK else color for color in colors]
     scale = alt.Scale(domain=[spoken_name(label) for label in labels], range=paints)
     return alt.Color("name:N", scale=scale, legend=None)
+
+
+def _dashes(labels: Sequence[str], looks: Mapping[str, Any]) -> Any:
+    """The dashes of a method, by its spoken name."""
+    names = [spoken_name(label) for label in labels]
+    dashes = (looks[look_alike(label)].dash for label in labels)
+    lines = [[1, 0] if dash == style.SOLID else list(dash[1]) for dash in dashes]
+    return alt.StrokeDash("name:N", scale=alt.Scale(domain=names, range=lines), legend=None)
+
+
+def _spend_title() -> Any:
+    """The title of the axis below, which says what was chosen: no title of an axis can."""
+    words = f"({json_text(NAMES)})[spend] + ' (logarithmic; left edge: none)'"
+    title = _chart([{}]).transform_calculate(words=words)
+    title = title.mark_text(
+        x=alt.expr("width / 2"), y=_TALL + 30, color=_INK, fontSize=11, limit=0
+    )
+    return title.encode(text="words:N")
 
 
 def _placed(values: list[dict[str, Any]]) -> None:

@@ -27,23 +27,28 @@ def _names() -> list[str]:
     return list(known())
 
 
+_Name = Annotated[
+    str | None,
+    typer.Argument(help="Family, as two-armed or two-armed/v1.", autocompletion=_names),
+]
+_Drawn = Annotated[
+    int | None, typer.Option("--draw", min=1, max=1000, help="Instances to write, from 000.")
+]
+_Out = Annotated[Path | None, typer.Option(parser=folder_named, help="Folder for the task files.")]
+_Split = Annotated[
+    str, typer.Option(help="development, test, or a year: fresh instances of that year.")
+]
+_Count = Annotated[
+    int, typer.Option(min=1, max=10_000, help="Instances that rejections are counted over.")
+]
+
+
 def families(
-    name: Annotated[
-        str | None,
-        typer.Argument(help="Family, as two-armed or two-armed/v1.", autocompletion=_names),
-    ] = None,
-    draw: Annotated[
-        int | None, typer.Option("--draw", min=1, max=1000, help="Instances to write, from 000.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(parser=folder_named, help="Folder for the task files.")
-    ] = None,
-    split: Annotated[
-        str, typer.Option(help="development, test, or a year: fresh instances of that year.")
-    ] = "test",
-    count: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Instances that rejections are counted over.")
-    ] = 100,
+    name: _Name = None,
+    draw: _Drawn = None,
+    out: _Out = None,
+    split: _Split = "test",
+    count: _Count = 100,
 ) -> None:
     """List families of random tasks with their rejections, or write instances as task files."""
     from coartic.families import families as known

@@ -44,42 +44,45 @@ def analyse(folder: given.ResultsFolder) -> None:
     say(f"In {folder}: {', '.join(files)}.")
 
 
+_Other = Annotated[
+    Path | None,
+    typer.Argument(
+        parser=folder_named, metavar="[DIR_B]", help="A second one, to stand beside it."
+    ),
+]
+_ReportFolder = Annotated[
+    Path | None,
+    typer.Option(parser=folder_named, help="Folder to write; DIR/report by default."),
+]
+_Shown = Annotated[
+    str | None,
+    typer.Option(
+        help="Methods that the figures show, labels as in the tables: a,b, "
+        "'\"a x=1, y=2\",b' with parameters."
+    ),
+]
+_Formats = Annotated[str, typer.Option(help="Files of each figure: svg and any of pdf, png, csv.")]
+_Printed = Annotated[
+    bool, typer.Option("--pdf", help="Also the page as report.pdf, by a browser that is here.")
+]
+
+
 def report(
     folder: given.Results,
-    other: Annotated[
-        Path | None,
-        typer.Argument(
-            parser=folder_named, metavar="[DIR_B]", help="A second one, to stand beside it."
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(parser=folder_named, help="Folder to write; DIR/report by default."),
-    ] = None,
-    methods: Annotated[
-        str | None,
-        typer.Option(
-            help="Methods that the figures show, labels as in the tables: a,b, "
-            "'\"a x=1, y=2\",b' with parameters."
-        ),
-    ] = None,
-    formats: Annotated[
-        str, typer.Option(help="Files of each figure: svg and any of pdf, png, csv.")
-    ] = "pdf,svg,png,csv",
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Also the page as report.pdf, by a browser that is here.")
-    ] = False,
+    other: _Other = None,
+    out: _ReportFolder = None,
+    methods: _Shown = None,
+    formats: _Formats = "pdf,svg,png,csv",
+    pdf: _Printed = False,
 ) -> None:
     """Write a report: page with player, tables, figures, numbers for LaTeX, traces.
 
     A folder that holds anything else than an earlier report, unchanged, is refused. With a
     second results folder, or an archive, the page begins with both side by side.
     """
-    archived = folder.is_file()
     if out is None:
-        out = folder.with_suffix("") / "report" if archived else folder / "report"
+        out = (folder.with_suffix("") if folder.is_file() else folder) / "report"
     if_interrupted(f"nothing is written in {out}")  # also not while this is imported
-    from coartic.analysis.comparisons.versions import compare_versions
     from coartic.analysis.figures.plot import FILES
     from coartic.analysis.report.beside import beside
     from coartic.analysis.report.build import build, write
@@ -95,9 +98,7 @@ def report(
         check_report_folder(out, first)
         made = build(study, labels, endings, processes=PROCESSES)
         if other is not None:
-            against = load(second)
-            found = compare_versions(study, against)
-            made = replace_field(made, document=beside(made.document, study, against, found))
+            made = replace_field(made, document=beside(made.document, study, load(second)))
         write(made, study, out, printed=pdf, begin=lambda: writing(out))
     if_interrupted(f"the report is written in {out}")
     took, tables = time.monotonic() - started, counted(len(made.document.tables()), "table")

@@ -24,19 +24,24 @@ _KINDS = (".svg", ".pdf", ".png")
 GROUP = "What is not printed"
 
 
+_Judge = Annotated[
+    str | None, typer.Option("--judge", metavar="FOLDER", help="Judge them, into a folder.")
+]
+_Runs = Annotated[
+    int | None,
+    typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task, 1000 if not said."),
+]
+_Trials = Annotated[
+    int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials per run, 10 000 if not said.")
+]
+_Pairs = Annotated[bool, typer.Option(help="Every two readings together as well.")]
+
+
 def readings(
-    judge: Annotated[
-        str | None, typer.Option("--judge", metavar="FOLDER", help="Judge them, into a folder.")
-    ] = None,
-    runs: Annotated[
-        int | None,
-        typer.Option(min=40, max=MOST_RUNS, help="Runs a reading and task, 1000 if not said."),
-    ] = None,
-    trials: Annotated[
-        int | None,
-        typer.Option(min=1, max=MOST_TRIALS, help="Trials per run, 10 000 if not said."),
-    ] = None,
-    pairs: Annotated[bool, typer.Option(help="Every two readings together as well.")] = False,
+    judge: _Judge = None,
+    runs: _Runs = None,
+    trials: _Trials = None,
+    pairs: _Pairs = False,
     jobs: given.Jobs = -1,
 ) -> None:
     """List what the paper leaves open, or judge it by what is printed of one-armed tasks."""

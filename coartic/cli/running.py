@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,8 +20,10 @@ from coartic.text import counted, json_text
 if TYPE_CHECKING:
     from coartic import Task
     from coartic.analysis.report.document import Document
+    from coartic.benchmarks.conformance import Law
     from coartic.benchmarks.executors import Executor
-    from coartic.benchmarks.registry import Entry
+    from coartic.benchmarks.registry import Entry, Registry
+    from coartic.benchmarks.run import RunReport
 
 GROUP = "Run"
 
@@ -56,16 +59,13 @@ def run(
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
-    plan = plan_suite(
-        chosen, runs=runs, trials=trials, seed=seed, select=select, limits=limits,
-        readings=reading or (),
-    )  # fmt: skip
+    planned = partial(plan_suite, runs=runs, trials=trials, seed=seed, readings=reading or ())
+    plan = planned(chosen, select=select, limits=limits)
     perform = partial(plan.perform, out, retry_failed=retry_failed, redo=redo)
     with performing(chosen.name, out) as display:
         comparison, executor = _Comparison(display), _executor(jobs, scheduler, display)
         report = perform(executor=executor, watch=display.update, pages=comparison.pages)
-    comparison.show()
-    say("", f"{report}, this comparison in {out / 'comparison.md'}.")
+    comparison.show(report)
     if report.crashed:
         sys.exit(1)
 
@@ -93,20 +93,21 @@ class _Comparison:
         from coartic.analysis.results.folder import made_here
 
         study = Study(made_here(folder))
-        self._made, self._page = comparison_document(study), folder / "comparison.md"
+        self._made = comparison_document(study)
         return {
             "comparison.md": markdown(self._made, tables="").encode(),
             "methods.csv": study.methods.to_csv(index=False).encode(),
         }
 
-    def show(self) -> None:
-        """Print what fits the terminal; nothing where nothing was made anew."""
+    def show(self, report: RunReport) -> None:
+        """Print what fits the terminal, where something was made anew; and what it came to."""
         from coartic.analysis.report.comparison import notes_of
 
-        if self._made is None:
-            return
-        show_data(self._made.tables(), f"see {self._page}")
-        show_lines(f"- {note}" for note in notes_of(self._made))
+        page = report.folder / "comparison.md"
+        if self._made is not None:
+            show_data(self._made.tables(), f"see {page}")
+            show_lines(f"- {note}" for note in notes_of(self._made))
+        say("", f"{report}, this comparison in {page}.")
 
 
 def list_(method_file: given.MethodFiles = None) -> None:
@@ -202,26 +203,40 @@ def reproduce(
 
 
 def check(
-    subject: Annotated[str, typer.Argument(help="Id of a method, or a task file (.toml).")],
+    subject: Annotated[
+        str, typer.Argument(help="A method, EC4 or 'optimum/*', or a task file (.toml).")
+    ],
     method_file: given.MethodFiles = None,
 ) -> None:
     """Check a method or a task file against the laws of the benchmark."""
-    from coartic.benchmarks.conformance import check_method, check_task_file
-    from coartic.benchmarks.registry import registry, unknown
+    from coartic.benchmarks.registry import registry
 
-    known = registry(method_file or [])
-    if subject.endswith(".toml"):
-        laws = check_task_file(Path(subject), known)
-    elif subject in known:
-        laws = check_method(known[subject])
-    else:
-        raise CoarticError(f"{unknown('method', subject, known)} A task is checked by its file.")
-    for law in laws:
-        say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
-    broken = sum(not law.passed for law in laws)
-    say("", f"{subject}: {len(laws) - broken} of {counted(len(laws), 'law')} hold.")
+    broken = 0
+    for number, (name, checked) in enumerate(_checks(subject, registry(method_file or []))):
+        laws = checked()
+        if number:
+            say("")
+        for law in laws:
+            say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
+        hold = sum(law.passed for law in laws)
+        say("", f"{name}: {hold} of {counted(len(laws), 'law')} hold.")
+        broken += len(laws) - hold
     if broken:
         sys.exit(1)
+
+
+def _checks(subject: str, known: Registry) -> list[tuple[str, Callable[[], list[Law]]]]:
+    """What is checked: a task, or all methods that a name stands for."""
+    from coartic.benchmarks.conformance import check_method, check_task_file
+    from coartic.benchmarks.suites import methods_named
+
+    if subject.endswith(".toml"):
+        return [(subject, partial(check_task_file, Path(subject), known))]
+    try:
+        names = methods_named(subject, known)
+    except CoarticError as error:
+        raise CoarticError(f"{error} A task is checked by its file.") from None
+    return [(name, partial(check_method, known[name])) for name in names]
 
 
 COMMANDS = (run, list_, show, reproduce, check)
