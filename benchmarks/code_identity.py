@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from coartic.benchmarks.declaration import Foreign, MethodFileError, brief
 from coartic.compiled import PACKAGE, model_files
@@ -59,7 +60,7 @@ def foreign_code(foreign: Foreign) -> str:
     """
     if foreign.kind == "installed":
         root = foreign.where.partition(":")[0].partition(".")[0]
-        return _hash(_essence(_tree(_text(path))) for path in _files_of(root))
+        return _hash(essence(_tree(_text(path))) for path in _files_of(root))
     local: dict[str, list[Path]] = {}
     waiting = _imported(_tree(foreign.source, foreign.where))
     while waiting:
@@ -72,7 +73,7 @@ def foreign_code(foreign: Foreign) -> str:
         ]
     files = [path for root in sorted(local) for path in local[root]]
     sources: list[str | bytes] = [foreign.source, *map(_text, files)]
-    return _hash(_essence(_tree(source, foreign.where)) for source in sources)
+    return _hash(essence(_tree(source, foreign.where)) for source in sources)
 
 
 def _files_of(root: str) -> list[Path]:
@@ -96,7 +97,7 @@ def _baseline(name: str) -> tuple[bytes, list[str]]:
     if not path.is_file():  # a name within a module
         return b"", []
     tree = _tree(_text(path), name)
-    return _essence(tree), _imported(tree)
+    return essence(tree), _imported(tree)
 
 
 def _imported(tree: ast.Module) -> list[str]:
@@ -120,7 +121,7 @@ def _hash(essences: Iterable[bytes]) -> str:
 def _model() -> bytes:
     """The model, and the worker that hands it to methods."""
     return b"".join(
-        path.name.encode() + _essence(_tree(_text(path), str(path))) for path in _model_files()
+        path.name.encode() + essence(_tree(_text(path), str(path))) for path in _model_files()
     )
 
 
@@ -128,13 +129,38 @@ def _model_files() -> list[Path]:
     return [*model_files(), Path(__file__).with_name("worker.py")]
 
 
-def _essence(tree: ast.Module) -> bytes:
-    """A module's syntax tree without docstrings, which it loses."""
+def essence(tree: ast.Module) -> bytes:
+    """What counts of a module: its syntax tree without docstrings, which it loses, the same in
+    every version of Python."""
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
             node.body = [child for child in body if not _is_text(child)]  # type: ignore[attr-defined]
-    return ast.dump(tree).encode()
+    return _written(tree).encode()
+
+
+def _written(tree: ast.Module) -> str:
+    """A syntax tree as text: every node before its parts, without empty ones. What ``ast.dump``
+    writes of those, and which there are, changes with the version of Python."""
+    written, waiting = [], [tree]  # no recursion: a long sum is a deep tree
+    while waiting:
+        node: Any = waiting.pop()
+        if isinstance(node, ast.AST):
+            if isinstance(node, ast.JoinedStr):  # 3.12 has empty texts in it
+                node.values = [own for own in node.values if not _is_empty(own)]
+            parts = [(n, own) for n, own in ast.iter_fields(node) if own is not None and own != []]
+            written.append(f"{type(node).__name__}({','.join(name for name, _ in parts)})")
+            waiting += [own for _, own in reversed(parts)]
+        elif isinstance(node, list):
+            written.append(f"[{len(node)}]")
+            waiting += reversed(node)
+        else:
+            written.append(hex(node) if type(node) is int else ascii(node))
+    return " ".join(written)
+
+
+def _is_empty(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and node.value == ""
 
 
 def _is_text(node: ast.AST) -> bool:

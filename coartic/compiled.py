@@ -48,7 +48,6 @@ _PRESENTATION = {
     "philox.py",
     "codec.py",
     "record.py",
-    "scores.py",
     "stored.py",
     "reference.py",
     "tables.py",
@@ -186,7 +185,7 @@ def compile_together(kernels: Mapping[str, Callable[[], object]], variant: str) 
         call()
 
 
-def record_of(fields: Mapping[str, Any]) -> np.dtype[np.void]:
+def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
     """Type of a record as kernels read it: what it holds lies together, at places they know."""
     return np.dtype(list(fields.items()), align=True)
 

@@ -17,6 +17,7 @@ from pydantic import Field
 from coartic.exploration import (
     BIAS,
     CONDITIONS,
+    MOST_NOISE,
     NULLSPACE_GAIN,
     VARIANTS,
     EqualDistance,
@@ -43,7 +44,7 @@ class DualProcessParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
     """ε"""
-    noise_sd: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = 0.05
+    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """SD of η, length unit (base) or rad (joints)."""
     ties: Ties = "left"
     equal_distance: EqualDistance = "random"
@@ -65,7 +66,7 @@ class NullspaceParameters(DualProcessParameters):
 class BiasedParameters(DualProcessParameters):
     """Of the variants whose noise is biased towards what the corrective process suggests."""
 
-    bias: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = BIAS
+    bias: Annotated[float, Field(gt=0, le=MOST_NOISE, allow_inf_nan=False)] = BIAS
     """Mean of η along the suggested direction, in SDs of η."""
 
 

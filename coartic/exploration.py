@@ -22,6 +22,9 @@ from coartic.robot import HANDS, Hand
 if TYPE_CHECKING:
     from coartic.task import Task
 
+MOST_NOISE = 100.0
+"""Largest noise, length unit and rad, and bias: far beyond what any arm can use. Targets that
+lose themselves in the far would be approached step by step without an end."""
 HandExploration = Literal["none", "closest", "random"]
 Ties = Literal["left", "right", "random", "nearest", "previous"]
 EqualDistance = Literal["random", "computed"]
@@ -80,12 +83,12 @@ class ExplorationCondition:
             raise ValueError(f"hands {self.hands!r}: name 'left', 'right' or both")
         if not 0.0 <= self.epsilon <= 1.0:
             raise ValueError(f"epsilon {self.epsilon} is not a probability")
-        if not 0.0 <= self.noise_sd < float("inf"):
-            raise ValueError(f"noise_sd {self.noise_sd} is not a finite number >= 0")
+        if not 0.0 <= self.noise_sd <= MOST_NOISE:
+            raise ValueError(f"noise_sd {self.noise_sd} is not within 0 to {MOST_NOISE:g}")
         if not 0.0 <= self.nullspace_gain <= 1.0:
             raise ValueError(f"nullspace_gain {self.nullspace_gain} is not within 0 to 1")
-        if not 0.0 <= self.bias < float("inf"):
-            raise ValueError(f"bias {self.bias} is not a finite number >= 0")
+        if not 0.0 <= self.bias <= MOST_NOISE:
+            raise ValueError(f"bias {self.bias} is not within 0 to {MOST_NOISE:g}")
         if not 0.0 <= self.discount <= 1.0:
             raise ValueError(f"discount {self.discount} is not within 0 to 1")
         for name, options in _CHOICES.items():

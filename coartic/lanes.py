@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import inlined, inner, lanewise, record_of
+from coartic.compiled import inlined, inner, lanewise, record_type
 from coartic.robot import BASE_DOF, Arm, Robot, chain
 from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
@@ -63,7 +63,7 @@ def _run(width: int) -> np.dtype[np.void]:
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics, in all
     }
-    return record_of(fields)
+    return record_type(fields)
 
 
 def lanes_for(robot: Robot) -> Lanes:

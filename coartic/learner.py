@@ -31,7 +31,7 @@ from coartic.compiled import (
     inlined,
     inner,
     joint_chain,
-    record_of,
+    record_type,
 )
 from coartic.corrective import correct_lanes, shift_kernel
 from coartic.exploration import ExplorationCondition
@@ -152,7 +152,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q, and
     ``target``, q*.
     """
-    known = record_of({"value": np.float64, "target": (np.float64, width_of(task.robot))})
+    known = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), known)
     tables["value"], tables["target"][..., : task.robot.dof] = -np.inf, np.nan
     return tables
@@ -162,13 +162,13 @@ def empty_log(runs: int, task: Task) -> Log:
     """Logs without movements."""
     goals, q = len(task.goals), (np.float64, width_of(task.robot))
     numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
-    movement = record_of({**numbers, "target": q})
-    hit = record_of({"hand": np.int64, "q": q})
+    movement = record_type({**numbers, "target": q})
+    hit = record_type({"hand": np.int64, "q": q})
     count = np.zeros(runs, dtype=np.int64)
     return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
 
 
-_TRIAL = record_of(
+_TRIAL = record_type(
     {
         "hand": np.int64,  # chosen for this goal
         "previous": np.int64,  # hand of the goal before

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -189,8 +190,9 @@ def learn(
 
     The result depends on the arguments alone. Raises NotApplicableError where the
     condition does not fit the task, CoarticError for an unknown condition, TypeError for what
-    is no task or model, and ValueError for a negative seed, fewer than one trial, or a model
-    that no movement can be made with. Source: paper, Figure 3.
+    is no task, model or seed, and ValueError for a negative seed, fewer than one trial, a model
+    that no movement can be made with, or a task that was changed into none. Source: paper,
+    Figure 3.
     """
     return learn_many(task, condition, seeds=[seed], trials=trials, model=model, jobs=1)[0]
 
@@ -220,7 +222,7 @@ def learn_many(
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
     search = search_initial_hands(task, condition.hands, model=model)
-    ordered: Sequence[int] = list(seeds)
+    ordered: Sequence[int] = list(map(_checked_seed, seeds))
     threads = _threads(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
@@ -241,6 +243,14 @@ def learn_many(
 
 _compiled_for: set[int] = set()
 """Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
+
+
+def _checked_seed(seed: Any) -> int:
+    if not isinstance(seed, Integral) or isinstance(seed, bool):
+        raise TypeError(f"seed is {seed!r}; it must be a whole number, the same for the same run")
+    if seed < 0:
+        raise ValueError(f"seed is {seed}; it must not be negative")
+    return int(seed)
 
 
 def _threads(jobs: int) -> int:
@@ -267,6 +277,8 @@ class _Learning:
         self._task, self._condition, self._model = task, condition, model
         self._search, self._seeds = search, seeds
         codes = [HANDS.index(hand) for hand in hands_of(search.hands)]
+        if len(codes) != len(task.goals):
+            raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
         self._tables = empty_tables(runs, task)
         self._kept = Kept(
             rewards=np.zeros((runs, trials), dtype=np.int64),

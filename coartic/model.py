@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import NamedTuple
 
 from coartic.errors import need
@@ -44,16 +45,21 @@ class MotionModel(NamedTuple):
 
 
 PAPER = MotionModel()
+_KINDS: dict[type, type | tuple[type, ...]] = {bool: bool, int: Integral, float: (float, int)}
 
 
 def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """The model itself; ValueError for constants no movement can be made with, TypeError for
-    what is no model.
+    what is no model or holds something of another kind.
 
     ``radius`` of the goals, where known: a corrective process that ends farther from a
     goal's centre than that never hits it.
     """
     need(model, MotionModel, "PAPER is the paper's")
+    for name, value in model._asdict().items():
+        kind = type(getattr(PAPER, name))
+        if not isinstance(value, _KINDS[kind]) or isinstance(value, bool) != (kind is bool):
+            raise TypeError(f"model.{name} is {value!r}; it must be of type {kind.__name__}")
     for name in ("step", "gain", "correction_tolerance"):
         value = getattr(model, name)
         if not 1e-6 <= value <= 1e6:

@@ -9,7 +9,7 @@ import numpy as np
 from coartic.compiled import inlined
 from coartic.corrective import Corrector
 from coartic.model import MotionModel
-from coartic.movement import Goal
+from coartic.movement import Goal, checked_goal, configuration
 from coartic.robot import Arm
 from coartic.task import Task
 
@@ -27,11 +27,16 @@ class Problem(NamedTuple):
 
 
 def problem_of(task: Task, model: MotionModel, *, nullspace_gain: float = 0.0) -> Problem:
-    """The task for a kernel; ``nullspace_gain`` is that of the corrective process."""
+    """The task for a kernel; ``nullspace_gain`` is that of the corrective process.
+
+    Raises ValueError for a task that is none any more: a copy with changed fields is unchecked,
+    and kernels would read beyond their arrays.
+    """
     locked = task.locked_base
+    goals = [checked_goal(goal, task.radius)[:2] for goal in task.goals]
     return Problem(
-        start=np.array(task.q0),
-        goals=np.array(task.goal_array),
+        start=configuration(task.robot, task.q0),
+        goals=np.array(goals, dtype=np.float64),
         radius=float(task.radius),
         left=task.robot.arm("left"),
         right=task.robot.arm("right"),

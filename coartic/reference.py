@@ -88,10 +88,14 @@ def correct(
         error = goal - robot.forward_kinematics(q, hand)
         if math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance:
             return Correction(q, True, iteration)
+        if not np.isfinite(error).all():
+            return Correction(q, False, iteration)
         step = model.gain * free * (robot.jacobian(q, hand).T @ error)
         if nullspace_gain:
             step += nullspace_gain * robot.nullspace_projector(q, hand, free) @ (start - q)
-        q = q + step
+        before, q = q, q + step
+        if (q == before).all():  # a stationary point away from the goal: it stays for ever
+            return Correction(q, False, iteration + 1)
     error = goal - robot.forward_kinematics(q, hand)
     converged = math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance
     return Correction(q, converged, model.max_iterations)
@@ -193,7 +197,7 @@ def _choose(
         if condition.hand_exploration == "closest":
             near = _distances(task, q, hands, goal)
             tolerance = 1e-9 if condition.equal_distance == "random" else -1.0
-            if abs(max(near) - min(near)) > tolerance:
+            if len(hands) == 1 or abs(max(near) - min(near)) > tolerance:
                 return hands[int(np.argmin(near))]
         return hands[int(rng.random() * len(hands))]
     learned = [values.get((state, hand), -math.inf) for hand in hands]

@@ -1,5 +1,7 @@
 """Methods and tasks from elsewhere: entry points, files, and the README's examples."""
 
+import ast
+import hashlib
 import json
 import re
 import shutil
@@ -13,6 +15,7 @@ import pytest
 from coartic import CoarticError, load_task
 from coartic.benchmarks import executors, reproduce
 from coartic.benchmarks import registry as registry_module
+from coartic.benchmarks.code_identity import essence
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
@@ -102,6 +105,35 @@ def test_a_file_brings_a_method(coartic, monkeypatch, tmp_path):
     code, _, error = coartic(*again)
     assert code == 2
     assert "unknown method 'nearest-hand'" in error
+
+
+SOURCE = '''
+"""A module."""
+import os as system, sys
+from math import pi, tau
+@final
+class Kind(object): ...
+def named(a, /, b=1, *rest: int, c: str = "x", **others) -> None:
+    "What it does."
+    total = 0x1f + 1_000 + 2.5e-3 + 1j  # not written
+    match a:
+        case [1, *more] if more: return f"{a!r:>{b}} {pi:.{b}f} {{x}} {f'{c}'}" "and" f"{a=}"
+        case {"k": v, **left}: yield lambda x: [y async for y in x]
+    try: assert not (a and b is None), "\u00e9\U0001f600"
+    except* (ValueError, OSError) as error: raise error from None
+    finally: del a, rest[0:1, ..., ::2]
+'''
+PLAIN = SOURCE.replace("# not written", "").replace("What it does.", "").replace("A module.", "?")
+
+
+def test_code_counts_alike_in_every_version_of_python():
+    """What :func:`essence` gives was compared between 3.11, 3.12 and 3.13."""
+    counts = [
+        hashlib.sha256(essence(ast.parse(text))).hexdigest()[:12] for text in (SOURCE, PLAIN)
+    ]
+    assert counts == ["b8185c19a05d", "b8185c19a05d"]
+    assert essence(ast.parse("x = " + "+".join("1" * 800)))  # a long sum is a deep tree
+    assert essence(ast.parse("x = 0x" + "f" * 5000))
 
 
 @pytest.mark.usefixtures("in_process")
