@@ -92,15 +92,23 @@ class RunReport:
     @property
     def records(self) -> Mapping[str, Record]:
         """The records of the plan by run id, in its order, each read when it is asked for."""
+        return Packs(self.folder).only(self._ids)
+
+    @cached_property
+    def _ids(self) -> list[str]:
         cells = self.manifest.specification.cells
-        return Packs(self.folder).only(
-            id_ for cell in cells for id_ in self.manifest.run_ids(cell)
-        )
+        return [id_ for cell in cells for id_ in self.manifest.run_ids(cell)]
 
     @cached_property
     def others(self) -> int:
-        """Runs in the folder that were not asked for: of another suite, or of more of this one."""
+        """Runs in the folder that were not asked for: of another suite, of more of this one, or
+        the same ones made by other code."""
         return len(Packs(self.folder)) - len(self.records)
+
+    @cached_property
+    def stale(self) -> int:
+        """Runs in the folder that were asked for and are of other code."""
+        return len(Store(self.folder).stale(self._ids)) if self.others else 0
 
     @property
     def crashed(self) -> int:
@@ -117,12 +125,15 @@ class RunReport:
 
     @property
     def _without(self) -> str:
-        if not self.others:
-            return ""
-        return (
-            f" (without {counted(self.others, 'run')} that the folder also keeps: tables are of "
-            "what one command asks for, so name all in one)"
-        )
+        said, unasked = [], self.others - self.stale
+        if self.stale:
+            said.append(f"{counted(self.stale, 'run')} that other code made")
+        if unasked:
+            said.append(
+                f"{counted(unasked, 'run')} that the folder also keeps: tables are of what one "
+                "command asks for, so name all in one"
+            )
+        return f" (without {' and '.join(said)})" if said else ""
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import pickle
+import shutil
 import stat
 import zipfile
 
@@ -12,6 +13,20 @@ from coartic import CoarticError
 from coartic.analysis import load
 from coartic.analysis.results.archive import LISTED, opened, pack, unpack
 from tests.support.commands import call
+
+
+@pytest.mark.parametrize(("name", "written"), [(".", "v1.2.zip"), ("../v1.2", "v1.2.zip")])
+def test_an_archive_is_beside_its_folder_by_its_name(
+    name, written, traced, tmp_path, monkeypatch, capsys
+):
+    folder = shutil.copytree(traced.results.folder, tmp_path / "v1.2")
+    monkeypatch.chdir(folder)
+    code, text, _ = call(monkeypatch, capsys, "pack", name)
+    assert (code, [path.name for path in tmp_path.glob("*.zip")]) == (0, [written])
+    assert "holds the results" in text
+    code, _, error = call(monkeypatch, capsys, "pack", "/")
+    assert code == 2
+    assert "/ is not a results folder" in error
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,9 @@
 """What holds over instances of families: planted runs, and a small folder through a report."""
 
 import math
+from collections import defaultdict
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -22,6 +24,7 @@ from coartic.analysis.generality.scaling import scaling, size
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.report.build import build
 from coartic.analysis.report.formats.markdown import markdown
+from coartic.analysis.report.tables.families import family_tables
 from coartic.analysis.results.folder import Results
 from coartic.analysis.results.optima import Optimum
 from coartic.analysis.statistics.estimates import Inference
@@ -29,7 +32,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.words import true_minus
 from coartic.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
-from tests.support.reports import document_of, undrawn, without_figures
+from tests.support.reports import changed_columns, document_of, undrawn, without_figures
 from tests.support.suites import paper_cells, run_and_write, suite_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -425,6 +428,30 @@ def test_a_small_folder_through_a_report(study):
     assert "## Beyond the paper" in page
     assert "claim-proficiency-rises-in-general" in {s.id for s in document.walk()}
     assert "claim-proficiency-rises" not in {s.id for s in document.walk()}
+
+
+def test_columns_over_instances_say_what_they_rest_on(tmp_path):
+    """With other best known rewards those change that say that they rest on them."""
+    planted = study_of(
+        tmp_path, {**RISING, EC1: lambda n: -510 - 10 * n, EC4: lambda n: -498 - 3 * n}
+    )
+    still = defaultdict(lambda: SimpleNamespace(learns=False, solved=True))
+    parts = {"best_so_far": still, "signs": made_up_signs(planted)}
+    others = {
+        key: replace(
+            best, reward=best.reward + 9 + n % 3, bound=best.bound + 20 + n % 2,
+            searches=(("optimum/any", best.reward - 3 * n),),
+        )
+        for n, (key, best) in enumerate(planted.optima.items())
+    }  # fmt: skip
+    before, after = (
+        list(family_tables(MadeUp(planted.results, optima=known, **parts)))
+        for known in (planted.optima, others)
+    )
+    saying = {(t.id, c.name) for t in before for c in t.columns if "optimum" in c.rests_on}
+    changed = changed_columns(before, after)
+    assert changed - saying == set()
+    assert len(changed) > 20
 
 
 def test_many_instances_alone_are_reported_together(folder, monkeypatch):

@@ -150,6 +150,8 @@ def test_a_changed_file_makes_its_records_stale(coartic, tmp_path):
     _, text, error = coartic(*command)
     assert "0 were there, 1 done" in text
     assert "not used, made by other code: 1 record" in error
+    assert "(without 1 run that other code made)" in text
+    assert "(without 1 run that other code made)" in coartic(*command)[1]
 
 
 @pytest.mark.usefixtures("in_process")

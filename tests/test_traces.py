@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError, Movement, corrective_trial, execute, load_task
-from coartic.analysis import markup
+from coartic.analysis import markup, printed, published
 from coartic.analysis.report.document import Document
 from coartic.analysis.report.numbers import Number
 from coartic.analysis.report.trace import trace, trace_text
@@ -24,7 +24,13 @@ from coartic.analysis.study import Study
 from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp
 from tests.support.packs import records_of
-from tests.support.reports import compiled, document_of, report_of, without_figures
+from tests.support.reports import (
+    changed_columns,
+    compiled,
+    document_of,
+    report_of,
+    without_figures,
+)
 from tests.support.suites import KNOWN, run_and_write, with_environment
 
 
@@ -536,16 +542,6 @@ def test_what_no_runs_are_behind(home):
         assert trace_text(found).splitlines()[-1] == f"runs: none; this value is {origin}"
 
 
-def values(document):
-    """Raw values by table, column and row."""
-    return {
-        (table.id, column.name, row.key): value
-        for table in document.tables()
-        for row in table.rows
-        for column, value in zip(table.columns, row.values, strict=True)
-    }
-
-
 def test_every_column_says_what_it_rests_on(study):
     """With another optimum those change that say that they rest on it."""
     document = document_of(study)
@@ -556,16 +552,37 @@ def test_every_column_says_what_it_rests_on(study):
         (task, arm): replace(best, reward=best.reward + better[arm], bound=None)
         for (task, arm), best in study.optima.items()
     }
-    other = values(document_of(MadeUp(study.results, optima=others)))
-    before = values(document)
-    both = before.keys() & other.keys()  # methods that come near the optimum no more have no row
-    assert len(both) > 0.9 * len(before)
-    changed = {key[:2] for key in both if repr(before[key]) != repr(other[key])}
+    other = document_of(MadeUp(study.results, optima=others))
+    changed = changed_columns(document.tables(), other.tables())
     saying = {key for key, column in columns.items() if "optimum" in column.rests_on}
     assert changed - saying == set()
     kinds = [{re.sub(r"\d+", "", name) for _, name in keys} for keys in (saying, changed)]
     assert kinds[0] == kinds[1]  # within_1 of all, where one or another changes
     assert len(changed) > 40
+
+
+def test_what_rests_on_the_paper_says_so(study, monkeypatch):
+    """With other printed rewards those values change that say that they rest on them."""
+    before = list(document_of(study).tables())
+    other = {
+        key: entry.model_copy(update={"value": entry.value - 7})
+        if isinstance(entry, printed.Reward) else entry
+        for key, entry in printed.ENTRIES.items()
+    }  # fmt: skip
+    for module in (printed, published):
+        monkeypatch.setattr(module, "ENTRIES", other)
+    after = list(document_of(Study(study.results)).tables())
+    columns = {(table.id, column.name): column for table in before for column in table.columns}
+    saying = {
+        (table.id, column.name)
+        for table in before
+        for column in table.columns
+        for row in table.rows
+        if {"paper", "derived"} & {*row.rests_on.get(column.name, column.rests_on)}
+    }
+    changed = {key for key in changed_columns(before, after) if columns[key].kind != "text"}
+    assert changed - saying == set()
+    assert len(changed) > 5
 
 
 def test_a_cell_of_a_table_says_how(home):

@@ -122,8 +122,9 @@ def pack(
     """
     from coartic.analysis.results.archive import pack as packed
 
-    path = folder.with_suffix(".zip") if out is None else out
-    if path.suffix.lower() != ".zip":
+    named = folder if folder.name.strip(".") else folder.resolve()  # not . or ..
+    path = named.parent / f"{named.name}.zip" if out is None else out
+    if not path.name.lower().endswith(".zip"):
         raise CoarticError(f"--out {path}: the name must end in .zip")
     if_interrupted(f"nothing is written in {path}")
     digest = packed(folder, path, replace=replace)

@@ -120,3 +120,19 @@ def shown(table):
     """By key and column name the values of a table."""
     names = [column.name for column in table.columns]
     return {row.key: dict(zip(names, row.values, strict=True)) for row in table.rows}
+
+
+def changed_columns(before, after):
+    """Table and column of the values that differ between tables; some rows come and go."""
+    first, second = (
+        {
+            (table.id, column.name, row.key): value
+            for table in tables
+            for row in table.rows
+            for column, value in zip(table.columns, row.values, strict=True)
+        }
+        for tables in (before, after)
+    )
+    both = first.keys() & second.keys()
+    assert len(both) > 0.9 * len(first)
+    return {key[:2] for key in both if repr(first[key]) != repr(second[key])}

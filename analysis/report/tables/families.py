@@ -278,7 +278,8 @@ def _variance_table(sample: Sample) -> DataTable | None:
 
 def _precision_table(sample: Sample) -> DataTable | None:
     layout = LAYOUTS["family-precision"].plus(
-        Column(f"with_{n}", counted(n, "run"), "number", rests_on=("runs",)) for n in RUNS
+        Column(f"with_{n}", counted(n, "run"), "number", rests_on=("runs", "optimum"))
+        for n in RUNS
     )
     rows = []
     for found in needed(sample):
