@@ -176,7 +176,7 @@ def _tree(source: str | bytes, name: str = "<method>") -> ast.Module:
     try:
         return ast.parse(source, name or "<method>")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise MethodFileError(f"cannot be run: {brief(error)}") from None
+        raise MethodFileError(f"{name}: cannot be run: {brief(error)}") from None
 
 
 def _text(path: Path) -> bytes:

@@ -259,6 +259,9 @@ def plan_suite(
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
     _check("select", select, Selection, "a Selection, as Selection(tasks=['ascending'])")
+    if isinstance(readings, str):
+        raise CoarticError(f"readings is a list: write readings=[{readings!r}]")
+    _check("readings", readings, Sequence, "a list")
     if not isinstance(suite, Suite):
         _check("suite", suite, str | Path, "a name, a path or a Suite")
         suite = load_suite(str(suite))

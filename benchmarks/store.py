@@ -185,4 +185,7 @@ def _readable(packs: Packs, run_ids: Iterable[str], doubtful: list[str]) -> Iter
 
 
 def _why(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error)
+    name, why = getattr(error, "filename", None), getattr(error, "strerror", None) or error
+    if isinstance(error, FileExistsError):
+        return f"{name} is a file where a folder is needed; move it away"
+    return str(why)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -237,7 +238,8 @@ def load_suite(name: str) -> Suite:
         return _read(Path(name))
     known = suites()
     if name not in known:
-        raise unknown("suite", name, known)
+        hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
+        raise CoarticError(f"{unknown('suite', name, known)}{hint}")
     return known[name]
 
 
@@ -317,7 +319,7 @@ def methods_named(name: str, known: Registry) -> list[str]:
     name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
     found = [method for method in known if fnmatchcase(method, name)] if "*" in name else [name]
     if not found or found[0] not in known:
-        raise unknown("method", name, known)
+        raise unknown("method", name, [*known, *CONDITIONS, *VARIANTS])
     return found
 
 

@@ -466,7 +466,10 @@ def names_in(text: str) -> list[str]:
     ends = [address_of(found[1] + end) for end in found.groups()[1:]] if found else [None]
     first, last = ends[0], ends[-1]
     if first is None or last is None or first.stream != last.stream:
-        raise TaskError(f"{text!r} is no range of instances; write two-armed/v1/i000..i039")
+        raise TaskError(
+            f"{text!r} is no range of instances; write two-armed/v1/i000..i039, or, for a task of "
+            "your own, the path of a file that ends in .toml"
+        )
     if last.number < first.number:
         raise TaskError(f"{text!r} goes backwards; the lower number stands first")
     if last.number - first.number >= MOST_CELLS:

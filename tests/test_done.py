@@ -162,9 +162,7 @@ def test_a_forgery_with_its_hash_in_the_manifest_is_refused_and_then_undone(tmp_
     content["run"]["manifest.json"] = [hashlib.sha256(text.encode()).hexdigest()]
     listing.write_text(json.dumps(content), encoding="utf-8")
     assert perform(tmp_path).progress.done == 0
-    with pytest.raises(
-        CoarticError, match="without the file manifest.json where it finds nothing"
-    ):
+    with pytest.raises(CoarticError, match="where it finds nothing to do, delete manifest.json"):
         load_results(tmp_path)
     (tmp_path / "manifest.json").unlink()
     assert perform(tmp_path).progress.done == 1

@@ -561,7 +561,7 @@ def test_damaged_results_are_named(results, tmp_path):
     with pytest.raises(CoarticError, match="is not a results folder: .*manifest.json is missing"):
         load_results(tmp_path)
     (tmp_path / "manifest.json").write_text("{")
-    with pytest.raises(CoarticError, match="results cannot be read"):
+    with pytest.raises(CoarticError, match="it cannot be read as JSON"):
         load_results(tmp_path)
 
 
@@ -587,7 +587,7 @@ def test_damaged_tables_are_named_with_what_to_do(results, tmp_path, name):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ([], "not an object"),
+        ([], "it holds no object"),
         ({"format": 2}, "have format 2"),
         ({"format": FORMAT}, "specification is missing"),
         (lambda found: found["specification"]["methods"].pop("dual-process/EC4"), "its seal"),

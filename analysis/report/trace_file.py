@@ -101,8 +101,9 @@ def read_trace(home: Path) -> TraceFile:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise CoarticError(
-            f"{home / FILE} is damaged, or of another version ({place}: {first['msg']}); make the "
-            f"report again with `{shell_line('coartic', 'report', home.parent)}`"
+            f"{home / FILE} is damaged, or of another version ({place}: {first['msg']}); move "
+            f"{home} away and make the report again with "
+            f"`{shell_line('coartic', 'report', home.parent)}`"
         ) from None
 
 

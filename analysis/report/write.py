@@ -23,7 +23,8 @@ def check_report_folder(folder: Path, results: Path) -> None:
     """
     if Path(os.path.realpath(results)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
-            f"{folder} holds the results themselves; a report has a folder of its own"
+            f"{folder} holds the results themselves, or lies above them; a report has a folder "
+            "of its own"
         )
     check_folder(folder, owner=REPORT, alone=True)
 

@@ -38,8 +38,8 @@ from coartic.tables import (
 
 ANEW = "start the same `coartic run` again: it makes the tables anew from the records"
 AGAIN = (
-    "start the same `coartic run` again, without the file manifest.json where it finds nothing "
-    "to do"
+    "start the same `coartic run` again; where it finds nothing to do, delete manifest.json "
+    "before that"
 )
 BASE = "task"  # base locked as the task has it: the case that rewards compare with
 
@@ -66,9 +66,9 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         content = json.loads(read_bytes(path, LARGEST_MANIFEST), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        raise CoarticError(f"{path}: results cannot be read: {error}") from None
+        damaged(path, f"it cannot be read as JSON: {error}")
     if not isinstance(content, dict):
-        damaged(path, f"it holds a {type(content).__name__}, not an object")
+        damaged(path, "it holds no object")
     if content.get("format") != FORMAT:
         raise CoarticError(
             f"{path}: its tables have format {content.get('format')!r}, this version reads "

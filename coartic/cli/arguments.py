@@ -94,6 +94,13 @@ Methods = Annotated[
         help="Only these methods, x,y.", autocompletion=_completing(_conditions, _methods)
     ),
 ]
+Subject = Annotated[
+    str,
+    typer.Argument(
+        help="A method, EC4 or 'optimum/*', or a task file (.toml).",
+        autocompletion=_completing(_conditions, _methods),
+    ),
+]
 TaskFiles = Annotated[
     list[Path] | None,
     typer.Option(

@@ -94,11 +94,11 @@ def report(
     endings = endings_in(formats, FILES)
     labels = None if methods is None else labels_in(methods, "--methods")
     with opened(folder) as first, opened(folder if other is None else other) as second:
-        study = load(first)
+        study, against = load(first), None if other is None else load(second)
         check_report_folder(out, first)
         made = build(study, labels, endings, processes=PROCESSES)
-        if other is not None:
-            made = replace_field(made, document=beside(made.document, study, load(second)))
+        if against is not None:
+            made = replace_field(made, document=beside(made.document, study, against))
         write(made, study, out, printed=pdf, begin=lambda: writing(out))
     if_interrupted(f"the report is written in {out}")
     took, tables = time.monotonic() - started, counted(len(made.document.tables()), "table")

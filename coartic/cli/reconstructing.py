@@ -49,7 +49,8 @@ def readings(
         given_too = {"--pairs": pairs, "--runs": runs, "--trials": trials}
         if without := [name for name, value in given_too.items() if value]:
             raise CoarticError(
-                f"{', '.join(without)}: what is judged, and how; name a folder with --judge"
+                f"{', '.join(without)}: only with --judge FOLDER, which judges the readings into "
+                "that folder"
             )
         _list_readings()
         return

@@ -6,9 +6,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
 from coartic.cli.arguments import check_numbers, names_in
@@ -203,9 +201,7 @@ def reproduce(
 
 
 def check(
-    subject: Annotated[
-        str, typer.Argument(help="A method, EC4 or 'optimum/*', or a task file (.toml).")
-    ],
+    subject: given.Subject,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Check a method or a task file against the laws of the benchmark."""
@@ -231,6 +227,8 @@ def _checks(subject: str, known: Registry) -> list[tuple[str, Callable[[], list[
     from coartic.benchmarks.suites import methods_named
 
     if subject.endswith(".toml"):
+        if not Path(subject).is_file():
+            raise CoarticError(f"{subject}: there is no such file")
         return [(subject, partial(check_task_file, Path(subject), known))]
     try:
         names = methods_named(subject, known)
