@@ -29,6 +29,7 @@ MOST_REWARDS = 1_000_000
 LEAST_TOGETHER = 8
 """Runs of a cell that are not divided among workers."""
 _ROUNDS = 3  # in a row without a single answer, after which runs are given up
+_PARTS = 8  # of a lot that went wrong, or took too long, are performed by themselves
 _SURE = frozenset({"ok", "infeasible"})  # whoever was beside
 RETRIED = frozenset({"timeout", "crashed"})
 
@@ -83,17 +84,18 @@ def perform_missing(
                 progress.failed += record.status != "ok"
     watch(progress, None)
     idle = 0
-    alone: set[str] = set()  # runs that are performed beside no others
+    at_most: dict[str, int] = {}  # that a run is performed together with, itself among them
     while missing and idle < _ROUNDS:
         idle += 1
-        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), alone, _workers(executor))}
+        lots = {lot[0].run_id: lot for lot in _lots(missing.values(), at_most, _workers(executor))}
         jobs = [lot[0].setting.job(lot) for lot in lots.values()]
         for answer in executor.perform(jobs):
             lot, idle = lots.pop(answer["run_id"]), 0
             records = records_of(answer, lot)
             if len(lot) > 1:  # one that went wrong beside others may have had it from them
-                alone.update(record.run_id for record in records if record.status not in _SURE)
-                records = [record for record in records if record.run_id not in alone]
+                doubtful = {r.run_id for r in records if r.status not in _SURE}
+                at_most |= dict.fromkeys(doubtful, max(1, len(lot) // _PARTS))
+                records = [record for record in records if record.run_id not in doubtful]
             store.write(records)
             for record in records:
                 progress.done += 1
@@ -112,7 +114,7 @@ def _workers(executor: Executor) -> int:
 
 
 def _lots(
-    specs: Collection[RunSpec], alone: Collection[str], workers: int
+    specs: Collection[RunSpec], at_most: Mapping[str, int], workers: int
 ) -> Iterator[Sequence[RunSpec]]:
     """Runs that are performed side by side; results do not depend on which these are.
 
@@ -124,14 +126,15 @@ def _lots(
     lots: list[list[RunSpec]] = []
     for _, group in groupby(specs, key=lambda spec: id(spec.setting)):
         together: list[RunSpec] = []
+        room = 0
         for spec in group:
-            if spec.run_id in alone:
-                lots.append([spec])
-            elif together and len(together) < min(spec.setting.most_together, share):
-                together.append(spec)
-            else:
-                together = [spec]
+            most = min(spec.setting.most_together, share)
+            most = min(most, at_most.get(spec.run_id, most))
+            if len(together) >= min(room, most):
+                together, room = [], most
                 lots.append(together)
+            room = min(room, most)
+            together.append(spec)
     left = len(lots) % workers
     whole = len(lots) - left
     yield from lots[:whole]

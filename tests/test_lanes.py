@@ -154,7 +154,7 @@ def results(store):
     return {run_id: (packs[run_id].result(), packs[run_id].rewards) for run_id in packs}
 
 
-def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
+def test_what_goes_wrong_side_by_side_is_performed_again_in_parts(tmp_path):
     cells = paper_cells(
         tasks=["ascending"], methods=["dual-process/EC1", "corrective-alone/given"]
     )
@@ -167,7 +167,7 @@ def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
         assert (progress.done, progress.failed) == (len(planned), 0)
         found.append(store)
     assert results(found[0]) == results(found[1])
-    assert sorted(executor.sizes) == [1] * (LANES + 3) + [2, LANES]
+    assert sorted(executor.sizes) == [1] * (LANES + 3) + [2] + [9] * 8 + [LANES]
     beside = {record.timing.together for record in map(found[0].read, found[0].packs())}
     assert beside == {1, 2, LANES}
     assert {found[1].read(run_id).timing.together for run_id in found[1].packs()} == {1}
@@ -200,8 +200,8 @@ def test_few_runs_of_several_cells_are_divided_among_workers():
         for name in ("dual-process/EC1", "corrective-alone/given")
     ]
     planned = [spec for _, spec in run_specs(cells, runs=20, seed=0, trials=3)]
-    assert [len(lot) for lot in _lots(planned, set(), 2)] == [11, 9, 1]
-    assert [len(lot) for lot in _lots(planned, {planned[3].run_id}, 2)] == [11, 1, 8, 1]
+    assert [len(lot) for lot in _lots(planned, {}, 2)] == [11, 9, 1]
+    assert [len(lot) for lot in _lots(planned, {planned[3].run_id: 1}, 2)] == [3, 1, 11, 5, 1]
 
 
 @pytest.mark.parametrize(
@@ -217,7 +217,7 @@ def test_few_runs_of_several_cells_are_divided_among_workers():
 def test_a_cell_is_divided_among_workers(runs, workers, sizes):
     (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
     planned = [spec for _, spec in run_specs([cell], runs=runs, seed=0, trials=3)]
-    lots = list(_lots(planned, set(), workers))
+    lots = list(_lots(planned, {}, workers))
     assert [len(lot) for lot in lots] == sizes
     assert [spec for lot in lots for spec in lot] == planned
 
