@@ -241,4 +241,4 @@ def test_command(tmp_path, monkeypatch, capsys):
     (tmp_path / "results" / "manifest.json").write_text("{", encoding="utf-8")
     code, _, error = call(monkeypatch, capsys, "cite", tmp_path / "results")
     assert code == 2
-    assert "results cannot be read" in error
+    assert "it cannot be read as JSON" in error
