@@ -133,8 +133,8 @@ def _lots(
             if len(together) >= min(room, most):
                 together, room = [], most
                 lots.append(together)
-            room = min(room, most)
             together.append(spec)
+            room = min(room, most)
     left = len(lots) % workers
     whole = len(lots) - left
     yield from lots[:whole]

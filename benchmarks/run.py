@@ -62,9 +62,7 @@ class Selection:
 
     def __post_init__(self) -> None:
         for name, given in vars(self).items():
-            if isinstance(given, str | Path):
-                raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
-            _check(name, given, Sequence, "a list")
+            _check_list(name, given)
             for item in given:
                 _check(f"an item of {name}", item, str | Path, "a name or a path")
 
@@ -73,6 +71,13 @@ def _check(name: str, given: object, kind: Any, words: str) -> None:
     """Raises CoarticError where an argument is not of its kind."""
     if not isinstance(given, kind) or isinstance(given, bool):
         raise CoarticError(f"{name} is {given!r}; it must be {words}")
+
+
+def _check_list(name: str, given: object) -> None:
+    """Raises CoarticError for what is no list, one text above all."""
+    if isinstance(given, str | Path):
+        raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
+    _check(name, given, Sequence, "a list")
 
 
 ALL_OF_IT = Selection()
@@ -259,9 +264,7 @@ def plan_suite(
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
     _check("select", select, Selection, "a Selection, as Selection(tasks=['ascending'])")
-    if isinstance(readings, str):
-        raise CoarticError(f"readings is a list: write readings=[{readings!r}]")
-    _check("readings", readings, Sequence, "a list")
+    _check_list("readings", readings)
     if not isinstance(suite, Suite):
         _check("suite", suite, str | Path, "a name, a path or a Suite")
         suite = load_suite(str(suite))
