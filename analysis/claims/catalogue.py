@@ -37,6 +37,7 @@ CLAIMS: tuple[Claim, ...] = tuple(JUDGED[name] for name in STATEMENTS)
 _UNKNOWN = Chances(math.nan, math.nan)
 _COLUMNS = (
     *("id", "section", "statement", "verdict", "fitted", "evidence", "rule", "test", "beside"),
+    "correction",
     *("p", "adjusted_p", "contrary_p", "adjusted_contrary_p", "power", "contrary_power"),
     *("reconstructions", "place", "quote", "figure", "runs", "sources"),
 )
@@ -106,6 +107,7 @@ def register_table(judged: Iterable[Judged]) -> pd.DataFrame:
             **vars(entry),
             "reconstructions": entry.claim.reconstructions,
             "verdict": entry.verdict,
+            "correction": entry.claim.correction if entry.claim.tested else "",
             **{"p": entry.p, "contrary_p": entry.contrary_p},
             "runs": " ".join(entry.run_ids),
             "sources": ", ".join(entry.sources),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,7 +37,7 @@ from coartic.analysis.report.document import (
     Prose,
     Section,
 )
-from coartic.analysis.report.formats.csv import table_csv
+from coartic.analysis.report.formats.csv import raw_columns
 from coartic.analysis.report.headlines import headline_numbers
 from coartic.analysis.report.limitations import limitations
 from coartic.analysis.report.numbers import PREFIX, Number, macro_names, numbers_tex
@@ -118,10 +117,7 @@ def build(
 def report_tables(study: Study) -> dict[str, pd.DataFrame]:
     """The report's tables by id, with the columns of their CSV files."""
     document = Document("", tuple(_sections(study, None)), runs=study.run_ids)
-    return {
-        table.id: pd.read_csv(io.StringIO(table_csv(table)), keep_default_na=False, na_values="")
-        for table in document.tables()
-    }
+    return {table.id: pd.DataFrame(raw_columns(table)) for table in document.tables()}
 
 
 def _sections(study: Study, pictures: Pictures | None) -> Iterator[Section]:

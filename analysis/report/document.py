@@ -118,6 +118,8 @@ class Row:
     """By column name, what a value was computed from where it is something else."""
     rests_on: Mapping[str, tuple[RestsOn, ...]] = field(default_factory=dict)
     """By column name, what a value rests on where it is not what its column does."""
+    other_arm: OtherArm | None = None
+    """Of the optimum that its values rest on, where its columns do not say it."""
     family: str = ""
     """Rows of one name are a family; by default all rows of a table."""
     link: str = ""

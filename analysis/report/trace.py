@@ -13,9 +13,17 @@ from coartic.analysis.markup import words
 from coartic.analysis.report.document import CellKey, DataTable
 from coartic.analysis.report.formats.templates import on_one_line, template
 from coartic.analysis.report.numbers import ORIGINS
+from coartic.analysis.report.tables.files import FILES
 from coartic.analysis.report.tables.layout import LAYOUTS
 from coartic.analysis.report.text import heads, texts
-from coartic.analysis.report.trace_file import FILE, Source, TraceFile, read_trace
+from coartic.analysis.report.trace_file import (
+    FILE,
+    Source,
+    TraceFile,
+    read_trace,
+    trace_content,
+)
+from coartic.analysis.study import load
 from coartic.stored import content_hash
 from coartic.text import counted, did_you_mean, shell_line
 
@@ -25,6 +33,9 @@ _COMPANIONS = {
     "High": "upper end of the interval of: ",
     "N": "number of runs of: ",
 }
+
+
+_MOST_NAMED = 20  # rows or folders in a message
 
 
 @dataclass(frozen=True)
@@ -60,22 +71,50 @@ class Trace:
         return folder if same else None
 
 
+def find_trace(folder: Path, name: str, where: Sequence[str] = ()) -> Trace:
+    """:func:`trace` in the one report in a folder or below it, :func:`trace_in_file` of a name
+    of :data:`~.tables.files.FILES` in the one results folder there.
+
+    Raises CoarticError for none or several, and as these do.
+    """
+    if name not in FILES:
+        return trace(find_report(folder), name, where)
+    places = folder, folder.parent
+    results = _found(folder, "manifest.json", places, "results folder", "coartic run SUITE")
+    return trace_in_file(results, name, where)
+
+
 def find_report(folder: Path) -> Path:
     """The one report in a folder or below it. Raises CoarticError for none or several."""
-    for home in (folder, folder / "report"):
-        if (home / FILE).is_file():
+    return _found(folder, FILE, (folder, folder / "report"), "report", "coartic report DIR")
+
+
+def _found(folder: Path, file: str, places: Iterable[Path], what: str, command: str) -> Path:
+    """The first of some places that has a file, or the one folder below that has it."""
+    for home in places:
+        if (home / file).is_file():
             return home
-    found = sorted(path.parent for path in folder.glob(f"**/{FILE}"))
+    found = sorted(path.parent for path in folder.glob(f"**/{file}"))
     if not found:
         raise CoarticError(
-            f"no report in {folder}; make one with `coartic report DIR`, or name another folder "
-            "with --in"
+            f"no {what} in {folder}; make one with `{command}`, or name another folder with --in"
         )
     if len(found) > 1:
         raise CoarticError(
-            f"{len(found)} reports below {folder}: {', '.join(map(str, found))}; choose with --in"
+            f"{len(found)} {what}s below {folder}: {_first(map(str, found))}; choose with --in"
         )
     return found[0]
+
+
+def trace_in_file(folder: Path, name: str, where: Sequence[str]) -> Trace:
+    """What is behind a value of a CSV file in a results folder (``where``: row and column).
+
+    Raises CoarticError where the folder cannot be read, or has nothing of that name.
+    """
+    study = load(folder)
+    table = FILES[name].table(study)
+    content = trace_content(study, [table], (), study.run_ids)
+    return _of_table(folder / "report", content, table, where)
 
 
 def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
@@ -100,7 +139,7 @@ def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
         return Trace(name, text, meaning, number.how, number.origin, number.cells, home, content)
     if name in tables:
         return _of_table(home, content, tables[name], where)
-    known = [*macros, *tables]
+    known = [*macros, *tables, *FILES]
     raise CoarticError(f"no macro or table {name!r} in {home}{did_you_mean(name, known)}")
 
 
@@ -115,13 +154,20 @@ def shell(command: Iterable[str | Path]) -> str:
     return shell_line(*command)
 
 
+def _first(names: Iterable[str]) -> str:
+    """As many names as a message has room for."""
+    shown = [*names]
+    left = len(shown) - _MOST_NAMED
+    return ", ".join(shown[:_MOST_NAMED]) + (f" and {left} more" if left > 0 else "")
+
+
 def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[str]) -> Trace:
     rows = {row.key: row for row in table.rows}
     columns = {column.name: place for place, column in enumerate(table.columns)}
     if len(where) != 2:
         raise CoarticError(
             f"{table.id} is a table: name a row and a column of it, one of\n  rows: "
-            f"{', '.join(map(repr, rows))}\n  columns: {', '.join(columns)}"
+            f"{_first(map(repr, rows))}\n  columns: {', '.join(columns)}"
         )
     known: dict[str, Collection[str]] = {"row": rows, "column": columns}
     for (what, names), name in zip(known.items(), where, strict=True):
@@ -134,7 +180,7 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
     known_best = [
         (f"Optimum of {task}, other arm {arm}, {best.reward}: {best.how}.", best.cells)
         for task, arm, best in content.optima
-        if "optimum" in rests_on and task in tasks and arm == column.other_arm
+        if "optimum" in rests_on and task in tasks and arm == (row.other_arm or column.other_arm)
     ]
     # The tables of methods share what stands above them all.
     above = LAYOUTS["methods"].read() if table.id.startswith("methods-") else ()

@@ -8,7 +8,7 @@ left out.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -73,6 +73,17 @@ class TraceFile(BaseModel):
 
 def trace_json(study: Study, document: Document, numbers: Iterable[Number]) -> str:
     """Every macro and table with the cells they rest on, and the runs of those."""
+    content = trace_content(study, document.tables(), numbers, document.runs)
+    return json_text({"format": content.format} | content.model_dump(exclude_defaults=True))
+
+
+def trace_content(
+    study: Study,
+    tables: Iterable[DataTable],
+    numbers: Iterable[Number],
+    runs: Mapping[CellKey, Sequence[str]],
+) -> TraceFile:
+    """What these tables and numbers rest on; ``runs``: ids by cell."""
     manifest = study.results.manifest
     first, *rest = (
         Path(word).name if Path(word).is_absolute() else word
@@ -80,15 +91,14 @@ def trace_json(study: Study, document: Document, numbers: Iterable[Number]) -> s
     )
     started = ["python", "-m", "coartic"] if first == "__main__.py" else [first]
     command = (*started, *rest)
-    content = TraceFile(
+    return TraceFile(
         specification=content_hash(manifest.specification.model_dump(mode="json")),
         environment=manifest.environment.model_copy(update={"command": command}),
-        sources=tuple(_sources(study, document, command)),
+        sources=tuple(_sources(study, runs, command)),
         numbers=tuple(numbers),
         optima=tuple((task, arm, best) for (task, arm), best in study.optima.items()),
-        tables=tuple(document.tables()),
+        tables=tuple(tables),
     )
-    return json_text({"format": content.format} | content.model_dump(exclude_defaults=True))
 
 
 def read_trace(home: Path) -> TraceFile:
@@ -113,19 +123,21 @@ def _parsed(data: bytes) -> TraceFile:
     return TraceFile.model_validate_json(data)
 
 
-def _sources(study: Study, document: Document, asked: tuple[str, ...]) -> Iterator[Source]:
+def _sources(
+    study: Study, runs_of: Mapping[CellKey, Sequence[str]], asked: tuple[str, ...]
+) -> Iterator[Source]:
     commits = study.runs.set_index("run_id").commit.astype(object).fillna("unknown")
     own_files = any(word.endswith((".toml", ".py")) for word in asked)
     makes: Counter[CellKey] = Counter()
-    for (task, label), runs in document.runs.items():
+    for (task, label), runs in runs_of.items():
         makes[task, study.cells[task, label].method] += len(runs)
-    for (task, label), runs in document.runs.items():
+    for (task, label), runs in runs_of.items():
         method = study.cells[task, label].method
         made_anew = not own_files and task in builtin_tasks()
         yield Source(
             task,
             label,
-            runs,
+            tuple(runs),
             tuple(sorted(set(commits[list(runs)]))),
             command_of(study.results.manifest.specification, task, method) if made_anew else "",
             makes[task, method],

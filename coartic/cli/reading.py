@@ -150,19 +150,20 @@ def verify(folder: given.Results) -> None:
 
 
 def trace(
-    name: Annotated[str, typer.Argument(help="Macro of numbers.tex, or id of a table.")],
+    name: Annotated[
+        str, typer.Argument(help="Macro of numbers.tex, id of a table, or a file as pareto.csv.")
+    ],
     row: Annotated[str | None, typer.Argument(help="Row of the table: its first cell.")] = None,
     column: Annotated[str | None, typer.Argument(help="Column of the table's CSV.")] = None,
     folder: Annotated[
         Path, typer.Option("--in", help="Report, its results folder, or a folder above.")
     ] = Path("results"),
 ) -> None:
-    """Say which runs, code and command are behind a number of a report."""
-    from coartic.analysis.report.trace import find_report, trace_text
-    from coartic.analysis.report.trace import trace as find
+    """Say which runs, code and command are behind a number of a report, or of a CSV file."""
+    from coartic.analysis.report.trace import find_trace, trace_text
 
     where = [part for part in (row, column) if part is not None]
-    say(*trace_text(find(find_report(folder), name, where)).split("\n"))
+    say(*trace_text(find_trace(folder, name, where)).split("\n"))
 
 
 def compare(
@@ -182,6 +183,7 @@ def compare(
     from coartic.analysis.comparisons.versions import compare_versions, load_pair
     from coartic.analysis.report.formats.markdown import markdown
     from coartic.analysis.report.pages.versions import versions_document
+    from coartic.analysis.report.tables.files import VERSIONS, csv_text
     from coartic.analysis.results.archive import opened
     from coartic.files import check_outputs, write_outputs
 
@@ -194,7 +196,7 @@ def compare(
     with opened(first) as a, opened(second) as b:
         found = replace_field(compare_versions(*load_pair(a, b)), folders=(first, second))
     document = versions_document(found)
-    texts = {out: markdown(document, tables=""), csv: found.cells.to_csv(index=False)}
+    texts = {out: markdown(document, tables=""), csv: csv_text(VERSIONS, found.cells)}
     written = {path: text.encode() for path, text in texts.items() if path is not None}
     write_outputs(written, replace=replace)
     show_data(document.tables(), f"see {out}" if out else "--out PAGE.md has all")

@@ -88,13 +88,14 @@ class _Comparison:
         from coartic.analysis import Study
         from coartic.analysis.report.comparison import comparison_document
         from coartic.analysis.report.formats.markdown import markdown
+        from coartic.analysis.report.tables.files import METHODS
         from coartic.analysis.results.folder import made_here
 
         study = Study(made_here(folder))
         self._made = comparison_document(study)
         return {
             "comparison.md": markdown(self._made, tables="").encode(),
-            "methods.csv": study.methods.to_csv(index=False).encode(),
+            METHODS.name: METHODS.text(study).encode(),
         }
 
     def show(self, report: RunReport) -> None:

@@ -20,19 +20,26 @@ def table_csv(table: DataTable) -> str:
     have them, ``cells`` (task and label, the cells apart by `` | ``) and, by column,
     ``NAME_cells`` where it differs. Empty: there is none. Shares are fractions.
     """
-    shown = parts(table)
-    traced = [
-        column.name
-        for column in table.columns
-        if any(column.name in row.cells_by_column for row in table.rows)
-    ]
-    names = [f"{part.column.name}{end}" for part in shown for end in _ENDINGS[part.kind]]
-    lines = [["key", *names, "cells", *(f"{name}_cells" for name in traced)]]
-    for row in table.rows:
-        values = (raw for part in shown for raw in part.raw(row.values[part.index]))
-        cells = (row.cells, *(row.cells_by_column.get(name, ()) for name in traced))
-        lines.append([row.key, *map(_text, values), *map(_cells, cells)])
-    return _csv(lines)
+    columns = raw_columns(table)
+    texts = ([_text(value) for value in column] for column in columns.values())
+    return _csv([[*columns], *map(list, zip(*texts, strict=True))])
+
+
+def raw_columns(table: DataTable) -> dict[str, list[Value]]:
+    """The same by column, not yet text; where there is none, NaN of numbers and None of text."""
+    found: dict[str, list[Value]] = {"key": [row.key for row in table.rows]}
+    for part in parts(table):
+        missing = None if part.column.kind == "text" else math.nan
+        of_rows = [row.values[part.index] for row in table.rows]
+        for place, ending in enumerate(_ENDINGS[part.kind]):
+            raw = (part.raw(value)[place] for value in of_rows)
+            found[f"{part.column.name}{ending}"] = [missing if x is None else x for x in raw]
+    found["cells"] = [_cells(row.cells) for row in table.rows]
+    for column in table.columns:
+        if any(column.name in row.cells_by_column for row in table.rows):
+            own = (row.cells_by_column.get(column.name, ()) for row in table.rows)
+            found[f"{column.name}_cells"] = list(map(_cells, own))
+    return found
 
 
 def runs_csv(document: Document) -> str:

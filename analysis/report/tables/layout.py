@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from coartic.analysis.comparisons.methods import TOLD
-from coartic.analysis.report.document import CellKey, Column, DataTable, Estimate, Row, Value
+from coartic.analysis.report.document import (
+    CellKey,
+    Column,
+    DataTable,
+    Estimate,
+    RestsOn,
+    Row,
+    Value,
+)
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.words import RECONSTRUCTED, stated
 
@@ -29,6 +37,7 @@ class Layout(BaseModel):
 
     name: str
     caption: str
+    rests_on: tuple[RestsOn, ...] = ()
     reading: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     folded: bool = False
@@ -40,6 +49,9 @@ class Layout(BaseModel):
         unknown = self.intervals.keys() - {column.name for column in self.columns}
         if unknown:
             raise ValueError(f"intervals of no columns: {', '.join(sorted(unknown))}")
+        for column in self.columns:
+            if column.kind != "text" and not column.rests_on:
+                raise ValueError(f"what the numbers of {column.name} rest on is not said")
         return self
 
     def plus(self, columns: Iterable[Column]) -> Layout:
@@ -107,22 +119,30 @@ def finite(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def _read() -> dict[str, Layout]:
+_L = TypeVar("_L", bound=Layout)
+
+
+def read_layouts(file: str, kind: type[_L]) -> dict[str, _L]:
+    """The sections of a file of this folder, by name, in its order.
+
+    Raises pydantic's ValidationError for what does not fit together.
+    """
     found = {}
-    for name, said in stated(__file__, "tables").items():
-        columns = [_column(*column) for column in said["columns"].items()]
-        found[name] = {**said, "name": name, "columns": columns}
-    return TypeAdapter(dict[str, Layout]).validate_python(found)
+    for name, said in stated(__file__, file).items():
+        rests_on = said.get("rests_on", ())
+        columns = [_column(*column, rests_on=rests_on) for column in said["columns"].items()]
+        found[name] = kind.model_validate({**said, "name": name, "columns": columns})
+    return found
 
 
-def _column(name: str, said: dict[str, Any]) -> dict[str, Any]:
+def _column(name: str, said: dict[str, Any], *, rests_on: Sequence[str]) -> dict[str, Any]:
     number = said.get("kind", "text") != "text"
-    rests_on = {"rests_on": ["runs"]} if number else {}
-    return {"name": name, "header": name.replace("_", " "), **rests_on, **said}
+    default = {"rests_on": rests_on} if number else {}
+    return {"name": name, "header": name.replace("_", " "), **default, **said}
 
 
-LAYOUTS = _read()
-"""All tables by name, in the order of the file."""
+LAYOUTS = read_layouts("tables", Layout)
+"""All tables of pages by name."""
 
 
 def with_legends(table: DataTable) -> DataTable:

@@ -1,0 +1,135 @@
+"""The CSV files of a results folder: what each column is, and which runs are behind a row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from coartic.analysis.report.document import CellKey, DataTable, Row, Value
+from coartic.analysis.report.tables.layout import Layout, read_layouts
+from coartic.analysis.study import Study
+from coartic.tables import label_of
+
+_Raw = Mapping[Hashable, Any]
+"""A row as pandas has it."""
+
+
+class FileLayout(Layout):
+    """A section of ``files.toml``, which says what the fields are."""
+
+    key: tuple[str, ...]
+    family: tuple[str, ...] = ()
+    optimum: str | None = None
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """A file with one number a place: its rows, and the cells that each was computed from."""
+
+    layout: FileLayout
+    rows: Callable[[Study], pd.DataFrame]
+    cells: Callable[[Study, _Raw], Iterable[CellKey]]
+
+    @property
+    def name(self) -> str:
+        """Of the file."""
+        return f"{self.layout.name}.csv"
+
+    def text(self, study: Study) -> str:
+        """All of it."""
+        return csv_text(self.layout, self.rows(study))
+
+    def table(self, study: Study) -> DataTable:
+        """The same as a table whose every value can be traced."""
+        layout = self.layout
+        rows = tuple(
+            Row(
+                key,
+                tuple(_value(row[column.name]) for column in layout.columns),
+                tuple(dict.fromkeys(self.cells(study, row))),
+                family=_joined(row, layout.family) or key,
+                other_arm=row[layout.optimum] if layout.optimum else None,
+            )
+            for row in self.rows(study).to_dict("records")
+            for key in [_joined(row, layout.key)]
+        )
+        return DataTable(self.name, layout.caption, layout.columns, rows)
+
+
+def csv_text(layout: Layout, rows: pd.DataFrame) -> str:
+    """Rows as CSV. Raises ValueError where they have other columns than the layout says."""
+    columns = [column.name for column in layout.columns]
+    if list(rows.columns) != columns:
+        raise ValueError(f"{layout.name} has columns {list(rows.columns)}, stated are {columns}")
+    return rows.to_csv(index=False)
+
+
+def _value(raw: Any) -> Value:
+    """A value of pandas as one of a table."""
+    if isinstance(raw, bool):
+        return "yes" if raw else "no"
+    return None if raw == "" or pd.isna(raw) else raw
+
+
+def _joined(row: _Raw, columns: Iterable[str]) -> str:
+    """Values of some columns with spaces between, whole numbers without decimals."""
+    values = (row[name] for name in columns)
+    texts = (repr(v).removesuffix(".0") if isinstance(v, float) else str(v) for v in values)
+    return " ".join(filter(None, texts))
+
+
+def _of_cell(study: Study, row: _Raw) -> Iterator[CellKey]:
+    """Of a task's method, which has its variant with it or in a column."""
+    label = label_of(row["method"], row.get("variant", ""))
+    yield row["task"], label
+    if (row.get("against"), label) in study.cells:
+        yield row["against"], label
+
+
+def _of_pair(study: Study, row: _Raw) -> Iterator[CellKey]:
+    yield from ((row["task"], row[label]) for label in ("first", "second"))
+
+
+def _of_all_tasks(study: Study, row: _Raw) -> Iterator[CellKey]:
+    scores = study.scores
+    own = scores[scores.method == row["method"]]
+    return zip(own.task.map(str), own.label.map(str), strict=True)
+
+
+def _of_claim(study: Study, row: _Raw) -> Iterator[CellKey]:
+    runs = set(row["runs"].split())
+    return (cell for cell, own in study.run_ids.items() if not runs.isdisjoint(own))
+
+
+_LAYOUTS = read_layouts("files", FileLayout)
+
+
+def _file(
+    name: str,
+    rows: Callable[[Study], pd.DataFrame],
+    cells: Callable[[Study, _Raw], Iterable[CellKey]] = _of_cell,
+) -> CsvFile:
+    return CsvFile(_LAYOUTS[name], rows, cells)
+
+
+METHODS = _file("methods", lambda study: study.methods)
+"""What ``coartic run`` writes."""
+ANALYSES = (
+    _file("claims", lambda study: study.claims, _of_claim),
+    _file("comparisons", lambda study: study.pairs, _of_pair),
+    _file("across_tasks", lambda study: study.overall, _of_all_tasks),
+    _file("profiles", lambda study: study.profiles, _of_all_tasks),
+    _file("signatures", lambda study: study.signatures.drop(columns="label")),
+    _file("anytime", lambda study: study.anytime),
+    _file("targets", lambda study: study.targets),
+    _file("areas", lambda study: study.areas),
+    _file("pareto", lambda study: study.pareto),
+)
+"""What ``coartic analyse`` writes, in its order."""
+VERSIONS = _LAYOUTS["versions"]
+"""Of what ``coartic compare`` writes, which is of two folders."""
+FILES = {file.name: file for file in (METHODS, *ANALYSES)}
+"""All of them by their names."""
