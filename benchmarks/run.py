@@ -93,27 +93,24 @@ class RunReport:
     """Seconds from the first run to the last."""
     manifest: Manifest
     """What was asked for."""
+    kept: int
+    """Runs that the folder has a record of, asked for or not."""
 
     @property
     def records(self) -> Mapping[str, Record]:
         """The records of the plan by run id, in its order, each read when it is asked for."""
-        return Packs(self.folder).only(self._ids)
+        return Packs(self.folder).only(self._ids())
 
-    @cached_property
-    def _ids(self) -> list[str]:
-        cells = self.manifest.specification.cells
-        return [id_ for cell in cells for id_ in self.manifest.run_ids(cell)]
-
-    @cached_property
+    @property
     def others(self) -> int:
         """Runs in the folder that were not asked for: of another suite, of more of this one, or
         the same ones made by other code."""
-        return len(Packs(self.folder)) - len(self.records)
+        return self.kept - self.progress.total
 
     @cached_property
     def stale(self) -> int:
         """Runs in the folder that were asked for and are of other code."""
-        return len(Store(self.folder).stale(self._ids)) if self.others else 0
+        return len(Store(self.folder).stale(self._ids())) if self.others else 0
 
     @property
     def crashed(self) -> int:
@@ -127,6 +124,10 @@ class RunReport:
             f"done in {self.wall_s:.1f} s; {progress.failed} failed. Results in {self.folder}"
             f"{self._without}"
         )
+
+    def _ids(self) -> list[str]:
+        cells = self.manifest.specification.cells
+        return [id_ for cell in cells for id_ in self.manifest.run_ids(cell)]
 
     @property
     def _without(self) -> str:
@@ -198,7 +199,9 @@ class SuitePlan:
                 failed = total - statuses(folder)["ok"]
                 progress = Progress(total, present=total, failed=failed)
                 watch(progress, None)
-                return RunReport(folder, progress, time.perf_counter() - clock, manifest)
+                return RunReport(
+                    folder, progress, time.perf_counter() - clock, manifest, len(store.packs())
+                )
             threading.Thread(target=_import_early).start()  # while workers begin
             progress = perform_missing(
                 [spec for cell in self.cells for spec in cell.specs()],
@@ -213,7 +216,7 @@ class SuitePlan:
             write_tables(store, manifest)
             if pages is not None:
                 publish(folder, pages(folder), owner=OWNER, alone=False)
-        return RunReport(folder, progress, wall_s, manifest)
+            return RunReport(folder, progress, wall_s, manifest, len(store.packs()))
 
     def _manifest(self) -> Manifest:
         return manifest_of(

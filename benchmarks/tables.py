@@ -15,7 +15,7 @@ from coartic.benchmarks.store import Store
 from coartic.errors import CoarticError
 from coartic.files import check_folder, check_no_report, digest_of, holds, publish, temporary
 from coartic.inputs import read_bytes
-from coartic.packs import Packs, digest_of_packs
+from coartic.packs import Packs
 from coartic.record import check_together, in_lots
 from coartic.tables import (
     LARGEST_MANIFEST,
@@ -65,7 +65,7 @@ def is_done(store: Store, manifest: Manifest, pages: Collection[str]) -> bool:
         }
         made = {
             "environment": now.model_copy(update=then),
-            "records": digest_of_packs(store.folder),
+            "records": store.packs().digest,
             "tables": found["tables"],
         }
         return manifest.model_copy(update=made).text() == text

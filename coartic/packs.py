@@ -5,7 +5,6 @@ A run that is in more than one pack has the record of the highest number.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import re
 from collections import OrderedDict
@@ -49,19 +48,6 @@ def number_of(path: Path) -> int:
     return int(path.stem)
 
 
-def digest_of_packs(folder: Path) -> str:
-    """:attr:`Packs.digest`, found without looking for runs."""
-    digest = hashlib.sha256()
-    for path in packs_in(folder):
-        with contextlib.suppress(RecordError):
-            digest.update(_entry(path, read_bytes(path, LARGEST_PACK, error=RecordError)))
-    return digest.hexdigest()
-
-
-def _entry(path: Path, data: bytes) -> bytes:
-    return f"{path.name} {hashlib.sha256(data).hexdigest()}\n".encode()
-
-
 class Packs(Mapping[str, Record]):
     """The records of a results folder by run id, as they are when this is made.
 
@@ -84,7 +70,7 @@ class Packs(Mapping[str, Record]):
             except RecordError as error:
                 self.damaged[path] = str(error)
                 continue
-            digest.update(_entry(path, data))
+            digest.update(f"{path.name} {hashlib.sha256(data).hexdigest()}\n".encode())
             found, clean = lines(data)
             if not clean:
                 self.damaged[path] = f"{path}: a line of it is damaged"

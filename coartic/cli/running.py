@@ -100,10 +100,10 @@ class _Comparison:
 
     def show(self, report: RunReport) -> None:
         """Print what fits the terminal, where something was made anew; and what it came to."""
-        from coartic.analysis.report.comparison import notes_of
-
         page = report.folder / "comparison.md"
         if self._made is not None:
+            from coartic.analysis.report.comparison import notes_of
+
             show_data(self._made.tables(), f"see {page}")
             show_lines(f"- {note}" for note in notes_of(self._made))
         say("", f"{report}, this comparison in {page}.")
