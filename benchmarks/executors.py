@@ -18,6 +18,7 @@ from coartic.benchmarks.sandbox import Keeper, keeper
 Job = dict[str, Any]
 Answer = dict[str, Any]
 _LOOK_S = 0.5  # between looks at the keyboard
+_AHEAD = 4  # jobs a worker that may be begun before an answer is taken: answers fill the memory
 
 
 @runtime_checkable
@@ -49,19 +50,20 @@ class Local:
             waiting.put(job)
         answers: queue.SimpleQueue[Answer | BaseException] = queue.SimpleQueue()
         keepers: list[Keeper] = []
+        workers = min(self.workers, len(jobs))
+        room, ended = threading.Semaphore(_AHEAD * workers), threading.Event()
 
         def work() -> None:
             try:
                 with keeper() as own:
                     keepers.append(own)
-                    while True:
+                    while room.acquire() and not ended.is_set():
                         answers.put(own.perform(waiting.get_nowait()))
             except queue.Empty:
                 pass
             except BaseException as error:
                 answers.put(error)
 
-        workers = min(self.workers, len(jobs))
         threads = [threading.Thread(target=work, daemon=True) for _ in range(workers)]
         for thread in threads:
             thread.start()
@@ -73,8 +75,12 @@ class Local:
                     if isinstance(answer, BaseException):
                         raise answer
                     answered += 1
+                    room.release()
                     yield answer
         finally:
+            ended.set()
+            for _ in threads:
+                room.release()
             if answered < len(jobs):
                 for own in keepers:
                     own.dismiss()

@@ -14,8 +14,8 @@ import psutil
 import pytest
 
 from coartic import CoarticError, load_task
+from coartic.benchmarks import executors, sandbox
 from coartic.benchmarks import registry as registry_module
-from coartic.benchmarks import sandbox
 from coartic.benchmarks.executors import Local
 from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.registry import registry
@@ -420,6 +420,38 @@ def test_a_line_from_elsewhere_is_no_answer():
         own.close()
     assert isinstance(answer, Failure)
     assert answer.reason == "it answered what nobody had asked"
+
+
+class Quick:
+    """Answers at once."""
+
+    def __init__(self):
+        self.begun = []
+
+    def perform(self, job):
+        self.begun.append(job["run_id"])
+        return job
+
+    def dismiss(self):
+        pass
+
+
+def test_workers_run_little_ahead_of_who_takes_their_answers(monkeypatch):
+    """Of a million runs the answers would fill the memory."""
+    quick = Quick()
+    monkeypatch.setattr(executors, "keeper", lambda: contextlib.nullcontext(quick))
+    answers = Local(2).perform([{"run_id": number} for number in range(500)])
+    for taken in range(1, 30):
+        next(answers)
+        time.sleep(0.002)
+        assert len(quick.begun) <= taken + 8
+    assert len(list(answers)) == 471
+    assert sorted(quick.begun) == list(range(500))
+    assert list(Local(2).perform([])) == []
+    ended = Local(2).perform([{"run_id": number} for number in range(500)])
+    next(ended)
+    ended.close()
+    assert len(quick.begun) <= 500 + 9 + 2
 
 
 def test_a_worker_that_cannot_start_is_a_sentence(known, monkeypatch):
