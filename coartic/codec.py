@@ -12,8 +12,8 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -24,7 +24,7 @@ from coartic.stored import Seed
 FULL = 1 << 26
 """Bytes of a pack from which on another one is begun."""
 _COMMON = b"common"
-_LINE = re.compile(rb"(common|[0-9a-f]{16}-[0-9a-f]+) ([0-9a-f]{64}) (.+)", re.DOTALL)
+_HEAD = re.compile(rb"(common|[0-9a-f]{16}-[0-9a-f]+) ([0-9a-f]{64}) (?=.)", re.DOTALL)
 
 
 class _CommonLine(Common):
@@ -35,15 +35,21 @@ class _RunLine(Own):
     seed: Seed
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(NamedTuple):
     """The record of a run as it was found, not yet read."""
 
     run_id: str
     common: bytes
     """The JSON before it, whatever it is; empty where there is none."""
     checksum: bytes
-    own: bytes
+    pack: bytes
+    begin: int
+    end: int
+
+    @property
+    def own(self) -> bytes:
+        """Its JSON."""
+        return self.pack[self.begin : self.end]
 
 
 def encode(records: Iterable[Record]) -> Iterator[bytes]:
@@ -67,15 +73,19 @@ def encode(records: Iterable[Record]) -> Iterator[bytes]:
 def lines(data: bytes) -> tuple[list[Line], bool]:
     """The runs of a pack, and whether there is nothing else in it."""
     found, common, clean = [], b"", data.endswith(b"\n")
-    for line in data.split(b"\n")[:-1] if clean else data.split(b"\n"):
-        parts = _LINE.fullmatch(line)
-        if parts is None:
+    begin, size = 0, len(data)
+    while begin < size:
+        end = data.find(b"\n", begin)
+        end = size if end < 0 else end
+        head = _HEAD.match(data, begin, end)
+        if head is None:
             clean = False
-        elif parts[1] == _COMMON:
-            common = parts[3]
-            clean = clean and parts[2] == _checksum(common)
+        elif head[1] == _COMMON:
+            common = data[head.end() : end]
+            clean = clean and head[2] == _checksum(common)
         else:
-            found.append(Line(parts[1].decode(), common, parts[2], parts[3]))
+            found.append(Line(head[1].decode(), common, head[2], data, head.end(), end))
+        begin = end + 1
     return found, clean
 
 

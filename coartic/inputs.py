@@ -59,7 +59,10 @@ def read_bytes(path: str | Path, most: int, *, error: type[CoarticError] = Coart
     shown = plain(str(path))
     with open_regular(path, error=error) as file:
         try:
-            content = file.read(most + 1)
+            size = min(os.fstat(file.fileno()).st_size, most)
+            content = file.read(size + 1)  # room for ``most`` would be made at once
+            if len(content) > size:  # it grew meanwhile
+                content += file.read(most + 1 - len(content))
         except OSError as failure:
             raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
     if len(content) > most:
