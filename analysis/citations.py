@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from coartic import __version__
-from coartic.analysis.methods import METHODS
+from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.references import Reference, references
 from coartic.analysis.words import slugs
 from coartic.text import one_line
@@ -90,7 +90,7 @@ def bibliography(
     reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
     others = []
     for method in methods:
-        row = METHODS.get(method.id) if method.built_in else None
+        row = KNOWN_METHODS.get(method.id) if method.built_in else None
         if row is None:
             others.append(method)
             continue

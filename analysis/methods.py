@@ -50,7 +50,7 @@ class KnownMethod(BaseModel):
     """Keys of the works behind what poses and solves its programmes."""
 
 
-METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).validate_python(
+KNOWN_METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).validate_python(
     stated(__file__)
 )
 """Rows of the built-in methods by id, in the order of lists and figures."""
@@ -96,7 +96,7 @@ def spoken_name(label: str) -> str:
     if label.startswith(LEARNER):
         return f"{FAMILIES['dual-process']} {name}"
     _, apart, rest = name.partition(": ")
-    return f"{family_of(label)} ({rest})" if apart and label in METHODS else name
+    return f"{family_of(label)} ({rest})" if apart and label in KNOWN_METHODS else name
 
 
 def short_name(label: str) -> str:
@@ -109,7 +109,7 @@ def short_name(label: str) -> str:
     if label.startswith(TOGETHER):
         return label.replace(LEARNER.rstrip("/"), FAMILIES["dual-process"], 1)
     method, _, variant = label.partition(" ")
-    name = METHODS[method].short if method in METHODS else method
+    name = KNOWN_METHODS[method].short if method in KNOWN_METHODS else method
     for key, words in _PARAMETERS.items():
         variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
     if not variant:

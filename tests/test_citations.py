@@ -9,7 +9,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.citations import PAPER, MethodSource, behind_analysis, bibliography, software
-from coartic.analysis.methods import METHODS, KnownMethod
+from coartic.analysis.methods import KNOWN_METHODS, KnownMethod
 from coartic.analysis.references import parse, references
 from coartic.analysis.results.laws import read_manifest
 from coartic.analysis.signatures.register import REGISTER
@@ -43,7 +43,7 @@ def surnames(key):
 
 @pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
 def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
-    keys, text = METHODS[method.name].works, plain(method.citation)
+    keys, text = KNOWN_METHODS[method.name].works, plain(method.citation)
     if not keys:
         assert text.startswith("This package")
     named = set(re.findall(r"(?:[A-Z]\.-?)+(?: [A-Z]\.)* ([A-Z][\w-]+)", text))
@@ -59,11 +59,11 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
 
 
 def test_every_method_has_a_row_and_every_row_a_method():
-    assert list(METHODS) == [method.name for method in BUILT_IN]
+    assert list(KNOWN_METHODS) == [method.name for method in BUILT_IN]
 
 
 def test_every_entry_is_used():
-    behind_methods = {key for row in METHODS.values() for key in (*row.works, *row.solvers)}
+    behind_methods = {key for row in KNOWN_METHODS.values() for key in (*row.works, *row.solvers)}
     assert {PAPER, *ANALYSIS} | behind_methods == set(BIB)
 
 
@@ -76,13 +76,13 @@ def test_solvers_are_cited_where_the_code_uses_them(method):
     if "from coartic.baselines.cascade import" in text:
         due = {"arnstrom2022"}
         assert method.Parameters().solver == "daqp"
-    assert set(METHODS[method.name].solvers) == due
+    assert set(KNOWN_METHODS[method.name].solvers) == due
 
 
 def test_works_behind_analysis_and_solvers_are_named():
     texts = [*ROOT.glob("analysis/**/*.py"), *ROOT.glob("docs/*.md")]
     text = plain("\n".join(path.read_text(encoding="utf-8") for path in texts))
-    for key in (*ANALYSIS, *(key for row in METHODS.values() for key in row.solvers)):
+    for key in (*ANALYSIS, *(key for row in KNOWN_METHODS.values() for key in row.solvers)):
         first = plain(BIB[key].fields["author"]).partition(",")[0]
         assert re.search(rf"{first}[^\n]*\n?[^\n]*{BIB[key].fields['year']}", text), key
 

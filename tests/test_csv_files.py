@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError
-from coartic.analysis.report.tables.files import FILES, METHODS, csv_text
+from coartic.analysis.report.tables.files import FILES, METHOD_ROWS, csv_text
 from coartic.analysis.report.trace import find_trace, trace_in_file
 from tests.support.made_up import MadeUp
 from tests.support.reports import changed_columns
@@ -27,7 +27,7 @@ def test_every_column_is_stated_and_typed(traced, tables):
         for row in tables[name].rows:
             assert row.all_cells <= traced.cells.keys()
     with pytest.raises(ValueError, match=r"methods has columns .*'more'"):
-        csv_text(METHODS.layout, traced.methods.assign(more=1))
+        csv_text(METHOD_ROWS.layout, traced.methods.assign(more=1))
 
 
 def test_rows_name_what_they_were_computed_from(traced, tables):

@@ -32,7 +32,7 @@ from coartic.analysis.figures.register import SECTIONS
 from coartic.analysis.figures.style import ONE, RC, TWO, amount, looks, number, on, widest
 from coartic.analysis.figures.svg import compact, relative
 from coartic.analysis.figures.tasks import tasks_plot
-from coartic.analysis.methods import METHODS, short_name
+from coartic.analysis.methods import KNOWN_METHODS, short_name
 from coartic.analysis.published import TRIALS
 from coartic.analysis.study import Study
 from coartic.benchmarks.suites import load_suite, select_cells
@@ -498,7 +498,7 @@ def test_svg_for_a_page(kinds):
 def test_short_names_and_looks_tell_methods_apart():
     labels = list(KNOWN)
     assert len({short_name(label) for label in labels}) == len(labels)
-    drawn = [name for name, row in METHODS.items() if row.look]
+    drawn = [name for name, row in KNOWN_METHODS.items() if row.look]
     assert len(set(looks(drawn).values())) == len(drawn)
     own = looks(f"own-{k}" for k in range(20))
     assert len(set(own.values())) == 20

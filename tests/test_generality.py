@@ -26,7 +26,7 @@ from coartic.analysis.report.build import build
 from coartic.analysis.report.formats.markdown import markdown
 from coartic.analysis.report.tables.families import family_tables
 from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import Optimum
+from coartic.analysis.results.optima import KnownOptimum
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.study import Study
 from coartic.analysis.words import true_minus
@@ -65,7 +65,9 @@ def study_of(
     for family in families:
         for number, name in enumerate(names_in(f"{family}/{split}000..{split}{count - 1:03d}")):
             tasks.append(load_task(name))
-            known[name, "free"] = Optimum(BEST, hands_of(name), BEST if number % 2 else BEST + 50)
+            known[name, "free"] = KnownOptimum(
+                BEST, hands_of(name), BEST if number % 2 else BEST + 50
+            )
             for label, centre in centres.items():
                 if (label == EC1) == (family in ONE) or label == INITIAL:
                     value = centre(number) if callable(centre) else centre

@@ -10,7 +10,7 @@ import pytest
 from coartic import builtin_tasks, execute, load_task
 from coartic.analysis.results import optima
 from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import Entry, collect, entries, essence
+from coartic.analysis.results.optima import ShippedOptimum, collect, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.method import MethodError, Session
 from coartic.rows import movement_rows, movements_from
@@ -143,7 +143,7 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     rows.to_parquet(tmp_path / "solutions.parquet")
     (entry,) = collect(Results(Path(tmp_path), manifest_for([task]), runs, pd.DataFrame()))
     assert (entry.reward, entry.bound, entry.run_ids) == (-292, -280, ("r1",))
-    again = Entry.model_validate_json(entry.model_dump_json()).solution
+    again = ShippedOptimum.model_validate_json(entry.model_dump_json()).solution
     assert execute(task, movements_from(task, pd.DataFrame(list(again)))).reward == -292
 
 

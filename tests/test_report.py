@@ -39,7 +39,7 @@ from coartic.analysis.report.formats.latex import PACKAGES, is_long, latex_table
 from coartic.analysis.report.formats.markdown import markdown
 from coartic.analysis.report.formats.terminal import terminal_table
 from coartic.analysis.report.summary import without_variants
-from coartic.analysis.report.tables.layout import LAYOUTS, Layout, with_legends
+from coartic.analysis.report.tables.layout import LAYOUTS, TableLayout, with_legends
 from coartic.analysis.report.text import number_text, parts, texts
 from coartic.analysis.report.write import write_report
 from coartic.analysis.words import typographic
@@ -639,8 +639,8 @@ def test_a_layout_has_the_columns_that_it_speaks_of():
         layout.row("a", method="a", gain=1.0)
     fields = dict(layout) | {"intervals": {"gain": ""}}
     with pytest.raises(ValidationError, match="intervals of no columns: gain"):
-        Layout.model_validate(fields)
+        TableLayout.model_validate(fields)
     with pytest.raises(ValidationError, match="colour"):
-        Layout.model_validate(
+        TableLayout.model_validate(
             dict(layout) | {"columns": [{"name": "a", "header": "a", "colour": 1}]}
         )

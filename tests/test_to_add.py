@@ -68,10 +68,31 @@ def longest_table(study: Study) -> DataTable | None:
 '''
 SAID = """
 [longest]
+rests_on = ["runs"]
 caption = "Longest runs."
 [longest.columns]
 task = {}
 ticks = { kind = "number" }
+"""
+
+PROPERTY = """
+    @property
+    def spent(self) -> pd.DataFrame:
+        \"""Ticks that each run made.\"""
+        return self.runs[["task", "method", "run", "movement_ticks"]]
+
+    @cached_property
+    def claims("""
+COLUMNS = """
+[spent]
+caption = "Ticks."
+rests_on = ["runs"]
+key = ["task", "method", "run"]
+[spent.columns]
+task = {}
+method = {}
+run = { kind = "number" }
+movement_ticks = { kind = "number", unit = "ticks" }
 """
 
 
@@ -86,7 +107,9 @@ def look(house):
     coartic.__path__.insert(0, str(house))  # the other packages come from here
     from coartic import analysis, baselines, benchmarks
     from coartic.analysis.figures import register
+    from coartic.analysis.report.analyses import analyse
     from coartic.analysis.report.build import build
+    from coartic.analysis.report.trace import trace_in_file
     from coartic.benchmarks import Selection, run_suite
     from coartic.benchmarks.registry import CLASSES
     from tests.support.reports import undrawn
@@ -110,6 +133,9 @@ def look(house):
     assert "dots" in {figure.id for figure in document.figures()}
     (longest,) = tables["longest"].rows
     assert longest.values == ("ascending", int(-study.runs.reward.min()))
+    assert analyse(study)["spent.csv"].startswith(b"task,method,run,movement_ticks\n")
+    row, cell = "ascending nearest-hand 0", ("ascending", "nearest-hand")
+    assert trace_in_file(house / "results", "spent.csv", (row, "movement_ticks")).cells == (cell,)
 
 
 LEFT_OUT = shutil.ignore_patterns("example")
@@ -157,7 +183,7 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
     change(
         "analysis/figures/register.py",
         "REGISTER = (\n",
-        'REGISTER = (\n    Entry("dots", dots, "learning"),\n',
+        'REGISTER = (\n    FigureEntry("dots", dots, "learning"),\n',
     )
     # A table: what it says, a function, an import and its call.
     append("analysis/report/tables/tables.toml", SAID)
@@ -171,5 +197,13 @@ def test_what_is_added_by_its_steps_is_in_a_report(house):
         "analysis/report/build.py",
         "[tasks_table(study)]",
         "[tasks_table(study), longest_table(study)]",
+    )
+    # A CSV file: a property, its columns, a row.
+    change("analysis/study.py", "\n    @cached_property\n    def claims(", PROPERTY)
+    append("analysis/report/tables/files.toml", COLUMNS)
+    change(
+        "analysis/report/tables/files.py",
+        "ANALYSES = (\n",
+        'ANALYSES = (\n    _file("spent", lambda study: study.spent),\n',
     )
     apart(look, house)

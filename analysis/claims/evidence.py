@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.report.document import DataTable, Row, Value
-from coartic.analysis.report.tables.layout import LAYOUTS, Layout
+from coartic.analysis.report.tables.layout import LAYOUTS, TableLayout
 from coartic.analysis.results.optima import ARMS, OtherArm
 from coartic.analysis.statistics.estimates import Inference, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
@@ -53,7 +53,7 @@ def measured(claim: str, evidence: str, rows: Sequence[Row], **facts: float) -> 
     return Finding(None, evidence, table=table if rows else None)
 
 
-def layout(claim: str) -> Layout:
+def layout(claim: str) -> TableLayout:
     """What the table of its evidence says."""
     return LAYOUTS[f"evidence-{claim}"]
 

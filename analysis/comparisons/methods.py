@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.results.folder import Cell, CellKey, CellRuns
+from coartic.analysis.results.folder import CellIdentity, CellKey, CellRuns
 from coartic.analysis.results.optima import locks_base
 from coartic.analysis.statistics.spread import sd
 from coartic.analysis.words import tally
@@ -46,7 +46,7 @@ STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 
 
 @dataclass(frozen=True)
-class MethodRow(Cell):
+class MethodRow(CellIdentity):
     """A method on a task; NaN is for what is not known, such as times of runs that crashed.
 
     Rewards are of runs with a solution; what was spent is the median over all runs.

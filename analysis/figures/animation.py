@@ -47,7 +47,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Timing:
+class Pace:
     """Which ticks are shown, and for how long."""
 
     stride: int
@@ -60,7 +60,7 @@ class Timing:
     """Times that the last frame is repeated."""
 
 
-def timing(ticks: int, speed: float | None = None) -> Timing:
+def timing(ticks: int, speed: float | None = None) -> Pace:
     """Frames of a movement of ``ticks`` rows at ``speed`` (ticks per second).
 
     Without a speed it lasts :data:`LASTS_S`, or less where that would be slower than a tick a
@@ -70,7 +70,7 @@ def timing(ticks: int, speed: float | None = None) -> Timing:
     stride = max(1, math.ceil(speed / RATE - 1e-9))
     interval = max(2, round(100 * stride / speed)) / 100
     rows = tuple(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
-    return Timing(stride, interval, rows, max(1, round(HOLD_S / interval)))
+    return Pace(stride, interval, rows, max(1, round(HOLD_S / interval)))
 
 
 def animate(
@@ -80,7 +80,7 @@ def animate(
     speed: float | None = None,
     width: int = 800,
     replace: bool = False,
-) -> Timing:
+) -> Pace:
     """Draw movements side by side, all from their first tick, into ``path``; their timing.
 
     ``speed`` is in ticks per second, ``width`` of the picture in pixels. A movement that ends
@@ -235,7 +235,7 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[_Film, list[_Scene]]:
     return figure, [_Scene(*of) for of in zip(figure.axes, movements, strict=True)]
 
 
-def _writer(path: Path, timed: Timing) -> Any:
+def _writer(path: Path, timed: Pace) -> Any:
     rate: Any = 1 / timed.interval_s
     if path.suffix.lower() == ".mp4":
         return FFMpegWriter(fps=rate, codec="h264")

@@ -17,7 +17,7 @@ from coartic.analysis.figures.robot import box, numbered_below
 from coartic.robot import Array
 
 if TYPE_CHECKING:
-    from coartic.analysis.figures.animation import Panel, Timing
+    from coartic.analysis.figures.animation import Pace, Panel
 
 _TITLE, _FOOT, _GAP = 26.0, 26.0, 14.0  # pixels above and below a panel, and between two
 _DEFS = (
@@ -35,7 +35,7 @@ _STYLE = (
 )
 
 
-def moving_picture(panels: Sequence[Panel], timed: Timing, width: int) -> bytes:
+def moving_picture(panels: Sequence[Panel], timed: Pace, width: int) -> bytes:
     """Movements side by side, all from their first tick, over and over, as an SVG.
 
     ``width`` in pixels. A movement that ends before the others stands still; bars below show the
@@ -69,7 +69,7 @@ class _View:
     """Where and when things are in every panel."""
 
     def __init__(
-        self, timed: Timing, scale: float, corner: Array, wide: float, tall: float, longest: int
+        self, timed: Pace, scale: float, corner: Array, wide: float, tall: float, longest: int
     ) -> None:
         self._scale, self._corner, self._longest = scale, corner, longest
         self._wide, self._tall = wide, tall

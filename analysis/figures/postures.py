@@ -29,7 +29,7 @@ _RUNS: Any = {"linewidth": 0.4, "alpha": 0.25, "zorder": 1}
 
 
 @dataclass(frozen=True)
-class Contexts:
+class ContextPair:
     """A method's runs that hit one goal before either of two others."""
 
     method: str
@@ -50,7 +50,7 @@ class Contexts:
     """Of the permutation test; NaN where there is none."""
 
 
-def contexts(study: Study, methods: Sequence[str] | None = None) -> Contexts | None:
+def contexts(study: Study, methods: Sequence[str] | None = None) -> ContextPair | None:
     """The first goal that two tasks share before they differ, by the paper's learner if it ran.
 
     None where no method has solved runs on two such tasks.
@@ -73,7 +73,7 @@ def contexts(study: Study, methods: Sequence[str] | None = None) -> Contexts | N
     same = same[(same.task == row.task) & (same.label == label) & (same["where"] == row["where"])]
     of = same.set_index("signature")
     spreads = of.loc["context dependence"] if "context dependence" in of.index else None
-    return Contexts(
+    return ContextPair(
         label,
         goal,
         (first, second),
@@ -107,7 +107,7 @@ def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     return worded("postures", figure, _data(found), found.tasks, found=found, method=method)
 
 
-def _draw(axes: Axes, found: Contexts) -> None:
+def _draw(axes: Axes, found: ContextPair) -> None:
     axes.set_axis_off()
     axes.set_aspect("equal")
     shown = np.concatenate([q.mean(axis=0)[None] for q in found.postures])
@@ -161,7 +161,7 @@ def _base(axes: Axes, task: Task, q: Array, color: str, *, above: bool) -> None:
     )  # fmt: skip
 
 
-def _data(found: Contexts) -> pd.DataFrame:
+def _data(found: ContextPair) -> pd.DataFrame:
     """One row a run: task and posture at the shared goal."""
     parts = []
     for task, runs in zip(found.tasks, found.postures, strict=True):

@@ -47,7 +47,7 @@ SECTIONS: tuple[Section, ...] = get_args(Section)
 """In the order of a report."""
 
 
-class Entry(NamedTuple):
+class FigureEntry(NamedTuple):
     """One row of the register."""
 
     name: str
@@ -68,24 +68,24 @@ class Entry(NamedTuple):
 
 
 REGISTER = (
-    Entry("tasks", tasks_of, "tasks-drawn", "Figure 4"),
+    FigureEntry("tasks", tasks_of, "tasks-drawn", "Figure 4"),
     *(
-        Entry(name, partial(paper_configurations, name), "movements", figure)
+        FigureEntry(name, partial(paper_configurations, name), "movements", figure)
         for name, (figure, _) in PAPER.items()
     ),
-    Entry("learned-reward", bars, "paper", "Figure 8"),
-    Entry("published", published, "paper"),
-    Entry("learning-curves", learning_curves, "learning"),
-    Entry("recruitment", recruitment, "paper"),
-    Entry("gaps-by-family", gaps_by_family, "families"),
-    Entry("exploration-by-family", exploration_by_family, "families"),
-    Entry("context", context, "coarticulation"),
-    Entry("signatures", signature_matrix, "coarticulation", by_task=True, narrows=False),
-    Entry("frontier", frontier, "cost"),
-    Entry("profiles", profiles, "methods"),
-    Entry("postures", postures, "answers"),
-    Entry("ranking", ranking, "answers", narrows=False),
-    Entry("price", price, "answers", narrows=False),
+    FigureEntry("learned-reward", bars, "paper", "Figure 8"),
+    FigureEntry("published", published, "paper"),
+    FigureEntry("learning-curves", learning_curves, "learning"),
+    FigureEntry("recruitment", recruitment, "paper"),
+    FigureEntry("gaps-by-family", gaps_by_family, "families"),
+    FigureEntry("exploration-by-family", exploration_by_family, "families"),
+    FigureEntry("context", context, "coarticulation"),
+    FigureEntry("signatures", signature_matrix, "coarticulation", by_task=True, narrows=False),
+    FigureEntry("frontier", frontier, "cost"),
+    FigureEntry("profiles", profiles, "methods"),
+    FigureEntry("postures", postures, "answers"),
+    FigureEntry("ranking", ranking, "answers", narrows=False),
+    FigureEntry("price", price, "answers", narrows=False),
 )
 """The paper's figures in its order, and the others."""
 
@@ -170,11 +170,11 @@ class Figures(Mapping[str, Figure]):
         """How many there are."""
         return len(self.plots)
 
-    def _of(self, entry: Entry) -> list[Plot]:
+    def _of(self, entry: FigureEntry) -> list[Plot]:
         found = self._found(entry)
         return [] if isinstance(found, CoarticError) else found
 
-    def _found(self, entry: Entry) -> list[Plot] | CoarticError:
+    def _found(self, entry: FigureEntry) -> list[Plot] | CoarticError:
         """The figures of a row, drawn once, or why there are none."""
         if entry.section == "families" and self._study.instances is None:
             return []  # nothing that is missed

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coartic import CoarticError
-from coartic.analysis.methods import METHODS
+from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.study import Study
 from coartic.text import did_you_mean
 
-HEADLINES = tuple(name for name, row in METHODS.items() if row.headline)
+HEADLINES = tuple(name for name, row in KNOWN_METHODS.items() if row.headline)
 """Methods that stand for their families where none are named, in the order of figures."""
 
 NO_CONTEXTS = "no method has solved runs on two tasks that share their first goals"
@@ -24,7 +24,7 @@ def chosen(study: Study, tasks: Sequence[str], methods: Sequence[str] | None) ->
     not have.
     """
     known_methods(study, methods or ())
-    families = {name.partition("/")[0] for name in METHODS}
+    families = {name.partition("/")[0] for name in KNOWN_METHODS}
     found = {
         label: cell.method.partition("/")[0] not in families
         for (task, label), cell in study.cells.items()

@@ -22,7 +22,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import Task
-from coartic.analysis.methods import METHODS, Color, Dash
+from coartic.analysis.methods import KNOWN_METHODS, Color, Dash
 from coartic.analysis.statistics import estimates
 from coartic.analysis.words import RECONSTRUCTED, marked
 
@@ -86,7 +86,7 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Colour, dash and mark of each method: the project's own look the same in all figures."""
     own = {
         name: Look(_COLORS[row.look[0]], _DASHES[row.look[1]], row.look[2])
-        for name, row in METHODS.items()
+        for name, row in KNOWN_METHODS.items()
         if row.look is not None
     }
     free = itertools.cycle(

@@ -24,7 +24,7 @@ MOST_INSTANCES = 8
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceReward:
     """What the solutions of an instance are measured by."""
 
     best: int
@@ -67,7 +67,7 @@ class Sample:
         return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
     @cached_property
-    def references(self) -> dict[str, Reference]:
+    def references(self) -> dict[str, ReferenceReward]:
         """What the solutions of each instance are measured by, where there is any."""
         runs = self.study.runs
         solved = runs[(runs.status == "ok") & runs.task.isin(list(self.tasks))]
@@ -79,7 +79,7 @@ class Sample:
             if optimum is not None:
                 known.append(optimum.reward)
             if known and max(known) < 0:
-                found[name] = Reference(
+                found[name] = ReferenceReward(
                     max(known),
                     optimum.bound if optimum else None,
                     optimum.searched if optimum else None,

@@ -35,7 +35,7 @@ _SEEDS = 900_000_000  # of runs that judge a reading begin here
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedReading:
     """What is printed of the one-armed tasks, under some readings."""
 
     chosen: tuple[ChosenReading, ...]
@@ -50,7 +50,7 @@ class Judged:
         """All parts as one."""
         return together(self.parts)
 
-    def is_as(self, other: Judged) -> bool:
+    def is_as(self, other: JudgedReading) -> bool:
         """Whether all runs are the same: one arm, or these figures, cannot tell the readings."""
         return self.initial == other.initial and all(
             cell.rewards.tolist() == other.cells[name].rewards.tolist()
@@ -88,7 +88,7 @@ def combinations(pairs: bool) -> Iterator[tuple[str, ...]]:
             yield first, second
 
 
-def judge(texts: Sequence[str], *, runs: int, trials: int = 10_000) -> Judged:
+def judge(texts: Sequence[str], *, runs: int, trials: int = 10_000) -> JudgedReading:
     """Readings, written as ``ties=right``, by runs of their own; same seeds for all."""
     chosen = load_readings(texts)
     model, fields = model_under(chosen), condition_under(chosen)
@@ -114,7 +114,7 @@ def judge(texts: Sequence[str], *, runs: int, trials: int = 10_000) -> Judged:
                         parts.append(replace(part, what=f"{task.name} {part.what}"))
     if any(reward is None for reward in initial.values()):
         parts.append(Likelihood("the initial solution fails", -math.inf, 0.0))
-    return Judged(chosen, initial, cells, tuple(parts))
+    return JudgedReading(chosen, initial, cells, tuple(parts))
 
 
 def judge_all(
@@ -123,11 +123,11 @@ def judge_all(
     runs: int,
     trials: int = 10_000,
     jobs: int = 2,
-    progress: Callable[[Judged], None] = lambda judged: None,
-) -> list[Judged]:
+    progress: Callable[[JudgedReading], None] = lambda judged: None,
+) -> list[JudgedReading]:
     """Each combination of readings, on threads."""
 
-    def perform(texts: Sequence[str]) -> Judged:
+    def perform(texts: Sequence[str]) -> JudgedReading:
         judged = judge(texts, runs=runs, trials=trials)
         progress(judged)
         return judged
@@ -136,14 +136,14 @@ def judge_all(
         return list(pool.map(perform, combined))
 
 
-def judged_table(judgements: Iterable[Judged]) -> pd.DataFrame:
+def judged_table(judgements: Iterable[JudgedReading]) -> pd.DataFrame:
     """A row a combination: figures of its runs, likelihood and chance of what is printed."""
     known = list(judgements)
     default = next((judged for judged in known if not judged.chosen), None)
     return pd.DataFrame([dict(_row(judged, default)) for judged in known])
 
 
-def _row(judged: Judged, default: Judged | None) -> Iterator[tuple[str, object]]:
+def _row(judged: JudgedReading, default: JudgedReading | None) -> Iterator[tuple[str, object]]:
     yield "readings", " ".join(map(str, judged.chosen)) or "default"
     for task, reward in judged.initial.items():
         yield f"{task} initial", reward

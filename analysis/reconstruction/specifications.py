@@ -34,7 +34,7 @@ VERDICTS = get_args(Verdict)[:3]
 
 
 @dataclass(frozen=True)
-class Specification:
+class Assumptions:
     """Choices that the paper leaves open."""
 
     readings: tuple[str, ...]
@@ -49,7 +49,7 @@ class Specification:
         return ", ".join(filter(None, (self.member, *self.readings))) or "default"
 
 
-def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
+def specifications(study: Study) -> Iterator[tuple[Assumptions, Study]]:
     """The specifications in a folder, each as a study of the paper's tasks under it.
 
     Members that are not admitted are none of them, nor are those with goals that another one has.
@@ -61,12 +61,12 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
     plain = tuple(name for name, task in own.items() if task is None)
     if plain:
         view = _seen_as(study.results, {name: name for name in plain})
-        yield Specification(plan.readings, "", ""), Study(view)
+        yield Assumptions(plan.readings, "", ""), Study(view)
     default = {task: task if task in own else f"{task}-m001" for task in with_members()}
     for name, task in members.items():
         others = {at: t for t, at in default.items() if t != task and at in own}
         view = _seen_as(study.results, {name: task} | others)
-        yield Specification(plan.readings, task, name), Study(view)
+        yield Assumptions(plan.readings, task, name), Study(view)
 
 
 def _admitted(study: Study) -> Iterator[str]:
@@ -121,7 +121,7 @@ def judged_specifications(
     *,
     claims: Iterable[Claim] = PAPERS,
     jobs: int = 1,
-    progress: Callable[[Specification], None] = lambda spec: None,
+    progress: Callable[[Assumptions], None] = lambda spec: None,
 ) -> pd.DataFrame:
     """A row a specification and claim of the paper that its runs can judge.
 
@@ -146,8 +146,8 @@ def judged_specifications(
 
 
 def _judged(
-    spec: Specification, results: Results, claims: Collection[str]
-) -> tuple[Specification, list[dict[str, Any]], list[str]]:
+    spec: Assumptions, results: Results, claims: Collection[str]
+) -> tuple[Assumptions, list[dict[str, Any]], list[str]]:
     """Rows of a specification, and the claims that its own runs can judge."""
     seen, rows, known = Study(results), [], []
     own = set(seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id)
@@ -162,7 +162,7 @@ def _judged(
     return spec, rows, known
 
 
-def _row(spec: Specification, judged: Judged) -> Iterator[tuple[str, Any]]:
+def _row(spec: Assumptions, judged: Judged) -> Iterator[tuple[str, Any]]:
     yield "readings", " ".join(spec.readings)
     yield "task", spec.task
     yield "member", spec.member

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from coartic import CoarticError, builtin_tasks
 from coartic.analysis.report.document import CellKey, DataTable, Document
 from coartic.analysis.report.numbers import Number
-from coartic.analysis.results.optima import Optimum
+from coartic.analysis.results.optima import KnownOptimum
 from coartic.record import Environment
 from coartic.stored import content_hash
 from coartic.tables import Plan
@@ -56,7 +56,7 @@ class TraceFile(BaseModel):
     environment: Environment
     sources: tuple[Source, ...]
     numbers: tuple[Number, ...]
-    optima: tuple[tuple[str, str, Optimum], ...]
+    optima: tuple[tuple[str, str, KnownOptimum], ...]
     """With task and other arm."""
     tables: tuple[DataTable, ...]
 

@@ -24,7 +24,7 @@ CellKey = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class Cell:
+class CellIdentity:
     """One method with parameters on one task."""
 
     task: str
@@ -38,7 +38,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class CellRuns(Cell):
+class CellRuns(CellIdentity):
     """A cell and its runs."""
 
     runs: pd.DataFrame

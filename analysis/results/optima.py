@@ -41,7 +41,7 @@ KEPT = ("start", "radius", "hands", "locked_base", "robot")
 """What makes a task beside its goals."""
 
 
-class Entry(BaseModel):
+class ShippedOptimum(BaseModel):
     """What is shipped of one task under one restriction: a reward, or why there is none."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -72,7 +72,7 @@ class Entry(BaseModel):
 
 
 @dataclass(frozen=True)
-class Optimum:
+class KnownOptimum:
     """The best reward known for one task under one restriction, and what it rests on."""
 
     reward: int
@@ -102,14 +102,14 @@ class Optimum:
         return f"{'proven' if self.proven else 'not proven'}; {self.source}"
 
 
-def optima(study: Study) -> dict[tuple[str, str], Optimum]:
+def optima(study: Study) -> dict[tuple[str, str], KnownOptimum]:
     """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
 
     What the shipped data say where task and model are the same in all that matters, bettered by
     what the folder's own searches found; these are named as its source wherever they give it.
     Searches of an instance of a family are short, and any run of the folder may better them.
     """
-    found: dict[tuple[str, str], Optimum] = {}
+    found: dict[tuple[str, str], KnownOptimum] = {}
     runs = study.runs
     solved = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
     for name, task in study.tasks.items():
@@ -120,7 +120,7 @@ def optima(study: Study) -> dict[tuple[str, str], Optimum]:
             entry = _shipped().get((essence(task), arm)) if study.model == PAPER else None
             if entry is not None and entry.reward is not None:
                 best = tuple(entry.searches.items())
-                candidates.append(Optimum(entry.reward, entry.hands, entry.bound, best))
+                candidates.append(KnownOptimum(entry.reward, entry.hands, entry.bound, best))
             if candidates:
                 stored = f"{SHIPPED}, runs {', '.join(entry.run_ids if entry else ())}"
                 found[name, arm] = _best(candidates, searches, stored)
@@ -145,13 +145,13 @@ def essence(task: Task) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def entries() -> list[Entry]:
+def entries() -> list[ShippedOptimum]:
     """The shipped data, one entry per task and restriction."""
     content = json.loads(DATA.read_text(encoding="utf-8"))
-    return [Entry.model_validate(entry) for entry in content["optima"]]
+    return [ShippedOptimum.model_validate(entry) for entry in content["optima"]]
 
 
-def collect(results: Results) -> list[Entry]:
+def collect(results: Results) -> list[ShippedOptimum]:
     """Entries of ``optima.json`` from a results folder of suite ``optimum``.
 
     Raises CoarticError where the folder has no searches for the optimum.
@@ -175,7 +175,7 @@ def collect(results: Results) -> list[Entry]:
             rows = movements[movements.run_id == first].drop(columns="run_id")
             facts = {key: getattr(best, key) for key in ("reward", "hands", "bound")}
             facts |= {"searches": dict(best.searches), "solution": rows.to_dict("records")}
-        entry = Entry(
+        entry = ShippedOptimum(
             task=name,
             essence=essence(results.tasks[name]),
             base=base,
@@ -188,7 +188,7 @@ def collect(results: Results) -> list[Entry]:
     return found
 
 
-def renew(new: Iterable[Entry]) -> int:
+def renew(new: Iterable[ShippedOptimum]) -> int:
     """Put entries into ``optima.json`` in the place of those about the same; how many stay."""
     kept = {entry.key: entry for entry in entries()}
     renewed = {entry.key: entry for entry in new}
@@ -219,11 +219,11 @@ def _restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _from_runs(runs: pd.DataFrame) -> Optimum:
+def _from_runs(runs: pd.DataFrame) -> KnownOptimum:
     best = runs.iloc[int(runs.reward.astype(int).argmax())]
     bounds = runs.proven_bound.dropna()
     searches = runs.groupby("method").reward.max()
-    return Optimum(
+    return KnownOptimum(
         reward=int(best.reward),
         hands=str(best.hands),
         bound=int(bounds.min()) if len(bounds) else None,
@@ -232,8 +232,8 @@ def _from_runs(runs: pd.DataFrame) -> Optimum:
 
 
 def _best(
-    candidates: list[Optimum], searches: Mapping[tuple[str, str], pd.DataFrame], stored: str
-) -> Optimum:
+    candidates: list[KnownOptimum], searches: Mapping[tuple[str, str], pd.DataFrame], stored: str
+) -> KnownOptimum:
     """The best reward with the lowest bound of all, and where the two are from."""
     best = max(candidates, key=lambda optimum: optimum.reward)
     bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
@@ -246,7 +246,7 @@ def _best(
     return replace(best, bound=bound, source=source, cells=cells)
 
 
-def _bettered(known: Optimum, runs: pd.DataFrame) -> Optimum:
+def _bettered(known: KnownOptimum, runs: pd.DataFrame) -> KnownOptimum:
     """With the best of all solved runs of a task, where that is more than what is known."""
     solved = runs[(runs.status == "ok") & ~runs.parameters.map(_locks_base)]
     if not len(solved) or int(solved.reward.max()) <= known.reward:
@@ -261,7 +261,7 @@ def _bettered(known: Optimum, runs: pd.DataFrame) -> Optimum:
 
 
 @cache
-def _shipped() -> dict[tuple[str, str], Entry]:
+def _shipped() -> dict[tuple[str, str], ShippedOptimum]:
     """Entries with the task's own base, by the task's essence and the other arm."""
     return {(entry.essence, entry.other_arm): entry for entry in entries() if entry.base == BASE}
 

@@ -18,7 +18,7 @@ from coartic.analysis.signatures.context import (
     lead_time,
     permutation_p,
 )
-from coartic.analysis.signatures.locus import LEAST, Family, locus_slopes, slope_norm
+from coartic.analysis.signatures.locus import LEAST, ContextFamily, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
 from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
 from coartic.analysis.signatures.trajectories import Trajectories, last_ticks, postures
@@ -31,7 +31,7 @@ NO_SPREAD = "one run a context: no spread within contexts, no test"
 
 
 @dataclass(frozen=True)
-class Contexts:
+class TwoContexts:
     """Runs of one method that hit the same goal with the same hand before other successors."""
 
     first: Trajectories
@@ -74,19 +74,19 @@ class Contexts:
         return signature.at(self.place, value=value, p=float(p), n=self.n, why_not=why_not)
 
 
-def context_distance(contexts: Contexts, signature: Signature) -> Rows:
+def context_distance(contexts: TwoContexts, signature: Signature) -> Rows:
     """Distance of mean postures."""
     yield signature.at(contexts.place, value=distance(*contexts.postures), n=contexts.n)
 
 
-def dependence(contexts: Contexts, signature: Signature) -> Rows:
+def dependence(contexts: TwoContexts, signature: Signature) -> Rows:
     """The distance in pooled standard deviations, with its test."""
     value = context_dependence(*contexts.postures)
     why = "runs do not differ within contexts" if math.isnan(value) else ""
     yield contexts.row(signature, value, NO_SPREAD if contexts.single else why)
 
 
-def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Rows:
+def parts(contexts: TwoContexts, equivalent: Signature, other: Signature) -> Rows:
     """The difference that leaves the hand in place, and the one that moves it."""
     first, second = contexts.postures
     task = contexts.first.task
@@ -101,7 +101,7 @@ def parts(contexts: Contexts, equivalent: Signature, other: Signature) -> Rows:
         yield contexts.row(signature, value, why, wide)
 
 
-def lead(contexts: Contexts, signature: Signature) -> Rows:
+def lead(contexts: TwoContexts, signature: Signature) -> Rows:
     """How long before the hit contexts differ."""
     place, n = contexts.place, contexts.n
     if contexts.single:
@@ -122,7 +122,7 @@ def lead(contexts: Contexts, signature: Signature) -> Rows:
 class Members:
     """What one method did on the tasks of a family."""
 
-    family: Family
+    family: ContextFamily
     of_task: Mapping[str, Trajectories]
     """Those that it did, in the order of the family."""
 

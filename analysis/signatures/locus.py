@@ -31,7 +31,7 @@ LEAST = 3
 
 
 @dataclass(frozen=True)
-class Family:
+class ContextFamily:
     """Tasks that differ in exactly one goal."""
 
     moving: int
@@ -43,7 +43,7 @@ class Family:
     where only one changes."""
 
 
-def families(tasks: Mapping[str, Task]) -> list[Family]:
+def families(tasks: Mapping[str, Task]) -> list[ContextFamily]:
     """The largest sets of at least three tasks that are the same but for one goal."""
     found = []
     groups: dict[tuple[int, str], list[str]] = {}
@@ -55,11 +55,11 @@ def families(tasks: Mapping[str, Task]) -> list[Family]:
     for (index, _), names in groups.items():
         goals = np.array([tasks[name].goals[index] for name in names])
         if len(np.unique(goals, axis=0)) >= LEAST:
-            found.append(Family(index + 1, tuple(names), _along(goals)))
+            found.append(ContextFamily(index + 1, tuple(names), _along(goals)))
     return found
 
 
-def variants(groups: Sequence[Family]) -> list[set[str]]:
+def variants(groups: Sequence[ContextFamily]) -> list[set[str]]:
     """Tasks that families join, directly or through tasks that they share."""
     joined = DisjointSet(name for family in groups for name in family.tasks)
     for family in groups:

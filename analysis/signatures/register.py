@@ -19,7 +19,7 @@ import pandas as pd
 from pydantic import TypeAdapter
 
 from coartic.analysis.generality.sample import one_by_one
-from coartic.analysis.signatures.between import Contexts, Members
+from coartic.analysis.signatures.between import Members, TwoContexts
 from coartic.analysis.signatures.context import context_pairs
 from coartic.analysis.signatures.locus import LEAST, families, variants
 from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
@@ -87,7 +87,7 @@ def signature_rows(study: Study) -> list[SignatureRow]:
 def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
     """Of every shared goal with every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
-        every = [Contexts(first, second, goal, hand) for hand in HANDS]
+        every = [TwoContexts(first, second, goal, hand) for hand in HANDS]
         found = [contexts for contexts in every if all(contexts.runs)]
         for contexts in found:
             yield from _measured(CONTEXTS, contexts)
@@ -96,7 +96,7 @@ def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
             yield from without(CONTEXTS, "no hand hit the goal in both contexts", place)
 
 
-def _measured(signatures: Iterable[Signature], what: Trajectories | Contexts | Members) -> Rows:
+def _measured(signatures: Iterable[Signature], what: Trajectories | TwoContexts | Members) -> Rows:
     """Values of all signatures, those with the same measure together."""
     for measure, measured in groupby(signatures, attrgetter("measure")):
         yield from measure(what, *measured)

@@ -88,14 +88,14 @@ class _Comparison:
         from coartic.analysis import Study
         from coartic.analysis.report.comparison import comparison_document
         from coartic.analysis.report.formats.markdown import markdown
-        from coartic.analysis.report.tables.files import METHODS
+        from coartic.analysis.report.tables.files import METHOD_ROWS
         from coartic.analysis.results.folder import made_here
 
         study = Study(made_here(folder))
         self._made = comparison_document(study)
         return {
             "comparison.md": markdown(self._made, tables="").encode(),
-            METHODS.name: METHODS.text(study).encode(),
+            METHOD_ROWS.name: METHOD_ROWS.text(study).encode(),
         }
 
     def show(self, report: RunReport) -> None:

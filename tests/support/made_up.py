@@ -6,7 +6,7 @@ import pandas as pd
 
 from coartic import load_task
 from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import Optimum
+from coartic.analysis.results.optima import KnownOptimum
 from coartic.analysis.study import Study
 from coartic.record import Commit, Environment
 from coartic.tables import Manifest, Plan, PlanLimits, PlannedCell
@@ -33,7 +33,7 @@ def made_up_optima(*tasks):
         "two-armed-2": ("RLRR", -306, -329),
     }
     return {
-        (task, arm): Optimum(reward, known[task][0], reward)
+        (task, arm): KnownOptimum(reward, known[task][0], reward)
         for task in tasks
         for arm, reward in zip(("free", "still"), known[task][1:], strict=True)
     }

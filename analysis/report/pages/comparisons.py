@@ -14,7 +14,7 @@ from coartic.analysis.comparisons.targets import SHARES
 from coartic.analysis.markup import code, escaped
 from coartic.analysis.report.document import Block, Bullets, DataTable, Document, Prose, Section
 from coartic.analysis.report.tables.common import marked, table_ids
-from coartic.analysis.report.tables.layout import LAYOUTS, Layout
+from coartic.analysis.report.tables.layout import LAYOUTS, TableLayout
 from coartic.analysis.report.tables.methods import overall_table
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
 from coartic.analysis.study import Study
@@ -157,7 +157,7 @@ def _pairing(study: Study) -> str:
     )
 
 
-def _pairs(study: Study, task: str, layout: Layout, **facts: str) -> DataTable | None:
+def _pairs(study: Study, task: str, layout: TableLayout, **facts: str) -> DataTable | None:
     """Conditions, methods, variants; of each the best second first."""
 
     def place(row: PairRow) -> tuple[int, str, float]:

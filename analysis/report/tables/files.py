@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from coartic.analysis.report.document import CellKey, DataTable, Row, Value
-from coartic.analysis.report.tables.layout import Layout, read_layouts
+from coartic.analysis.report.tables.layout import TableLayout, read_layouts
 from coartic.analysis.study import Study
 from coartic.tables import label_of
 
@@ -17,7 +17,7 @@ _Raw = Mapping[Hashable, Any]
 """A row as pandas has it."""
 
 
-class FileLayout(Layout):
+class FileLayout(TableLayout):
     """A section of ``files.toml``, which says what the fields are."""
 
     key: tuple[str, ...]
@@ -59,7 +59,7 @@ class CsvFile:
         return DataTable(self.name, layout.caption, layout.columns, rows)
 
 
-def csv_text(layout: Layout, rows: pd.DataFrame) -> str:
+def csv_text(layout: TableLayout, rows: pd.DataFrame) -> str:
     """Rows as CSV. Raises ValueError where they have other columns than the layout says."""
     columns = [column.name for column in layout.columns]
     if list(rows.columns) != columns:
@@ -115,7 +115,7 @@ def _file(
     return CsvFile(_LAYOUTS[name], rows, cells)
 
 
-METHODS = _file("methods", lambda study: study.methods)
+METHOD_ROWS = _file("methods", lambda study: study.methods)
 """What ``coartic run`` writes."""
 ANALYSES = (
     _file("claims", lambda study: study.claims, _of_claim),
@@ -131,5 +131,5 @@ ANALYSES = (
 """What ``coartic analyse`` writes, in its order."""
 VERSIONS = _LAYOUTS["versions"]
 """Of what ``coartic compare`` writes, which is of two folders."""
-FILES = {file.name: file for file in (METHODS, *ANALYSES)}
+FILES = {file.name: file for file in (METHOD_ROWS, *ANALYSES)}
 """All of them by their names."""

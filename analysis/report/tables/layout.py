@@ -30,7 +30,7 @@ _MARKS = {
 }
 
 
-class Layout(BaseModel):
+class TableLayout(BaseModel):
     """A section of ``tables.toml``, which says what the fields are."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -54,7 +54,7 @@ class Layout(BaseModel):
                 raise ValueError(f"what the numbers of {column.name} rest on is not said")
         return self
 
-    def plus(self, columns: Iterable[Column]) -> Layout:
+    def plus(self, columns: Iterable[Column]) -> TableLayout:
         """With further columns, which depend on what there is to be shown."""
         return self.model_copy(update={"columns": (*self.columns, *columns)})
 
@@ -119,7 +119,7 @@ def finite(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-_L = TypeVar("_L", bound=Layout)
+_L = TypeVar("_L", bound=TableLayout)
 
 
 def read_layouts(file: str, kind: type[_L]) -> dict[str, _L]:
@@ -141,7 +141,7 @@ def _column(name: str, said: dict[str, Any], *, rests_on: Sequence[str]) -> dict
     return {"name": name, "header": name.replace("_", " "), **default, **said}
 
 
-LAYOUTS = read_layouts("tables", Layout)
+LAYOUTS = read_layouts("tables", TableLayout)
 """All tables of pages by name."""
 
 

@@ -14,7 +14,7 @@ from coartic.analysis.comparisons.reached import ALL_TASKS
 from coartic.analysis.figures.ranking import GROUPS, learner, standings
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report.document import Column, DataTable, Row, Value
-from coartic.analysis.report.tables.layout import LAYOUTS, Layout, finite, with_interval
+from coartic.analysis.report.tables.layout import LAYOUTS, TableLayout, finite, with_interval
 from coartic.analysis.study import Study
 from coartic.analysis.words import marked, slugs
 
@@ -103,7 +103,7 @@ def main_verdicts(study: Study) -> DataTable | None:
 
 
 def verdict_rows(
-    study: Study, layout: Layout, judged: Iterable[Judged], own: Iterable[Mapping[str, Value]]
+    study: Study, layout: TableLayout, judged: Iterable[Judged], own: Iterable[Mapping[str, Value]]
 ) -> Iterator[Row]:
     """A row a claim, which leads to its section, with what is the table's ``own``."""
     by_run = {run: key for key, runs in study.run_ids.items() for run in runs}

@@ -16,7 +16,7 @@ from coartic.analysis.published import (
 )
 from coartic.analysis.report.document import DataTable, RestsOn, Row, Value
 from coartic.analysis.report.tables.common import counts, estimate_as_printed, marked, mean_of
-from coartic.analysis.report.tables.layout import LAYOUTS, Layout, estimated
+from coartic.analysis.report.tables.layout import LAYOUTS, TableLayout, estimated
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.study import Study
 from coartic.analysis.words import typographic
@@ -107,7 +107,7 @@ def _sequence_row(study: Study, row: SequenceRow) -> Row:
 
 def _beside(
     study: Study,
-    layout: Layout,
+    layout: TableLayout,
     row: PaperRow | SequenceRow,
     published: Summary | None,
     rests_on: Mapping[str, tuple[RestsOn, ...]] = MappingProxyType({}),
