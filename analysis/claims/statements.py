@@ -11,6 +11,7 @@ from coartic.analysis.claims.data import Cells
 from coartic.analysis.claims.register import Claim, Finding
 from coartic.analysis.printed import ENTRIES
 from coartic.analysis.words import stated
+from coartic.task import load_task
 
 _APART = ("one-armed", "two-armed")
 _REGISTER = stated(__file__, "claims")
@@ -75,7 +76,7 @@ def decides_apart(name: str, cells: Cells) -> Callable[[Judging], Judging]:
     def enter(judge: Judging) -> Judging:
         for which in _APART:
             two = which == "two-armed"
-            own = tuple(cell for cell in cells if cell[0].startswith("two-armed") == two)
+            own = tuple(cell for cell in cells if (len(load_task(cell[0]).hands) > 1) == two)
             decides(f"{name}-{which}", cells=own)(judge)
         return judge
 

@@ -277,12 +277,16 @@ def winners(study: Study) -> str:
     if proven == known:
         sure_of = ", which is proven"
     if len(by_trial):
-        best, sure = by_trial.iloc[0], _sure(by_trial)
+        best, apart = by_trial.iloc[0], _is_apart(by_trial)
+        sure = ""
+        if apart is not None:
+            second = escaped(spoken_name(by_trial.method[1]))
+            sure = f", {'surely' if apart else 'not surely'} before {second}"
         said = _said(
             "methods",
             "learners",
             best=escaped(spoken_name(best.method)),
-            leads="is ahead" if sure.startswith(", not") else "wins",
+            leads="is ahead" if apart is False else "wins",
             row=best,
             known="optimum" if 2 * proven > known else "best known reward",
             interval=_interval(best, about=_SAID["methods"]["about"]),
@@ -305,12 +309,11 @@ def _interval(row: Any, about: str = "") -> str:
     return _said("methods", "interval", row=row, about=about)
 
 
-def _sure(rows: pd.DataFrame) -> str:
-    """Whether the first is apart from the second by their intervals."""
+def _is_apart(rows: pd.DataFrame) -> bool | None:
+    """Whether the first is apart from the second by their intervals; None without these."""
     if len(rows) < 2 or rows.low[:2].isna().any():
-        return ""
-    surely = "surely" if rows.high[0] < rows.low[1] else "not surely"
-    return f", {surely} before {escaped(spoken_name(rows.method[1]))}"
+        return None
+    return bool(rows.high[0] < rows.low[1])
 
 
 def _place_of_learner(rows: pd.DataFrame) -> str:

@@ -111,6 +111,8 @@ class Signature(BaseModel):
     measure: ImportString[Measure]
     unit: str
     extent: str
+    by_goal: bool = False
+    share: bool = False
     meaning: str
     heading: str
     table: Shown
@@ -118,11 +120,6 @@ class Signature(BaseModel):
     matrix: str = ""
     macro: str = ""
     sources: tuple[Key, ...] = ()
-
-    @property
-    def share(self) -> bool:
-        """Whether it is a share of runs."""
-        return self.extent.startswith("share")
 
     def at(self, place: Place, **values: Any) -> SignatureRow:
         """A value of it, with its unit; ``values`` as :class:`SignatureRow` has them."""

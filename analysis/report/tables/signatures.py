@@ -46,8 +46,7 @@ class Spot(NamedTuple):
         heading = self.signature.heading
         if self.joint:
             return f"{self.joint.replace('_', ' ')} {heading}"
-        by_goal = self.signature.extent.endswith("by goal")
-        return f"{heading}, goal {self.goal}" if by_goal else heading
+        return f"{heading}, goal {self.goal}" if self.signature.by_goal else heading
 
 
 def signatures_tables(study: Study, task: str, *, short: bool = False) -> list[DataTable]:
