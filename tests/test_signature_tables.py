@@ -192,7 +192,7 @@ def test_a_signature_is_a_measure_and_a_row(traced, monkeypatch):
         yield within.mean_at(signature, Place(), [run.ticks for run in cell.runs])
 
     row = Signature(
-        name="length", measure=length, unit="ticks", extent="ticks", meaning="how long",
+        name="length", measure=length, unit="ticks", range="ticks", meaning="how long",
         heading="length", table="main-signatures",
     )  # fmt: skip
     monkeypatch.setattr(register, "WITHIN", (*register.WITHIN, row))

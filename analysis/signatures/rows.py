@@ -110,7 +110,7 @@ class Signature(BaseModel):
     name: str
     measure: ImportString[Measure]
     unit: str
-    extent: str
+    range: str
     by_goal: bool = False
     share: bool = False
     meaning: str
@@ -120,6 +120,11 @@ class Signature(BaseModel):
     matrix: str = ""
     macro: str = ""
     sources: tuple[Key, ...] = ()
+
+    @property
+    def extent(self) -> str:
+        """Unit and range, and whether there is one of each goal."""
+        return self.range + ", by goal" * self.by_goal
 
     def at(self, place: Place, **values: Any) -> SignatureRow:
         """A value of it, with its unit; ``values`` as :class:`SignatureRow` has them."""
