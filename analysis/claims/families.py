@@ -101,8 +101,8 @@ def _held(samples: Sequence[Array], parts: Sequence[str]) -> Finding:
 
 
 for _name, _said in STATEMENTS.items():
-    if "compared" in _said:
-        decides(_name, families=_said["families"], compared=_said["compared"])(_compared)
+    if _said.compared:
+        decides(_name, families=_said.families, compared=_said.compared)(_compared)
 
 
 def _mean_sign(data: Data, name: str, condition: str, sign: str) -> float | None:
@@ -129,7 +129,7 @@ def _beyond(
 ) -> Parts:
     """By how much what is measured of an instance is beyond a bound, in every family."""
     samples, parts = [], []
-    for family in STATEMENTS[claim]["families"]:
+    for family in STATEMENTS[claim].families:
         own = _over(data, family, [of(name) for name in _judged(data, family)])
         samples.append(own - bound)
         parts.append(f"{family} {shown(own, '.2f')} {unit} on {len(own)} instances")
@@ -176,7 +176,7 @@ for _name, _sign, _unit in (
 def _ensures(data: Data) -> Finding:
     failed: dict[str, int] = {}
     trials = 0
-    for family in STATEMENTS["corrective-ensures-in-general"]["families"]:
+    for family in STATEMENTS["corrective-ensures-in-general"].families:
         names = _judged(data, family)
         if not names:
             raise MissingError(f"this folder has no instances of {family} that can be judged")

@@ -211,17 +211,15 @@ _JUDGES = {"higher": _higher, "most": _share, "few": _share, "about": _about}
 
 def _enter(name: str) -> None:
     said = STATEMENTS[name]
-    if said["rule"] not in _JUDGES:
+    if said.rule not in _JUDGES:
         return
     what = "; ".join(
         f"{task} {', '.join([own] if isinstance(own, str) else own)}"
-        for task, own in (said.get("pairs") or said["runs"]).items()
+        for task, own in (said.pairs or said.runs).items()
     )
-    test = f"{IN_WORDS[said['rule']]}: {what}"
-    judge = _JUDGES[said["rule"]]
-    JUDGED[name] = Claim(
-        id=name, judge=lambda data: judge(data, JUDGED[name]), **said | {"test": test}
-    )
+    judge = _JUDGES[said.rule]
+    test = f"{IN_WORDS[said.rule]}: {what}"
+    JUDGED[name] = said.claim(name, test, lambda data: judge(data, JUDGED[name]))
 
 
 def of_task(claim: Claim, task: str) -> Claim:

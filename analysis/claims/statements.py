@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
-from coartic.analysis.claims.data import Cells
-from coartic.analysis.claims.register import Claim, Finding
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+
+from coartic.analysis.claims.data import Cells, Data
+from coartic.analysis.claims.register import Claim, Finding, Rule, Section
 from coartic.analysis.printed import ENTRIES
 from coartic.analysis.words import stated
 from coartic.task import load_task
@@ -25,8 +27,44 @@ _SELECTED = {
 """Claims that goals which are not printed had to meet to be admitted."""
 
 
-def _read() -> dict[str, dict[str, Any]]:
-    """Fields of every claim by its id."""
+class Said(BaseModel):
+    """A claim of ``claims.toml``, which says what the fields are."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    statement: str
+    section: Section
+    rule: Rule
+    test: str = ""
+    beside: bool = False
+    pairs: dict[str, str | tuple[str, ...]] = {}
+    families: tuple[str, ...] = ()
+    compared: tuple[str, ...] = ()
+    unit: str = ""
+    runs: dict[str, str] = {}
+    place: str = ""
+    quote: str = ""
+    figure: str = ""
+    fitted: bool
+    selected: bool
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        ours = self.section == "Beyond the paper"
+        if ours == bool(self.place) or (ours and self.rule != "measured"):
+            raise ValueError(
+                "what the paper says has a place in it; what it does not say is measured and "
+                "stands in section 'Beyond the paper'"
+            )
+        return self
+
+    def claim(self, name: str, test: str, judge: Callable[[Data], Finding]) -> Claim:
+        """The claim with its test in words, and who judges it."""
+        return Claim(id=name, judge=judge, **{**vars(self), "test": test})
+
+
+def _read() -> dict[str, Said]:
+    """Every claim by its id."""
     found = {}
     for section, rows in _REGISTER.items():
         for name, row in rows.items():
@@ -41,7 +79,7 @@ def _read() -> dict[str, dict[str, Any]]:
                 key = f"{name}-{which}" if apart else name
                 selected = key in _SELECTED
                 found[key] = {**own, "section": section, "fitted": fitted, "selected": selected}
-    return found
+    return TypeAdapter(dict[str, Said]).validate_python(found)
 
 
 STATEMENTS = _read()
@@ -60,8 +98,13 @@ def decides(name: str, **given: Any) -> Callable[[Judging], Judging]:
 
     def enter(judge: Judging) -> Judging:
         said = STATEMENTS[name]
-        test = said["test"].format(**vars(sys.modules[judge.__module__]) | MARGINS | given)
-        JUDGED[name] = Claim(id=name, judge=partial(judge, **given), **said | {"test": test})
+        try:
+            test = said.test.format(**vars(sys.modules[judge.__module__]) | MARGINS | given)
+        except KeyError as error:
+            raise ValueError(
+                f"claim {name}: its test names {error}, which nobody states"
+            ) from None
+        JUDGED[name] = said.claim(name, test, partial(judge, **given))
         return judge
 
     return enter
