@@ -23,7 +23,8 @@ _AHEAD = 4  # jobs a worker that may be begun before an answer is taken: answers
 
 @runtime_checkable
 class Executor(Protocol):
-    """Performs jobs."""
+    """Performs jobs (:meth:`coartic.benchmarks.sandbox.Keeper.perform`). It may lose some, and
+    answers none twice."""
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
         """Answers as they come, in any order."""
@@ -31,7 +32,10 @@ class Executor(Protocol):
 
 
 class Local:
-    """Sandboxes on this machine, each driven by a thread; one thread each for BLAS."""
+    """Sandboxes on this machine, each driven by a thread; one thread each for BLAS.
+
+    ``jobs``: how many, -1 for one a core.
+    """
 
     def __init__(self, jobs: int = -1) -> None:
         self.jobs = jobs

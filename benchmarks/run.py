@@ -41,7 +41,7 @@ from coartic.benchmarks.tables import (
 )
 from coartic.files import folder_named, publish
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
-from coartic.packs import Packs
+from coartic.packs import Chosen, Packs
 from coartic.readings import ChosenReading, load_readings
 from coartic.record import Record
 from coartic.tables import Manifest
@@ -90,16 +90,16 @@ class RunReport:
     folder: Path
     progress: Progress
     wall_s: float
-    """Seconds from the first run to the last."""
+    """Seconds from the call until the last run was kept, or nothing found to do."""
     manifest: Manifest
     """What was asked for."""
     kept: int
     """Runs that the folder has a record of, asked for or not."""
 
-    @property
+    @cached_property
     def records(self) -> Mapping[str, Record]:
         """The records of the plan by run id, in its order, each read when it is asked for."""
-        return Packs(self.folder).only(self._ids())
+        return Chosen(Packs(self.folder), self._ids())
 
     @property
     def others(self) -> int:
@@ -137,7 +137,8 @@ class RunReport:
         if unasked:
             said.append(
                 f"{counted(unasked, 'run')} that the folder also keeps: tables are of what one "
-                "command asks for, so name all in one"
+                "command asks for, so name all in one, and give other seeds, runs and trials a "
+                "folder of their own"
             )
         return f" (without {' and '.join(said)})" if said else ""
 

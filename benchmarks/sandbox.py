@@ -242,7 +242,7 @@ class Sandbox:
 
 
 class Keeper:
-    """Performs jobs, each in a sandbox that no other method has run in."""
+    """Performs jobs, each in a sandbox of its method, or of all that are built in."""
 
     def __init__(self) -> None:
         self._sandbox: Sandbox | None = None

@@ -22,7 +22,7 @@ from coartic.record import Asked, Common, Own, Record, RecordError
 from coartic.stored import Seed
 
 FULL = 1 << 26
-"""Bytes of a pack from which on another one is begun."""
+"""Bytes of lines in a pack beyond which another one is begun."""
 _COMMON = b"common"
 _HEAD = re.compile(rb"(common|[0-9a-f]{16}-[0-9a-f]+) ([0-9a-f]{64}) (?=.)", re.DOTALL)
 
@@ -53,7 +53,7 @@ class Line(NamedTuple):
 
 
 def encode(records: Iterable[Record]) -> Iterator[bytes]:
-    """Packs of records, each of at most :data:`FULL` bytes or of one run."""
+    """Packs of records, each of about :data:`FULL` bytes at most, or of one run."""
     pack: list[bytes] = []
     size, before = 0, b""
     for record in records:
@@ -71,7 +71,8 @@ def encode(records: Iterable[Record]) -> Iterator[bytes]:
 
 
 def lines(data: bytes) -> tuple[list[Line], bool]:
-    """The runs of a pack, and whether there is nothing else in it."""
+    """The runs of a pack, and whether it is otherwise whole: nothing else is in it, no common
+    line was changed, its last line has an end. Runs' own checksums are not looked at."""
     found, common, clean = [], b"", data.endswith(b"\n")
     begin, size = 0, len(data)
     while begin < size:

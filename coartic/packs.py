@@ -9,7 +9,6 @@ import hashlib
 import re
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
-from copy import copy
 from pathlib import Path
 
 from coartic.codec import Line, decode, lines
@@ -94,12 +93,6 @@ class Packs(Mapping[str, Record]):
     def __getitem__(self, run_id: str) -> Record:
         return self.read(run_id, self.path(run_id))
 
-    def only(self, run_ids: Iterable[str]) -> Packs:
-        """Those of some runs, in this order. Raises RecordError where one has none."""
-        chosen = copy(self)
-        chosen._newest = {run_id: self.path(run_id) for run_id in run_ids}
-        return chosen
-
     def path(self, run_id: str) -> Path:
         """The pack that a run's record is in. Raises RecordError where there is none."""
         try:
@@ -141,3 +134,24 @@ class Packs(Mapping[str, Record]):
                 del self._sizes[dropped]
         self._open.move_to_end(path)
         return self._open[path]
+
+
+class Chosen(Mapping[str, Record]):
+    """The records of some runs, in their order, each read when it is asked for."""
+
+    def __init__(self, packs: Packs, run_ids: Iterable[str]) -> None:
+        """Raises RecordError where a run has no record."""
+        self._packs, self._ids = packs, dict.fromkeys(run_ids)
+        for run_id in self._ids:
+            packs.path(run_id)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._ids)
+
+    def __len__(self) -> int:
+        return len(self._ids)
+
+    def __getitem__(self, run_id: str) -> Record:
+        if run_id not in self._ids:
+            raise RecordError(f"run {run_id} is not among these")
+        return self._packs[run_id]

@@ -1,5 +1,6 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -23,7 +24,7 @@ from coartic.analysis.claims.page import SENTENCES, page
 from coartic.analysis.claims.power import powers
 from coartic.analysis.claims.presence import REPRESENTATIVES
 from coartic.analysis.claims.reconstructions import held_by
-from coartic.analysis.claims.statements import MARGINS, REASONS
+from coartic.analysis.claims.statements import MARGINS, REASONS, Said
 from coartic.analysis.published import published_cells
 from coartic.analysis.report.document import Estimate
 from coartic.analysis.report.formats.markdown import markdown
@@ -1187,7 +1188,30 @@ def test_every_sentence_is_accounted_for():
         assert len({"claims", "held", "open"} & set(said)) == 1, said["quote"]
         assert set(said.get("claims", ())) <= names
     accounted = {name for said in SENTENCES for name in said.get("claims", ())}
-    assert {claim.id for claim in CLAIMS if claim.place} <= accounted
+    untold = {claim.id for claim in CLAIMS if claim.place} - accounted
+    assert not untold, f"sentences.toml names no sentence that these claims come from: {untold}"
+
+
+SAID = {
+    **{"statement": "It is so.", "section": "General", "rule": "tested", "place": "here"},
+    **dict.fromkeys(("fitted", "selected"), False),
+}
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("rule", "count", "'higher', 'most'"),
+        ("section", "Two-armed", "'Two-armed tasks'"),
+        ("rool", "counted", "Extra inputs are not permitted"),
+        ("place", "", "stands in section 'Beyond the paper'"),
+        ("section", "Beyond the paper", "is measured"),
+    ],
+)
+def test_a_claim_is_checked_where_it_is_read(field, value, words):
+    Said.model_validate(SAID)
+    with pytest.raises(ValueError, match=re.escape(words)):
+        Said.model_validate(SAID | {field: value})
 
 
 def test_margins_are_set_once_with_a_reason():
@@ -1195,5 +1219,4 @@ def test_margins_are_set_once_with_a_reason():
     assert MARGINS["few"] == 1 - MARGINS["most"]
     for claim in CLAIMS:
         assert "{" not in claim.test
-        assert claim.rule == "measured" or claim.place
         assert not (claim.pairs and claim.runs)

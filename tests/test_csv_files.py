@@ -26,7 +26,7 @@ def test_every_column_is_stated_and_typed(traced, tables):
         assert len(written) == len(tables[name].rows) > 0, name
         for row in tables[name].rows:
             assert row.all_cells <= traced.cells.keys()
-    with pytest.raises(ValueError, match=r"methods has columns .*'more'"):
+    with pytest.raises(ValueError, match=r"methods has other columns .*'more'"):
         csv_text(METHOD_ROWS.layout, traced.methods.assign(more=1))
 
 
@@ -91,6 +91,11 @@ def test_a_value_of_a_file_is_traced(traced):
     found = find_trace(folder, "targets.csv", (still, "target"))
     assert "Optimum of two-armed-1, other arm still" in found.how
     assert found.cells == ()
+    first = "ascending dual-process/EC1 first subtask against initial goal 1"
+    value = find_trace(folder, "signatures.csv", (first, "value"))
+    assert value.how.startswith(
+        "value. first subtask against initial: less those of the initial solution"
+    )
     found = find_trace(folder / "report", "targets.csv", (still, "reached"))
     assert found.folder == folder
     (source,) = found.sources

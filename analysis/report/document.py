@@ -118,6 +118,8 @@ class Row:
     """By column name, what a value was computed from where it is something else."""
     rests_on: Mapping[str, tuple[RestsOn, ...]] = field(default_factory=dict)
     """By column name, what a value rests on where it is not what its column does."""
+    how: str = ""
+    """How its values were obtained, beyond what its columns say, in inline markup."""
     other_arm: OtherArm | None = None
     """Of the optimum that its values rest on, where its columns do not say it."""
     family: str = ""
@@ -135,7 +137,7 @@ class Row:
 
 @dataclass(frozen=True)
 class DataTable:
-    """A table of raw values. Its first column names the rows."""
+    """A table of raw values."""
 
     id: str
     """Stable, such as ``methods-ascending``; the name of its files."""

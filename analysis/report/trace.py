@@ -172,7 +172,7 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
     known: dict[str, Collection[str]] = {"row": rows, "column": columns}
     for (what, names), name in zip(known.items(), where, strict=True):
         if name not in names:
-            near = did_you_mean(name, names)
+            near = did_you_mean(name, names) or f"; `coartic trace {table.id}` lists them"
             raise CoarticError(f"table {table.id} has no {what} {name!r}{near}")
     row, place = rows[where[0]], columns[where[1]]
     column, tasks = table.columns[place], {task for task, _ in row.cells}
@@ -183,8 +183,8 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
         if "optimum" in rests_on and task in tasks and arm == (row.other_arm or column.other_arm)
     ]
     # The tables of methods share what stands above them all.
-    above = LAYOUTS["methods"].read() if table.id.startswith("methods-") else ()
-    how = dict.fromkeys(map(words, filter(None, (column.how, *above, *table.notes))))
+    above = LAYOUTS["methods"].reading_with() if table.id.startswith("methods-") else ()
+    how = dict.fromkeys(map(words, filter(None, (column.how, row.how, *above, *table.notes))))
     own = row.cells if "runs" in rests_on or not rests_on else ()
     cells = [*row.cells_by_column.get(column.name, own)]
     kin = [*(other.cells for other in table.rows if other.family == row.family), table.unshown]

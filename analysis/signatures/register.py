@@ -46,6 +46,8 @@ FAMILIES = _KINDS["families"]
 """Of tasks that differ in one goal."""
 REGISTER = {signature.name: signature for signature in (*WITHIN, *CONTEXTS, *FAMILIES)}
 """All signatures by name."""
+if len(REGISTER) < len((*WITHIN, *CONTEXTS, *FAMILIES)):
+    raise ValueError("register.toml has two signatures of one name")
 
 
 def signature_rows(study: Study) -> list[SignatureRow]:

@@ -41,7 +41,12 @@ def analyse(folder: given.ResultsFolder) -> None:
             for entry in study.judged
         ],
     )
-    say(f"In {folder}: {', '.join(files)}.")
+    untold = sum(entry.verdict == "cannot tell" for entry in study.judged)
+    say(
+        f"{untold} of {counted(len(study.judged), 'claim')} cannot be told by these runs; why is "
+        "in claims.md. † rests on a reconstructed task.",
+        f"In {folder}: {', '.join(files)}.",
+    )
 
 
 _Other = Annotated[
@@ -153,7 +158,9 @@ def trace(
     name: Annotated[
         str, typer.Argument(help="Macro of numbers.tex, id of a table, or a file as pareto.csv.")
     ],
-    row: Annotated[str | None, typer.Argument(help="Row of the table: its first cell.")] = None,
+    row: Annotated[
+        str | None, typer.Argument(help="Row: its key, as `coartic trace NAME` lists them.")
+    ] = None,
     column: Annotated[str | None, typer.Argument(help="Column of the table's CSV.")] = None,
     folder: Annotated[
         Path, typer.Option("--in", help="Report, its results folder, or a folder above.")

@@ -99,7 +99,7 @@ def _across(study: Study) -> Iterator[Block]:
     tasks = list(dict.fromkeys(study.scores.task))
     names = escaped(", ".join(tasks)) or "none"
     table = overall_table(study)
-    (text,) = LAYOUTS["across-tasks"].read(names=names)
+    (text,) = LAYOUTS["across-tasks"].reading_with(names=names)
     if len(tasks) < 2:
         text = f"Needs at least two tasks with known optimum and initial solution; here: {names}."
     elif table is None:
@@ -128,7 +128,7 @@ def cost_table(study: Study, task: str) -> DataTable | None:
 
 def reading_of_pairs(study: Study) -> tuple[str, ...]:
     """Who is compared with whom, and what the numbers of the tables do not say."""
-    return LAYOUTS["compared"].read(pairing=_pairing(study))
+    return LAYOUTS["compared"].reading_with(pairing=_pairing(study))
 
 
 def _pairing(study: Study) -> str:

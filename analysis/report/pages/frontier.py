@@ -87,8 +87,8 @@ def _optimum(study: Study, task: str, arm: str) -> str:
 
 def reading_of_cost() -> tuple[str, ...]:
     """What is behind the tables of this module."""
-    pareto = _PARETO.read(tolerance=100 * TIME_TOLERANCE)
-    return (*_TARGETS.read(), *_AREAS.read(), *pareto)
+    pareto = _PARETO.reading_with(tolerance=100 * TIME_TOLERANCE)
+    return (*_TARGETS.reading_with(), *_AREAS.reading_with(), *pareto)
 
 
 def other_arms(study: Study, task: str) -> tuple[OtherArm, ...]:

@@ -25,7 +25,7 @@ def signatures_document(study: Study) -> Document:
     ):
         made = tuple(filter(None, tables))
         sections += [Section(name, title, made)] if made else []
-    lead, tested = LAYOUTS["main-signatures"].read()
+    lead, tested = LAYOUTS["main-signatures"].reading_with()
     tests: list[Block] = [Prose((tested,))]
     if any(task.reconstructed for task in study.tasks.values()):
         tests.append(Prose(("† Reconstructed task (docs/model.md).",)))

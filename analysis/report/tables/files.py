@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import pandas as pd
+from pydantic import model_validator
 
 from coartic.analysis.report.document import CellKey, DataTable, Row, Value
 from coartic.analysis.report.tables.layout import TableLayout, read_layouts
+from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.study import Study
 from coartic.tables import label_of
 
@@ -21,17 +23,27 @@ class FileLayout(TableLayout):
     """A section of ``files.toml``, which says what the fields are."""
 
     key: tuple[str, ...]
-    family: tuple[str, ...] = ()
+    depends_within: tuple[str, ...] = ()
     optimum: str | None = None
+
+    @model_validator(mode="after")
+    def _names_columns(self) -> Self:
+        named = {*self.key, *self.depends_within, *filter(None, [self.optimum])}
+        unknown = named - {column.name for column in self.columns}
+        if unknown:
+            raise ValueError(f"no columns {', '.join(sorted(unknown))}")
+        return self
 
 
 @dataclass(frozen=True)
 class CsvFile:
-    """A file with one number a place: its rows, and the cells that each was computed from."""
+    """A file with one number a place: its rows, and the cells that each was computed from, with
+    all their runs."""
 
     layout: FileLayout
     rows: Callable[[Study], pd.DataFrame]
     cells: Callable[[Study, _Raw], Iterable[CellKey]]
+    how: Callable[[_Raw], str]
 
     @property
     def name(self) -> str:
@@ -50,7 +62,8 @@ class CsvFile:
                 key,
                 tuple(_value(row[column.name]) for column in layout.columns),
                 tuple(dict.fromkeys(self.cells(study, row))),
-                family=_joined(row, layout.family) or key,
+                how=self.how(row),
+                family=_joined(row, layout.depends_within) or key,
                 other_arm=row[layout.optimum] if layout.optimum else None,
             )
             for row in self.rows(study).to_dict("records")
@@ -63,14 +76,15 @@ def csv_text(layout: TableLayout, rows: pd.DataFrame) -> str:
     """Rows as CSV. Raises ValueError where they have other columns than the layout says."""
     columns = [column.name for column in layout.columns]
     if list(rows.columns) != columns:
-        raise ValueError(f"{layout.name} has columns {list(rows.columns)}, stated are {columns}")
+        odd = {*rows.columns} ^ {*columns} or "in another order"
+        raise ValueError(f"{layout.name} has other columns than are stated of it: {odd}")
     return rows.to_csv(index=False)
 
 
 def _value(raw: Any) -> Value:
     """A value of pandas as one of a table."""
     if isinstance(raw, bool):
-        return "yes" if raw else "no"
+        return str(raw)
     return None if raw == "" or pd.isna(raw) else raw
 
 
@@ -111,18 +125,23 @@ def _file(
     name: str,
     rows: Callable[[Study], pd.DataFrame],
     cells: Callable[[Study, _Raw], Iterable[CellKey]] = _of_cell,
+    how: Callable[[_Raw], str] = lambda row: "",
 ) -> CsvFile:
-    return CsvFile(_LAYOUTS[name], rows, cells)
+    return CsvFile(_LAYOUTS[name], rows, cells, how)
 
 
 METHOD_ROWS = _file("methods", lambda study: study.methods)
 """What ``coartic run`` writes."""
 ANALYSES = (
-    _file("claims", lambda study: study.claims, _of_claim),
+    _file("claims", lambda study: study.claims, _of_claim, lambda row: f"{row['test']}."),
     _file("comparisons", lambda study: study.pairs, _of_pair),
     _file("across_tasks", lambda study: study.overall, _of_all_tasks),
     _file("profiles", lambda study: study.profiles, _of_all_tasks),
-    _file("signatures", lambda study: study.signatures.drop(columns="label")),
+    _file(
+        "signatures",
+        lambda study: study.signatures.drop(columns="label"),
+        how=lambda row: f"{row['signature']}: {REGISTER[row['signature']].meaning}.",
+    ),
     _file("anytime", lambda study: study.anytime),
     _file("targets", lambda study: study.targets),
     _file("areas", lambda study: study.areas),

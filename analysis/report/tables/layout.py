@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
 from coartic.analysis.comparisons.methods import TOLD
 from coartic.analysis.report.document import (
@@ -58,14 +58,15 @@ class TableLayout(BaseModel):
         """With further columns, which depend on what there is to be shown."""
         return self.model_copy(update={"columns": (*self.columns, *columns)})
 
-    def read(self, **facts: Any) -> tuple[str, ...]:
+    def reading_with(self, **facts: Any) -> tuple[str, ...]:
         """What is said once of the tables, in inline markup as ``facts`` are."""
         return tuple(text.format(**facts) for text in self.reading)
 
-    def row(self, key: str, of: Any = None, cells: Iterable[CellKey] = (), **own: Value) -> Row:
-        """Values by the columns' names: its ``own``, the others are fields of ``of``.
+    def row(self, key: str, of: Any = None, /, cells: Iterable[CellKey] = (), **own: Value) -> Row:
+        """A row. Values given by name are taken as they are; every other column is read off
+        ``of``, with its interval where ``intervals`` names one.
 
-        Raises ValueError for a value of its own that no column shows.
+        Raises ValueError for a value that no column shows, and for a column without a value.
         """
         unknown = own.keys() - {column.name for column in self.columns}
         if unknown:
@@ -74,7 +75,10 @@ class TableLayout(BaseModel):
         return Row(key, tuple(values), tuple(cells))
 
     def _field(self, of: Any, name: str) -> Value:
-        value = getattr(of, name)
+        try:
+            value = getattr(of, name)
+        except AttributeError:
+            raise ValueError(f"table {self.name}: a row has no value for {name}") from None
         if name in self.intervals:
             ends = (getattr(of, f"{self.intervals[name]}{end}") for end in ("low", "high"))
             return with_interval(value, *ends)
@@ -131,8 +135,9 @@ def read_layouts(file: str, kind: type[_L]) -> dict[str, _L]:
     for name, said in stated(__file__, file).items():
         rests_on = said.get("rests_on", ())
         columns = [_column(*column, rests_on=rests_on) for column in said["columns"].items()]
-        found[name] = kind.model_validate({**said, "name": name, "columns": columns})
-    return found
+        found[name] = {**said, "name": name, "columns": columns}
+    layouts: TypeAdapter[dict[str, _L]] = TypeAdapter(dict[str, kind])  # type: ignore[valid-type]
+    return layouts.validate_python(found)
 
 
 def _column(name: str, said: dict[str, Any], *, rests_on: Sequence[str]) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def reading_of_methods(study: Study) -> tuple[str, ...]:
                 f"{name}: its solutions needed "
                 f"{counted(row.corrections, 'corrective movement')} in all."
             )
-    return (*impossible, *_METHODS.read(), *corrected)
+    return (*impossible, *_METHODS.reading_with(), *corrected)
 
 
 def methods_table(study: Study, task: str) -> DataTable | None:

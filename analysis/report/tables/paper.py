@@ -52,7 +52,7 @@ def sequences_table(study: Study) -> DataTable | None:
 
 def _of_paper() -> str:
     """What both tables say of published rewards."""
-    return " ".join(_CELLS.read(runs=RUNS))
+    return " ".join(_CELLS.reading_with(runs=RUNS))
 
 
 def exhaustive_table(study: Study) -> DataTable | None:
