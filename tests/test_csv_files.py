@@ -1,6 +1,7 @@
 """The CSV files of a results folder: typed, said what they rest on, and traced."""
 
 import re
+import shutil
 from dataclasses import replace
 
 import pandas as pd
@@ -9,8 +10,11 @@ import pytest
 from coartic import CoarticError
 from coartic.analysis.report.tables.files import FILES, METHOD_ROWS, csv_text
 from coartic.analysis.report.trace import find_trace, trace_in_file
+from coartic.analysis.report.trace_file import FILE
+from coartic.analysis.signatures import subtasks, trajectories
+from coartic.analysis.study import Study
 from tests.support.made_up import MadeUp
-from tests.support.reports import changed_columns
+from tests.support.reports import changed_columns, shown
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +89,56 @@ def test_what_rests_on_the_optimum_says_so(traced, tables):
     assert missed == {"claims.csv evidence", "methods.csv beaten", *few}
 
 
-def test_a_value_of_a_file_is_traced(traced):
-    folder = traced.results.folder
+def test_what_rests_on_the_corrective_process_alone_says_so(traced, tables, monkeypatch):
+    """With other rewards of it, and no movement by it, those values change that say so."""
+    table = traced.results.sequences
+    other = Study(
+        replace(traced.results, sequences=table.assign(reward=table.reward - 7 * table.index))
+    )
+    monkeypatch.setattr(trajectories, "corrective", lambda *_: None)
+    monkeypatch.setattr(subtasks, "isolated_reach", lambda *_: None)
+    changed, lost, saying, valued = set(), set(), set(), set()
+    for name, file in FILES.items():
+        before, after = shown(tables[name]), shown(file.table(other))
+        for row in tables[name].rows:
+            for column in tables[name].columns:
+                value = before[row.key][column.name]
+                place = name, column.name, row.key
+                rests_on = row.rests_on.get(column.name, column.rests_on)
+                if "simulation" in rests_on:
+                    saying.add(place)
+                if value is not None:
+                    valued.add(place)
+                if rests_on in ((), ("text",)):  # words of ours, as why something is not judged
+                    continue
+                if row.key not in after:
+                    lost.add(place)
+                elif repr(after[row.key][column.name]) != repr(value):
+                    changed.add(place)
+    assert changed - saying == set()
+    columns = {place[:2] for place in changed}
+    assert {("across_tasks.csv", "score"), ("profiles.csv", "share")} <= columns
+    signatures = {place for place in saying & valued if place[:2] == ("signatures.csv", "value")}
+    alike = re.compile(" (hand as in isolation|hands as the best corrective ones) ")  # 0 is 0
+    assert all(alike.search(key) for *_, key in signatures - changed - lost)
+    assert len(signatures) > 100
+
+
+def test_a_claim_without_runs_says_what_is_behind_it(tables):
+    values = shown(tables["claims.csv"])
+    for row in tables["claims.csv"].rows:
+        if values[row.key]["runs"] is None:
+            (kinds,) = {row.rests_on[name] for name in ("verdict", "evidence")}
+            assert (kinds == ("text",)) == (values[row.key]["sources"] is None)
+            assert {"runs", "optimum"}.isdisjoint(kinds)
+
+
+def test_a_value_of_a_file_is_traced(traced, tmp_path):
+    folder = shutil.copytree(traced.results.folder, tmp_path / "traced")
+    for name in ("targets.csv", "comparisons.csv"):
+        (folder / name).write_text(FILES[name].text(traced), encoding="utf-8")
+    (folder / "report").mkdir(exist_ok=True)
+    (folder / "report" / FILE).touch()
     still = "two-armed-1 dual-process/EC3 still trials 0.05"
     found = find_trace(folder, "targets.csv", (still, "target"))
     assert "Optimum of two-armed-1, other arm still" in found.how
@@ -107,15 +159,35 @@ def test_a_value_of_a_file_is_traced(traced):
     assert len(raw.cells) == 2
     assert {*raw.cells} < {*adjusted.cells}
     assert "It depends on all of its family: all pairs of the task" in adjusted.how
+    assert {label for _, label in adjusted.cells} >= {"random-search/pure", "dual-process/EC4"}
+    table = FILES["comparisons.csv"].table(traced)
+    kinds = {key: row["kind"] for key, row in shown(table).items()}
+    families = ({row.family for row in table.rows if (kinds[row.key] == "conditions") is apart}
+                for apart in (True, False))  # fmt: skip
+    assert set.isdisjoint(*families)
+    assert raw.note == ""
+    assert trace_in_file(folder, "areas.csv", (still.removesuffix(" 0.05"), "area")).note
+    (folder / "comparisons.csv").write_text("forged", encoding="utf-8")
+    forged = trace_in_file(folder, "comparisons.csv", (pair, "p"))
+    assert "not what the records give" in forged.note
 
 
 def test_what_a_file_does_not_have(traced, tmp_path):
     folder = traced.results.folder
+    rows = r"rows by task, method, spend, budget: 'ascending dual-process/EC1 trials 1.0', .* more"
     for where, words in (
-        ((), r"name a row and a column of it.*\n.* and \d+ more\n.*task, method, spend"),
-        (("ascending dual-process/EC1 trial 1", "mean"), "did you mean 'ascending dual-process"),
+        ((), rf"name a row and a column of it.*\n +{rows}\n +columns: task, method, spend"),
+        (("ascending dual-process/EC1 trials 1", "mean"), "did you mean 'ascending dual-process"),
     ):
         with pytest.raises(CoarticError, match=words):
             trace_in_file(folder, "anytime.csv", where)
-    with pytest.raises(CoarticError, match="no results folder in .*; make one with `coartic run"):
-        find_trace(tmp_path, "anytime.csv")
+    (tmp_path / "within").mkdir()
+    (tmp_path / "manifest.json").touch()
+    for name, below, words in (
+        ("anytime.csv", "within", "no results folder in .*within; make one with `coartic run"),
+        ("anytime.csv", "nowhere", "no results folder in .*nowhere"),
+        ("anytme.csv", "", "no file anytme.csv of .*; did you mean 'anytime.csv'?"),
+        ("x.csv", "", "there are methods.csv, claims.csv"),
+    ):
+        with pytest.raises(CoarticError, match=words):
+            find_trace(tmp_path / below, name)

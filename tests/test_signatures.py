@@ -15,6 +15,7 @@ from coartic import Movement, corrective_trial, execute, learn, learn_many, load
 from coartic.analysis.calibration import signatures as simulated
 from coartic.analysis.calibration.simulation import rate
 from coartic.analysis.references import references
+from coartic.analysis.report.tables.files import FILES
 from coartic.analysis.results.folder import Results
 from coartic.analysis.signatures.context import (
     context_dependence,
@@ -733,7 +734,13 @@ def test_frame_of_a_family(tmp_path):
         lower = 0.02 * (height - 2.0)
         targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
         solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
-    frame = Study(results(tmp_path, solved)).signatures
+    study = Study(results(tmp_path, solved))
+    frame = study.signatures
+    whole = frame[frame.moving.notna()].drop(columns="label").to_dict("records")
+    assert whole
+    for row in whole:  # all tasks are behind a slope
+        cells = [*FILES["signatures.csv"].cells(study, row)]
+        assert cells == [(task.name, "planner") for task, *_ in solved]
     slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
     assert set(slopes.moving) == {2}
     norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])

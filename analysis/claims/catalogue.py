@@ -92,8 +92,8 @@ def _seen(claim: Claim, data: Data) -> Judged:
         finding = claim.judge(data)
     except MissingError as missing:
         return Judged(None, f"not judged: {missing}", claim=claim)
-    run_ids, sources = (tuple(dict.fromkeys(read)) for read in (data.run_ids, data.others))
-    return Judged(**vars(finding), claim=claim, run_ids=run_ids, sources=sources)
+    run_ids = tuple(dict.fromkeys(data.run_ids))
+    return Judged(**vars(finding), claim=claim, run_ids=run_ids, others=data.others)
 
 
 def register_table(judged: Iterable[Judged]) -> pd.DataFrame:

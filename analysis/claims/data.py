@@ -15,6 +15,7 @@ from coartic import Execution, Task
 from coartic.analysis.comparisons.methods import TOLD, MethodRow
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import TRIALS, published_cells
+from coartic.analysis.report.document import RestsOn
 from coartic.analysis.signatures.rows import SignatureRow
 from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST
@@ -56,8 +57,8 @@ class Data:
     study: Study
     run_ids: list[str] = field(default_factory=list)
     """Runs read so far, some of them more than once."""
-    others: list[str] = field(default_factory=list)
-    """What else was read."""
+    others: dict[str, RestsOn] = field(default_factory=dict)
+    """What else was read, in words, and of which kind it is."""
     _cells: list[tuple[str, str]] = field(default_factory=list)
 
     def recorded(
@@ -171,7 +172,7 @@ class Data:
         execution = initial_solution(self.task(name), self.study.model)
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
-        self.others.append(f"the corrective process on {name}")
+        self.others[f"the corrective process on {name}"] = "simulation"
         return execution
 
     def sequences(self, task: str) -> dict[str, float]:
@@ -182,7 +183,7 @@ class Data:
             raise MissingError(
                 f"this folder has no rewards of the corrective process alone on {task}"
             )
-        self.others.append("sequences.parquet")
+        self.others["sequences.parquet"] = "simulation"
         rewards = own.reward.to_numpy(dtype=np.float64, na_value=np.nan)
         return dict(zip(map(str, own.hands), rewards.tolist(), strict=True))
 

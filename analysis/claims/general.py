@@ -216,7 +216,7 @@ def _printed_p_values(data: Data) -> Finding:
         p = [_welch(first, second, off) for off in (0.0, 1.0)]
         holds.append(p[1] < entry.p_below)
         parts.append(f"{entry.id} p = {p[0]:.2g} ({p[1]:.2g} at best, printed < {entry.p_below})")
-    data.others.append("the paper's print")
+    data.others["the paper's print"] = "paper"
     return Finding(all(holds), "; ".join(parts))
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from coartic.analysis.claims.data import Data
 from coartic.analysis.claims.reconstructions import held_by
-from coartic.analysis.report.document import DataTable
+from coartic.analysis.report.document import DataTable, RestsOn
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, Inference
 from coartic.robot import Array
 
@@ -135,8 +135,8 @@ class Judged(Finding):
 
     claim: Claim
     run_ids: tuple[str, ...] = ()
-    sources: tuple[str, ...] = ()
-    """What it rests on beside runs."""
+    others: Mapping[str, RestsOn] = field(default_factory=dict)
+    """What it rests on beside runs, in words, and of which kind that is."""
     adjusted_p: float = math.nan
     """:attr:`p`, adjusted over its family (Holm)."""
     adjusted_contrary_p: float = math.nan
@@ -147,6 +147,18 @@ class Judged(Finding):
     """Chance of *not supported* if the contrary holds: :mod:`coartic.analysis.claims.power`."""
     visible: float = math.nan
     """True effect in every family with which so many instances support it with power 80 %."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """What it rests on beside runs, in words."""
+        return tuple(self.others)
+
+    @property
+    def origin(self) -> Mapping[str, tuple[RestsOn, ...]]:
+        """What verdict and evidence rest on where no runs are behind them."""
+        if self.run_ids:
+            return {}
+        return dict.fromkeys(("verdict", "evidence"), tuple(self.others.values()) or ("text",))
 
     @property
     def p(self) -> float:

@@ -91,8 +91,8 @@ class Column:
     """How its values were obtained, where the table's notes do not say it, in inline markup."""
     family: str = ""
     """Of which rows each value depends on all, not on its own alone, in words."""
-    other_arm: OtherArm = "free"
-    """Of the optimum that it rests on, if it does."""
+    other_arm: OtherArm | Literal["both"] = "free"
+    """Of the optimum that it rests on, if it does, or of both."""
     printed: bool = True
     """Whether the LaTeX table has it, which has to fit on a page of paper; a terminal has
     first what paper has."""
@@ -150,6 +150,8 @@ class DataTable:
     """Whether a page shows its caption alone until more is asked for."""
     unshown: tuple[CellKey, ...] = ()
     """Of every family, cells that have no row."""
+    key: tuple[str, ...] = ()
+    """Columns whose values, spaces between, are the rows' keys; none where keys are their own."""
 
     def __post_init__(self) -> None:
         names = [column.name for column in self.columns]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from coartic.analysis.markup import words
 from coartic.analysis.report.document import CellKey, DataTable
 from coartic.analysis.report.formats.templates import on_one_line, template
 from coartic.analysis.report.numbers import ORIGINS
-from coartic.analysis.report.tables.files import FILES
+from coartic.analysis.report.tables.files import FILES, METHOD_ROWS
 from coartic.analysis.report.tables.layout import LAYOUTS
 from coartic.analysis.report.text import heads, texts
 from coartic.analysis.report.trace_file import (
@@ -24,6 +24,7 @@ from coartic.analysis.report.trace_file import (
     trace_content,
 )
 from coartic.analysis.study import load
+from coartic.inputs import brief, read_bytes
 from coartic.stored import content_hash
 from coartic.text import counted, did_you_mean, shell_line
 
@@ -52,6 +53,8 @@ class Trace:
     home: Path
     """The report's folder."""
     file: TraceFile
+    note: str = ""
+    """What does not fit."""
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -77,9 +80,10 @@ def find_trace(folder: Path, name: str, where: Sequence[str] = ()) -> Trace:
 
     Raises CoarticError for none or several, and as these do.
     """
-    if name not in FILES:
+    if not name.endswith(".csv"):
         return trace(find_report(folder), name, where)
-    places = folder, folder.parent
+    of_report = [folder.parent] if (folder / FILE).is_file() else []
+    places = folder, *of_report
     results = _found(folder, "manifest.json", places, "results folder", "coartic run SUITE")
     return trace_in_file(results, name, where)
 
@@ -111,10 +115,20 @@ def trace_in_file(folder: Path, name: str, where: Sequence[str]) -> Trace:
 
     Raises CoarticError where the folder cannot be read, or has nothing of that name.
     """
+    if name not in FILES:
+        near = did_you_mean(name, FILES) or f"; there are {', '.join(FILES)}"
+        raise CoarticError(f"no file {brief(name)} of `coartic run` or `analyse`{near}")
     study = load(folder)
-    table = FILES[name].table(study)
-    content = trace_content(study, [table], (), study.run_ids)
-    return _of_table(folder / "report", content, table, where)
+    table, text = FILES[name].table(study), FILES[name].text(study)
+    found = _of_table(
+        folder / "report", trace_content(study, [table], (), study.run_ids), table, where
+    )
+    path = folder / name
+    if path.is_file() and read_bytes(path, 2 * len(text) + 1) == text.encode():
+        return found
+    made = "coartic run" if FILES[name] is METHOD_ROWS else "coartic analyse"
+    why = "is not there, or not what the records give"
+    return replace(found, note=f"{path} {why}; `{made}` makes it")
 
 
 def trace(home: Path, name: str, where: Sequence[str] = ()) -> Trace:
@@ -166,21 +180,24 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
     columns = {column.name: place for place, column in enumerate(table.columns)}
     if len(where) != 2:
         raise CoarticError(
-            f"{table.id} is a table: name a row and a column of it, one of\n  rows: "
-            f"{_first(map(repr, rows))}\n  columns: {', '.join(columns)}"
+            f"{table.id} is a table: name a row and a column of it, one of\n  rows"
+            f"{table.key and ' by ' + ', '.join(table.key)}: {_first(map(repr, rows))}\n"
+            f"  columns: {', '.join(columns)}"
         )
     known: dict[str, Collection[str]] = {"row": rows, "column": columns}
     for (what, names), name in zip(known.items(), where, strict=True):
         if name not in names:
             near = did_you_mean(name, names) or f"; `coartic trace {table.id}` lists them"
-            raise CoarticError(f"table {table.id} has no {what} {name!r}{near}")
+            raise CoarticError(f"table {table.id} has no {what} {brief(name)!r}{near}")
     row, place = rows[where[0]], columns[where[1]]
     column, tasks = table.columns[place], {task for task, _ in row.cells}
     rests_on = row.rests_on.get(column.name, column.rests_on)
     known_best = [
         (f"Optimum of {task}, other arm {arm}, {best.reward}: {best.how}.", best.cells)
         for task, arm, best in content.optima
-        if "optimum" in rests_on and task in tasks and arm == (row.other_arm or column.other_arm)
+        if "optimum" in rests_on
+        and task in tasks
+        and (row.other_arm or column.other_arm) in (arm, "both")
     ]
     # The tables of methods share what stands above them all.
     above = LAYOUTS["methods"].reading_with() if table.id.startswith("methods-") else ()

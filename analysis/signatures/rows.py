@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, ImportString
+from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
 from coartic.analysis.references import Key
 from coartic.analysis.statistics.intervals import Interval
@@ -110,9 +110,10 @@ class Signature(BaseModel):
     name: str
     measure: ImportString[Measure]
     unit: str
-    range: str
+    range: str = "share of runs"
     by_goal: bool = False
     share: bool = False
+    simulated: bool = False
     meaning: str
     heading: str
     table: Shown
@@ -120,6 +121,12 @@ class Signature(BaseModel):
     matrix: str = ""
     macro: str = ""
     sources: tuple[Key, ...] = ()
+
+    @model_validator(mode="after")
+    def _says_its_range(self) -> Self:
+        if self.share == ("range" in self.model_fields_set):
+            raise ValueError(f"signature {self.name}: it has a range, or is a share of runs")
+        return self
 
     @property
     def extent(self) -> str:

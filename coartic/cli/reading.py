@@ -190,7 +190,8 @@ def compare(
     from coartic.analysis.comparisons.versions import compare_versions, load_pair
     from coartic.analysis.report.formats.markdown import markdown
     from coartic.analysis.report.pages.versions import versions_document
-    from coartic.analysis.report.tables.files import VERSIONS, csv_text
+    from coartic.analysis.report.tables.files import csv_text
+    from coartic.analysis.report.tables.layout import LAYOUTS
     from coartic.analysis.results.archive import opened
     from coartic.files import check_outputs, write_outputs
 
@@ -203,7 +204,7 @@ def compare(
     with opened(first) as a, opened(second) as b:
         found = replace_field(compare_versions(*load_pair(a, b)), folders=(first, second))
     document = versions_document(found)
-    texts = {out: markdown(document, tables=""), csv: csv_text(VERSIONS, found.cells)}
+    texts = {out: markdown(document, tables=""), csv: csv_text(LAYOUTS["versions"], found.cells)}
     written = {path: text.encode() for path, text in texts.items() if path is not None}
     write_outputs(written, replace=replace)
     show_data(document.tables(), f"see {out}" if out else "--out PAGE.md has all")

@@ -34,11 +34,11 @@ def raw_columns(table: DataTable) -> dict[str, list[Value]]:
         for place, ending in enumerate(_ENDINGS[part.kind]):
             raw = (part.raw(value)[place] for value in of_rows)
             found[f"{part.column.name}{ending}"] = [missing if x is None else x for x in raw]
-    found["cells"] = [_cells(row.cells) for row in table.rows]
+    found["cells"] = [_cells(row.cells) or None for row in table.rows]
     for column in table.columns:
         if any(column.name in row.cells_by_column for row in table.rows):
             own = (row.cells_by_column.get(column.name, ()) for row in table.rows)
-            found[f"{column.name}_cells"] = list(map(_cells, own))
+            found[f"{column.name}_cells"] = [_cells(cells) or None for cells in own]
     return found
 
 

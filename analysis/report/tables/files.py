@@ -9,8 +9,9 @@ from typing import Any, Self
 import pandas as pd
 from pydantic import model_validator
 
-from coartic.analysis.report.document import CellKey, DataTable, Row, Value
+from coartic.analysis.report.document import CellKey, DataTable, RestsOn, Row, Value
 from coartic.analysis.report.tables.layout import TableLayout, read_layouts
+from coartic.analysis.signatures.locus import families
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.study import Study
 from coartic.tables import label_of
@@ -23,12 +24,11 @@ class FileLayout(TableLayout):
     """A section of ``files.toml``, which says what the fields are."""
 
     key: tuple[str, ...]
-    depends_within: tuple[str, ...] = ()
     optimum: str | None = None
 
     @model_validator(mode="after")
     def _names_columns(self) -> Self:
-        named = {*self.key, *self.depends_within, *filter(None, [self.optimum])}
+        named = {*self.key, *filter(None, [self.optimum])}
         unknown = named - {column.name for column in self.columns}
         if unknown:
             raise ValueError(f"no columns {', '.join(sorted(unknown))}")
@@ -44,6 +44,11 @@ class CsvFile:
     rows: Callable[[Study], pd.DataFrame]
     cells: Callable[[Study, _Raw], Iterable[CellKey]]
     how: Callable[[_Raw], str]
+    """What a row's values are, where the columns do not say it."""
+    rests_on: Callable[[Study, _Raw], Mapping[str, tuple[RestsOn, ...]]]
+    """By column, what a row's values rest on where it is not what the column says."""
+    family: Callable[[_Raw], str]
+    """Rows of one name depend on each other, in columns with a family."""
 
     @property
     def name(self) -> str:
@@ -63,13 +68,14 @@ class CsvFile:
                 tuple(_value(row[column.name]) for column in layout.columns),
                 tuple(dict.fromkeys(self.cells(study, row))),
                 how=self.how(row),
-                family=_joined(row, layout.depends_within) or key,
+                rests_on=self.rests_on(study, row),
+                family=self.family(row) or key,
                 other_arm=row[layout.optimum] if layout.optimum else None,
             )
             for row in self.rows(study).to_dict("records")
             for key in [_joined(row, layout.key)]
         )
-        return DataTable(self.name, layout.caption, layout.columns, rows)
+        return DataTable(self.name, layout.caption, layout.columns, rows, key=layout.key)
 
 
 def csv_text(layout: TableLayout, rows: pd.DataFrame) -> str:
@@ -89,18 +95,23 @@ def _value(raw: Any) -> Value:
 
 
 def _joined(row: _Raw, columns: Iterable[str]) -> str:
-    """Values of some columns with spaces between, whole numbers without decimals."""
-    values = (row[name] for name in columns)
-    texts = (repr(v).removesuffix(".0") if isinstance(v, float) else str(v) for v in values)
-    return " ".join(filter(None, texts))
+    """Values of some columns as the file has them, with spaces between."""
+    return " ".join(filter(None, (str(row[name]) for name in columns)))
 
 
 def _of_cell(study: Study, row: _Raw) -> Iterator[CellKey]:
     """Of a task's method, which has its variant with it or in a column."""
-    label = label_of(row["method"], row.get("variant", ""))
-    yield row["task"], label
-    if (row.get("against"), label) in study.cells:
-        yield row["against"], label
+    yield row["task"], label_of(row["method"], row.get("variant", ""))
+
+
+def _of_signature(study: Study, row: _Raw) -> Iterator[CellKey]:
+    """The same method on all tasks that a value is taken over."""
+    task, label = row["task"], label_of(row["method"], row["variant"])
+    tasks: tuple[str, ...] = (task, row["against"])
+    if not pd.isna(row["moving"]):
+        known = families(study.tasks)
+        tasks = next(f.tasks for f in known if task in f.tasks and f.moving == row["moving"])
+    return ((name, label) for name in tasks if (name, label) in study.cells)
 
 
 def _of_pair(study: Study, row: _Raw) -> Iterator[CellKey]:
@@ -118,6 +129,22 @@ def _of_claim(study: Study, row: _Raw) -> Iterator[CellKey]:
     return (cell for cell, own in study.run_ids.items() if not runs.isdisjoint(own))
 
 
+def _of_simulation(study: Study, row: _Raw) -> Mapping[str, tuple[RestsOn, ...]]:
+    columns = ("value", "low", "high", "p", "n", "why_not")
+    simulated = REGISTER[row["signature"]].simulated
+    return dict.fromkeys(columns, ("runs", "simulation")) if simulated else {}
+
+
+def _of_gaps(study: Study, row: _Raw) -> Mapping[str, tuple[RestsOn, ...]]:
+    """Gaps, unlike scores, are not taken from the corrective process alone."""
+    columns = ("share", "low", "high", "note")
+    return dict.fromkeys(columns, ("runs", "optimum")) if row["kind"] == "gap" else {}
+
+
+def _of_no_runs(study: Study, row: _Raw) -> Mapping[str, tuple[RestsOn, ...]]:
+    return next(entry.origin for entry in study.judged if entry.claim.id == row["id"])
+
+
 _LAYOUTS = read_layouts("files", FileLayout)
 
 
@@ -125,30 +152,45 @@ def _file(
     name: str,
     rows: Callable[[Study], pd.DataFrame],
     cells: Callable[[Study, _Raw], Iterable[CellKey]] = _of_cell,
+    *,
     how: Callable[[_Raw], str] = lambda row: "",
+    rests_on: Callable[[Study, _Raw], Mapping[str, tuple[RestsOn, ...]]] = lambda study, row: {},
+    family: Callable[[_Raw], str] = lambda row: "",
 ) -> CsvFile:
-    return CsvFile(_LAYOUTS[name], rows, cells, how)
+    return CsvFile(_LAYOUTS[name], rows, cells, how, rests_on, family)
 
 
 METHOD_ROWS = _file("methods", lambda study: study.methods)
 """What ``coartic run`` writes."""
 ANALYSES = (
-    _file("claims", lambda study: study.claims, _of_claim, lambda row: f"{row['test']}."),
-    _file("comparisons", lambda study: study.pairs, _of_pair),
+    _file(
+        "claims",
+        lambda study: study.claims,
+        _of_claim,
+        how=lambda row: f"{row['test']}.",
+        rests_on=_of_no_runs,
+        family=lambda row: str(row["correction"]),
+    ),
+    _file(
+        "comparisons",
+        lambda study: study.pairs,
+        _of_pair,
+        family=lambda row: "" if row["kind"] == "conditions" else str(row["task"]),
+    ),
     _file("across_tasks", lambda study: study.overall, _of_all_tasks),
-    _file("profiles", lambda study: study.profiles, _of_all_tasks),
+    _file("profiles", lambda study: study.profiles, _of_all_tasks, rests_on=_of_gaps),
     _file(
         "signatures",
         lambda study: study.signatures.drop(columns="label"),
+        _of_signature,
         how=lambda row: f"{row['signature']}: {REGISTER[row['signature']].meaning}.",
+        rests_on=_of_simulation,
     ),
     _file("anytime", lambda study: study.anytime),
     _file("targets", lambda study: study.targets),
-    _file("areas", lambda study: study.areas),
-    _file("pareto", lambda study: study.pareto),
+    _file("areas", lambda study: study.areas, family=lambda row: str(row["task"])),
+    _file("pareto", lambda study: study.pareto, family=lambda row: str(row["task"])),
 )
 """What ``coartic analyse`` writes, in its order."""
-VERSIONS = _LAYOUTS["versions"]
-"""Of what ``coartic compare`` writes, which is of two folders."""
 FILES = {file.name: file for file in (METHOD_ROWS, *ANALYSES)}
 """All of them by their names."""

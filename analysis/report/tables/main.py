@@ -113,4 +113,6 @@ def verdict_rows(
         said: dict[str, Value] = {"statement": claim.statement, "verdict": entry.marked}
         row = layout.row(claim.id, entry, cells, **said, **values)
         family = claim.id if math.isnan(entry.p) else claim.correction
-        yield replace(row, link=f"#claim-{claim.id}", family=family)
+        names = {column.name for column in layout.columns}
+        origin = {name: kinds for name, kinds in entry.origin.items() if name in names}
+        yield replace(row, link=f"#claim-{claim.id}", family=family, rests_on=origin)

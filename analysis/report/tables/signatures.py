@@ -190,7 +190,9 @@ def columns_of(
     kind: Literal["share", "number"] = "share" if signature.share else "number"
     unit = signature.unit if signature.unit in ("ticks", "bit", "rad", "pooled SD") else ""
     digits = 0 if signature.share else signature.digits
-    of_runs = partial(Column, rests_on=("runs",))
+    of_runs = partial(
+        Column, rests_on=("runs", "simulation") if signature.simulated else ("runs",)
+    )
     how = f"{signature.name[:1].upper()}{signature.name[1:]}: {signature.meaning}."
     yield of_runs(name, header, kind, unit, digits, how=how, printed=printed)
     if p:
