@@ -438,7 +438,7 @@ class Quick:
 
 def test_workers_run_little_ahead_of_who_takes_their_answers(monkeypatch):
     """Of a million runs the answers would fill the memory."""
-    quick = Quick()
+    quick, others = Quick(), threading.active_count()
     monkeypatch.setattr(executors, "keeper", lambda: contextlib.nullcontext(quick))
     answers = Local(2).perform([{"run_id": number} for number in range(500)])
     for taken in range(1, 30):
@@ -451,6 +451,11 @@ def test_workers_run_little_ahead_of_who_takes_their_answers(monkeypatch):
     ended = Local(2).perform([{"run_id": number} for number in range(500)])
     next(ended)
     ended.close()
+    for _ in range(100):
+        if threading.active_count() == others:
+            break
+        time.sleep(0.02)
+    assert threading.active_count() == others
     assert len(quick.begun) <= 500 + 9 + 2
 
 
