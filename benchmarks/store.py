@@ -41,8 +41,6 @@ class Store:
         self.folder = folder
         self.records = folder / "records"
         self._lock = FileLock(self.records / ".lock", timeout=0)
-        self.checked: set[str] = set()
-        """Runs whose newest record was checked, or made here, since this was last locked."""
         self._packs: Packs | None = None
         self._last: int | None = None  # number of a pack
 
@@ -70,7 +68,6 @@ class Store:
                 for folder in (self.folder, self.records):
                     clear_leftovers(folder)
                 self._packs = self._last = None
-                self.checked.clear()
                 check_layout(self.folder)
             except OSError as error:
                 raise CoarticError(f"cannot write to {self.folder}: {_why(error)}") from None
@@ -93,15 +90,10 @@ class Store:
         return self.packs()[run_id]
 
     def write(self, records: Iterable[Record]) -> None:
-        """Keep good records that are done together; they replace earlier ones of the same runs.
+        """Keep records that are done together; they replace earlier ones of the same runs.
 
         Raises CoarticError where the disk does not take them.
         """
-        records = list(records)
-        self.checked.update(record.run_id for record in records)
-        self._keep(records)
-
-    def _keep(self, records: Iterable[Record]) -> None:
         self._packs = None
         for pack in encode(records):
             try:
@@ -122,7 +114,6 @@ class Store:
             except RecordError:
                 doubtful += [record.run_id for record in lot]
             else:
-                self.checked.update(record.run_id for record in lot)
                 yield from lot
         damaged = {path: Damage(path, reason) for path, reason in packs.damaged.items()}
         for run_id in doubtful:
@@ -149,7 +140,7 @@ class Store:
                 if run_id not in damage.runs and packs.path(run_id) == path:
                     with contextlib.suppress(RecordError):
                         good.append(packs[run_id])
-        self._keep(good)
+        self.write(good)
         try:
             path.rename(path.with_name(f"damaged-{uuid.uuid4().hex[:8]}-{path.name}.txt"))
         except OSError as error:

@@ -15,6 +15,7 @@ from coartic.benchmarks.store import Store
 from coartic.errors import CoarticError
 from coartic.files import check_folder, check_no_report, digest_of, holds, publish, temporary
 from coartic.inputs import read_bytes
+from coartic.packs import Packs
 from coartic.record import check_together, in_lots
 from coartic.tables import (
     LARGEST_MANIFEST,
@@ -86,7 +87,7 @@ def write_tables(store: Store, manifest: Manifest) -> None:
             )
             for name, schema in schemas(plan).items()
         }
-        for name, table in row_groups(plan, _checked(manifest, store)):
+        for name, table in row_groups(plan, _checked(manifest, packs)):
             writers[name].write_table(table, row_group_size=max(1, len(table)))
         for writer in writers.values():
             writer.close()
@@ -124,10 +125,9 @@ def _digests(folder: Path) -> dict[str, str]:
     return digests
 
 
-def _checked(manifest: Manifest, store: Store) -> Iterator[Planned]:
-    packs = store.packs()
+def _checked(manifest: Manifest, packs: Packs) -> Iterator[Planned]:
     for cell in manifest.specification.cells:
         for lot in in_lots(packs[run_id] for run_id in manifest.run_ids(cell)):
-            check_together([record for record in lot if record.run_id not in store.checked])
+            check_together(lot)
             for record in lot:
                 yield cell, record
