@@ -67,24 +67,18 @@ def movements_from(
     ``paths`` holds the run's rows of ``paths.parquet``, for movements of kind ``path``.
     """
     names = list(task.robot.joint_names)
+    rows = rows.sort_values("order")
+    targets = rows[names].to_numpy(dtype=np.float64, copy=True)
+    columns = (rows[name].tolist() for name in ("order", "goal", "hand", "kind", "ticks"))
     movements = []
-    for row in rows.sort_values("order").to_dict("records"):
+    for target, order, goal, hand, kind, ticks in zip(targets, *columns, strict=True):
         waypoints = None
-        if row["kind"] == "path":
+        if kind == "path":
             if paths is None:
                 raise ValueError("a movement of kind 'path' needs the rows of paths.parquet")
-            own = paths[paths["order"] == row["order"]].sort_values("waypoint")
+            own = paths[paths["order"] == order].sort_values("waypoint")
             waypoints = own[names].to_numpy(dtype=np.float64)
-        movements.append(
-            Movement(
-                goal=int(row["goal"]),
-                hand=row["hand"],
-                kind=row["kind"],
-                target=np.array([row[name] for name in names], dtype=np.float64),
-                ticks=int(row["ticks"]),
-                waypoints=waypoints,
-            )
-        )
+        movements.append(Movement(int(goal), hand, kind, target, int(ticks), waypoints))
     return tuple(movements)
 
 
