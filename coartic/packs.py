@@ -151,7 +151,10 @@ class Chosen(Mapping[str, Record]):
     def __len__(self) -> int:
         return len(self._ids)
 
+    def __contains__(self, run_id: object) -> bool:
+        return run_id in self._ids
+
     def __getitem__(self, run_id: str) -> Record:
         if run_id not in self._ids:
-            raise RecordError(f"run {run_id} is not among these")
+            raise KeyError(f"run {run_id} is not among these")
         return self._packs[run_id]

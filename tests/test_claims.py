@@ -1206,6 +1206,10 @@ SAID = {
         ("rool", "counted", "Extra inputs are not permitted"),
         ("place", "", "stands in section 'Beyond the paper'"),
         ("section", "Beyond the paper", "is measured"),
+        ("pairs", {"two-armed-9": "EC3 > EC2"}, "there is no task 'two-armed-9'; did you mean"),
+        ("pairs", {"two-armed-1": "EC9 > EC2"}, "match pattern"),
+        ("pairs", {"two-armed-1": "EC3 LRLR < EC2"}, "match pattern"),
+        ("runs", {"two-armed-1": "EC3 LRXR"}, "match pattern"),
     ],
 )
 def test_a_claim_is_checked_where_it_is_read(field, value, words):

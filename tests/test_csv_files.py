@@ -9,7 +9,7 @@ import pytest
 
 from coartic import CoarticError
 from coartic.analysis.report.tables.files import FILES, METHOD_ROWS, csv_text
-from coartic.analysis.report.trace import find_trace, trace_in_file
+from coartic.analysis.report.trace import find_trace, trace_in_file, trace_text
 from coartic.analysis.report.trace_file import FILE
 from coartic.analysis.signatures import subtasks, trajectories
 from coartic.analysis.study import Study
@@ -166,10 +166,15 @@ def test_a_value_of_a_file_is_traced(traced, tmp_path):
                 for apart in (True, False))  # fmt: skip
     assert set.isdisjoint(*families)
     assert raw.note == ""
+    assert "\nrests on: runs, optimum\n" in trace_text(found)
+    score = trace_in_file(folder, "across_tasks.csv", ("dual-process (EC1, EC4)", "score"))
+    assert "\nrests on: runs, optimum, simulation\n" in trace_text(score)
     assert trace_in_file(folder, "areas.csv", (still.removesuffix(" 0.05"), "area")).note
     (folder / "comparisons.csv").write_text("forged", encoding="utf-8")
     forged = trace_in_file(folder, "comparisons.csv", (pair, "p"))
-    assert "not what the records give" in forged.note
+    assert "is not what the records give" in forged.note
+    (folder / "comparisons.csv").unlink()
+    assert "is not there" in trace_in_file(folder, "comparisons.csv", (pair, "p")).note
 
 
 def test_what_a_file_does_not_have(traced, tmp_path):

@@ -67,6 +67,8 @@ def test_nothing_is_checked_or_written_again(tmp_path, checks):
     assert (report.progress.total, report.progress.present, report.progress.done) == (2, 2, 0)
     assert said == [2]
     assert [record.run for record in report.records.values()] == [0, 1]
+    assert "x" not in report.records
+    assert report.records.get("x") is None
     assert checks == []
     assert files(tmp_path) == before
 

@@ -519,7 +519,7 @@ def test_what_no_runs_are_behind(home):
     paper = "printed in the paper (Shah, Barto & Fagg, 2013)"
     derived = "derived from what the paper prints (Shah, Barto & Fagg, 2013)"
     ours = "ours, chosen or assumed, not the paper's (Shah, Barto & Fagg, 2013)"
-    alone = "computed from the corrective process alone (sequences.parquet)"
+    alone = "computed from the corrective process alone"
     place = "Results, Exploration Condition"
     ascending = "published-and-ours", "ascending dual-process/EC1"
     fourth = "two-armed-1 dual-process/EC4"

@@ -158,7 +158,8 @@ class Judged(Finding):
         """What verdict and evidence rest on where no runs are behind them."""
         if self.run_ids:
             return {}
-        return dict.fromkeys(("verdict", "evidence"), tuple(self.others.values()) or ("text",))
+        kinds = tuple(dict.fromkeys(self.others.values())) or ("text",)
+        return dict.fromkeys(("verdict", "evidence"), kinds)
 
     @property
     def p(self) -> float:

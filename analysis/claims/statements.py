@@ -5,15 +5,24 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    TypeAdapter,
+    model_validator,
+)
 
 from coartic.analysis.claims.data import Cells, Data
 from coartic.analysis.claims.register import Claim, Finding, Rule, Section
 from coartic.analysis.printed import ENTRIES
 from coartic.analysis.words import stated
-from coartic.task import load_task
+from coartic.task import builtin_tasks, load_task
+from coartic.text import did_you_mean
 
 _APART = ("one-armed", "two-armed")
 _REGISTER = stated(__file__, "claims")
@@ -27,21 +36,38 @@ _SELECTED = {
 """Claims that goals which are not printed had to meet to be admitted."""
 
 
+_HANDS = "[LR]+"
+_RUNS = rf"(replay )?(EC[1-4]?|EC[1-4]-[a-z]+)( {_HANDS})?"
+Pair = Annotated[str, Field(pattern=rf"^{_RUNS} > ({_RUNS}|initial|best|jerk)$")]
+"""Two things that are compared, the first of which is said to be higher."""
+Counted = Annotated[str, Field(pattern=rf"^EC[1-4] ((not )?{_HANDS}|EC[1-4])$")]
+"""Runs that are counted by their hands."""
+
+
+def _is_shipped(task: str) -> str:
+    if task not in builtin_tasks():
+        raise ValueError(f"there is no task {task!r}{did_you_mean(task, builtin_tasks())}")
+    return task
+
+
+ShippedTask = Annotated[str, AfterValidator(_is_shipped)]
+
+
 class Said(BaseModel):
     """A claim of ``claims.toml``, which says what the fields are."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    statement: str
+    statement: Annotated[str, Field(min_length=1)]
     section: Section
     rule: Rule
     test: str = ""
-    beside: bool = False
-    pairs: dict[str, str | tuple[str, ...]] = {}
+    beside: StrictBool = False
+    pairs: dict[ShippedTask, Pair | tuple[Pair, ...]] = {}
     families: tuple[str, ...] = ()
-    compared: tuple[str, ...] = ()
+    compared: tuple[Pair, ...] = ()
     unit: str = ""
-    runs: dict[str, str] = {}
+    runs: dict[ShippedTask, Counted] = {}
     place: str = ""
     quote: str = ""
     figure: str = ""
@@ -68,13 +94,13 @@ def _read() -> dict[str, Said]:
     found = {}
     for section, rows in _REGISTER.items():
         for name, row in rows.items():
-            apart = "{which}" in row["statement"]
+            apart = "{which}" in row.get("statement", "")
             for which in _APART if apart else ("",):
                 own = {
                     key: said[which] if isinstance(said, dict) and which in said else said
                     for key, said in row.items()
                 }
-                own["statement"] = row["statement"].replace("{which}", which)
+                own["statement"] = row.get("statement", "").replace("{which}", which)
                 fitted = section == "Two-armed tasks" or which == "two-armed"
                 key = f"{name}-{which}" if apart else name
                 selected = key in _SELECTED
@@ -100,10 +126,8 @@ def decides(name: str, **given: Any) -> Callable[[Judging], Judging]:
         said = STATEMENTS[name]
         try:
             test = said.test.format(**vars(sys.modules[judge.__module__]) | MARGINS | given)
-        except KeyError as error:
-            raise ValueError(
-                f"claim {name}: its test names {error}, which nobody states"
-            ) from None
+        except (LookupError, ValueError, AttributeError) as error:
+            raise ValueError(f"claim {name}: its test names what nobody states: {error}") from None
         JUDGED[name] = said.claim(name, test, partial(judge, **given))
         return judge
 

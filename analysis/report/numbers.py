@@ -28,7 +28,7 @@ ORIGINS: dict[RestsOn, str] = {
     "ours": "ours, chosen or assumed, not the paper's (Shah, Barto & Fagg, 2013)",
     "derived": "derived from what the paper prints (Shah, Barto & Fagg, 2013)",
     "paper": "printed in the paper (Shah, Barto & Fagg, 2013)",
-    "simulation": "computed from the corrective process alone (sequences.parquet)",
+    "simulation": "computed from the corrective process alone",
     "runs": "computed of no runs, since none of its cells has any",
     "text": "text",
 }

@@ -24,7 +24,7 @@ from coartic.analysis.report.trace_file import (
     trace_content,
 )
 from coartic.analysis.study import load
-from coartic.inputs import brief, read_bytes
+from coartic.inputs import brief
 from coartic.stored import content_hash
 from coartic.text import counted, did_you_mean, shell_line
 
@@ -55,6 +55,8 @@ class Trace:
     file: TraceFile
     note: str = ""
     """What does not fit."""
+    rests_on: tuple[str, ...] = ()
+    """Kinds of what the value of a table rests on."""
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -123,11 +125,12 @@ def trace_in_file(folder: Path, name: str, where: Sequence[str]) -> Trace:
     found = _of_table(
         folder / "report", trace_content(study, [table], (), study.run_ids), table, where
     )
-    path = folder / name
-    if path.is_file() and read_bytes(path, 2 * len(text) + 1) == text.encode():
-        return found
+    path, why = folder / name, "is not there"
+    if path.is_file():
+        if path.read_bytes() == text.encode():
+            return found
+        why = "is not what the records give"
     made = "coartic run" if FILES[name] is METHOD_ROWS else "coartic analyse"
-    why = "is not there, or not what the records give"
     return replace(found, note=f"{path} {why}; `{made}` makes it")
 
 
@@ -218,4 +221,5 @@ def _of_table(home: Path, content: TraceFile, table: DataTable, where: Sequence[
         tuple(dict.fromkeys(cells)),
         home,
         content,
+        rests_on=rests_on,
     )

@@ -16,7 +16,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import pandas as pd
-from pydantic import TypeAdapter
+from pydantic import BaseModel, ConfigDict
 
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.signatures.between import Members, TwoContexts
@@ -37,17 +37,26 @@ IN_FAMILY = "the tasks that share its first goals are variants of it: see the lo
 NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
 
 
-_KINDS = TypeAdapter(dict[str, tuple[Signature, ...]]).validate_python(stated(__file__))
-WITHIN = _KINDS["within"]
+class _Kinds(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    within: tuple[Signature, ...]
+    contexts: tuple[Signature, ...]
+    families: tuple[Signature, ...]
+
+
+_KINDS = _Kinds.model_validate(stated(__file__))
+WITHIN = _KINDS.within
 """Of one method's runs on one task."""
-CONTEXTS = _KINDS["contexts"]
+CONTEXTS = _KINDS.contexts
 """Of one goal in two contexts."""
-FAMILIES = _KINDS["families"]
+FAMILIES = _KINDS.families
 """Of tasks that differ in one goal."""
 REGISTER = {signature.name: signature for signature in (*WITHIN, *CONTEXTS, *FAMILIES)}
 """All signatures by name."""
-if len(REGISTER) < len((*WITHIN, *CONTEXTS, *FAMILIES)):
-    raise ValueError("register.toml has two signatures of one name")
+for _signature in (*WITHIN, *CONTEXTS, *FAMILIES):
+    if REGISTER[_signature.name] is not _signature:
+        raise ValueError(f"register.toml has two signatures {_signature.name!r}")
 
 
 def signature_rows(study: Study) -> list[SignatureRow]:

@@ -169,7 +169,7 @@ ANALYSES = (
         _of_claim,
         how=lambda row: f"{row['test']}.",
         rests_on=_of_no_runs,
-        family=lambda row: str(row["correction"]),
+        family=lambda row: "" if pd.isna(row["p"]) else str(row["correction"]),
     ),
     _file(
         "comparisons",
