@@ -34,8 +34,6 @@ _COMPANIONS = {
     "High": "upper end of the interval of: ",
     "N": "number of runs of: ",
 }
-
-
 _MOST_NAMED = 20  # rows or folders in a message
 
 
