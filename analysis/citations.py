@@ -14,9 +14,8 @@ from coartic.text import one_line
 
 PAPER = "shah2013"
 _STATISTICS = (
-    *("efron1993", "davison1997", "cliff1993", "agarwal2021", "newcombe2006", "holm1979"),
-    *("chung2013", "schuirmann1987", "dolan2002", "kaplan1958", "brookmeyer1982"),
-    *("clopper1934", "cohen1988"),
+    *("efron1993", "davison1997", "agarwal2021", "newcombe2006", "holm1979"),
+    *("chung2013", "schuirmann1987", "cohen1988"),
 )
 
 _SPECIAL = {

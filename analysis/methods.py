@@ -1,33 +1,33 @@
-"""What the analysis knows of the built-in methods: names, looks and works behind them.
+"""What the analysis knows of the built-in methods: names, looks and the works behind them.
 
-A row of ``methods.toml`` for each; methods of others have none.
+``methods.toml`` has a row for each. A method of somebody else has none and goes by its id.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from coartic import Task, exploration
 from coartic.analysis.references import Key
-from coartic.analysis.words import stated
+from coartic.analysis.words import read_beside
 from coartic.learning import METHOD_PREFIX
+from coartic.record import SEARCH
 from coartic.text import one_line
 
 LEARNER = METHOD_PREFIX
-"""The paper's learner: the name begins so, and its exploration condition follows."""
+"""Beginning of the paper's learner's id; the exploration condition follows."""
 CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in exploration.CONDITIONS)
 """Labels of the learner under the paper's conditions: the first with one arm, the others with two,
-what explores more behind."""
+more exploration later."""
 TWO_ARMED = CONDITIONS[1:]
 TOGETHER = f"{LEARNER.rstrip('/')} ("
-"""So begins the label of several conditions together, each on the tasks that it is for."""
+"""Beginning of the label of several conditions together, each on the tasks that it is for."""
 INITIAL = "corrective-alone/given"
-"""Whose solution is the initial one."""
-
+"""The corrective process with a task's initial hands: the initial solution."""
 
 Color = Literal["blue", "sky", "green", "orange", "vermillion", "purple", "grey", "ink"]
 Dash = Literal["solid", "dashed", "dotted", "dash-dotted"]
@@ -38,22 +38,26 @@ class KnownMethod(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    short: str
-    """Its name in figures and printed tables."""
+    name: str
+    """Its one name, in figures, tables and sentences."""
+    algorithm: str
+    """What it is a form of; a ranking counts algorithms."""
     look: tuple[Color, Dash, str] | None = None
-    """Colour, dash and matplotlib's marker in all figures; None for what is left there."""
+    """Colour, dash and matplotlib's marker in all figures; None: one that is free."""
     headline: bool = False
-    """Whether it stands for its family where no methods are named."""
+    """Whether it stands for its algorithm where no methods are named."""
     works: tuple[Key, ...]
-    """Keys of ``references.bib``, the most telling first; none for what is this software's own."""
+    """Keys of ``references.bib``, the most telling first; none for this software's own."""
     solvers: tuple[Key, ...] = ()
     """Keys of the works behind what poses and solves its programmes."""
 
 
 KNOWN_METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).validate_python(
-    stated(__file__)
+    read_beside(__file__)
 )
 """Rows of the built-in methods by id, in the order of lists and figures."""
+HEADLINES = tuple(name for name, row in KNOWN_METHODS.items() if row.headline)
+"""Methods that stand for their algorithms where none are named."""
 _PARAMETERS = {
     "other_arm=": "other arm ",
     "noise_sd=": "σ ",
@@ -61,19 +65,7 @@ _PARAMETERS = {
     "hands=": "hands ",
     "timing=fixed": "fixed times",
 }
-
-
-FAMILIES: Mapping[str, str] = {
-    "dual-process": "learner",
-    "corrective-alone": "corrective process alone",
-    "random-search": "random search",
-    "cma-es": "CMA-ES",
-    "nullspace-qp": "null-space control",
-    "posture-based": "posture plan",
-    "trajectory-optimisation": "trajectory plan",
-    "optimum": "search for the optimum",
-}
-"""What the built-in methods of one family are called together."""
+_VARIANT = re.compile(r"=|\bEC\d-")
 
 
 def most_exploring(task: Task) -> str:
@@ -81,38 +73,75 @@ def most_exploring(task: Task) -> str:
     return EC4 if len(task.hands) > 1 else EC1
 
 
-def family_of(label: str) -> str:
-    """The family of a method in words; of one that is not built in what its name begins with."""
-    first = re.split(r"[/ ]", one_line(label), maxsplit=1)[0]
-    return FAMILIES.get(first, first)
+def is_learner(label: str) -> bool:
+    """Whether it is the paper's learner under its own conditions, alone or several together."""
+    return label.startswith((LEARNER, TOGETHER)) and not is_variant(label)
 
 
-def spoken_name(label: str) -> str:
-    """The name of a method with its variant as a sentence has it.
-
-    ``learner EC4``, ``null-space control (next goal)``.
-    """
-    name = short_name(label)
-    if label.startswith(LEARNER):
-        return f"{FAMILIES['dual-process']} {name}"
-    _, apart, rest = name.partition(": ")
-    return f"{family_of(label)} ({rest})" if apart and label in KNOWN_METHODS else name
+def is_variant(label: str) -> bool:
+    """Whether it was run with parameters of its own, or is an ablation of the learner."""
+    return bool(_VARIANT.search(label))
 
 
-def short_name(label: str) -> str:
-    """The name of a method with its variant as figures and printed tables show it.
+def is_search(label: str) -> bool:
+    """Whether it searches for the optimum: a reference rather than a method to compare."""
+    return label.startswith(SEARCH)
 
-    Of a method that is not built in it is the label itself. The learner's conditions together,
-    ``dual-process (EC1, EC4)``, are ``learner (EC1, EC4)``.
+
+def algorithm_of(label: str) -> str:
+    """What a method is a form of; a method without a row is its own algorithm."""
+    method = label.partition(" ")[0]
+    if label.startswith(TOGETHER):
+        method = EC4
+    return KNOWN_METHODS[method].algorithm if method in KNOWN_METHODS else one_line(label)
+
+
+def name_of(label: str) -> str:
+    """The name of a method with its variant, the same wherever it is shown.
+
+    ``learner EC4``, ``hill climbing``, ``CMA-ES (other arm still)``. The learner's conditions
+    together, ``dual-process (EC1, EC4)``, are ``learner (EC1, EC4)``; a method that is not built
+    in is its label.
     """
     label = one_line(label)
     if label.startswith(TOGETHER):
-        return label.replace(LEARNER.rstrip("/"), FAMILIES["dual-process"], 1)
+        return label.replace(LEARNER.rstrip("/"), "learner", 1)
     method, _, variant = label.partition(" ")
-    name = KNOWN_METHODS[method].short if method in KNOWN_METHODS else method
+    name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else method
     for key, words in _PARAMETERS.items():
         variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
-    if not variant:
-        return name
-    begun = f"{name[:-1]}, " if name.endswith(")") else f"{name} ("
-    return f"{begun}{variant.replace('_', ' ')})"
+    return f"{name} ({variant.replace('_', ' ')})" if variant else name
+
+
+def look_alike(label: str) -> str:
+    """Whose look a method has: the learner over all tasks that of its two-armed condition."""
+    if not label.startswith(TOGETHER):
+        return label
+    ends = (name for name in reversed(CONDITIONS) if name.removeprefix(LEARNER) in label)
+    return next(ends, label)
+
+
+def main_methods(labels: Iterable[str]) -> list[str]:
+    """Those of ``labels`` that stand for their algorithms, in the order of figures; else all.
+
+    The learner over all tasks takes the place of its single conditions.
+    """
+    labels = list(dict.fromkeys(labels))
+    together = [label for label in labels if label.startswith(TOGETHER)][:1]
+    single = [
+        label
+        for label in HEADLINES
+        if label in labels and not (together and label.startswith(LEARNER))
+    ]
+    foreign = [
+        label
+        for label in labels
+        if label.partition(" ")[0] not in KNOWN_METHODS and not label.startswith(TOGETHER)
+    ]
+    return [*together, *single, *foreign] or labels
+
+
+def in_order(labels: Collection[str]) -> list[str]:
+    """Labels in the order of lists and figures, methods without a row last."""
+    place = {name: number for number, name in enumerate(KNOWN_METHODS)}
+    return sorted(labels, key=lambda label: place.get(look_alike(label).partition(" ")[0], 999))

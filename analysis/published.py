@@ -42,11 +42,6 @@ class Summary:
         """What mean and SD rest on."""
         return "derived" if self.derived else "paper"
 
-    @property
-    def source_of_runs(self) -> Literal["paper", "derived", "ours"]:
-        """What the number of runs rests on."""
-        return self.source if self.runs_printed else "ours"
-
 
 @dataclass(frozen=True)
 class SequenceResult:

@@ -1,44 +1,27 @@
-"""The one entrance to a results folder: its tables, and all that is computed of them, each once.
+"""A results folder as data: its runs, cells, tasks, movements and optima.
 
-``load("results/all")`` reads a folder; everything else is a property, computed when it is first
-asked for. Most are functions of the study, whose docstrings say what they hold: ``optima`` is
-``optima(study)`` of :mod:`coartic.analysis.results.optima`, kept.
+``load("results/comparison")`` reads a folder. What is computed from it is a plain function of the
+study, in the packages beside this file; :func:`cached` makes such a function compute once a study.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import Any, TypeVar
 
 import pandas as pd
 
 from coartic import MotionModel, Task
-from coartic.analysis.claims import judge, register_table
-from coartic.analysis.comparisons.anytime import anytime_curves
-from coartic.analysis.comparisons.areas import areas
-from coartic.analysis.comparisons.methods import method_rows
-from coartic.analysis.comparisons.overall import combined, normalised_scores, over_tasks, profiles
-from coartic.analysis.comparisons.pairs import compared, pairs_table
-from coartic.analysis.comparisons.pareto import pareto_sets
-from coartic.analysis.comparisons.progress import best_so_far
-from coartic.analysis.comparisons.reached import reached
-from coartic.analysis.comparisons.targets import targets
-from coartic.analysis.generality.exploration import Contrast, contrasts
-from coartic.analysis.generality.presence import Signs, signs
-from coartic.analysis.generality.sample import sample
-from coartic.analysis.generality.scaling import Growth, scaling
 from coartic.analysis.results.folder import CellKey, CellRuns, Results, load_results
-from coartic.analysis.results.optima import optima
-from coartic.analysis.signatures.register import signature_rows, signatures_table
-from coartic.analysis.signatures.trajectories import all_trajectories, movements_by_run
+from coartic.analysis.results.optima import KnownOptimum, known_optima
+from coartic.analysis.trajectories import Trajectories, trajectories_of
 from coartic.files import folder_named
-from coartic.text import counted, did_you_mean
+from coartic.text import counted
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+Computed = TypeVar("Computed")
 
 
 def load(folder: str | Path) -> Study:
@@ -51,14 +34,19 @@ def load(folder: str | Path) -> Study:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Stored results and what follows from them."""
+    """The stored results of one folder."""
 
     results: Results
+    _computed: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")
-        suite = self.results.manifest.specification.suite
-        return f"Study of {self.results.folder}: {runs} of suite {suite}, {cells}"
+        return f"Study of {self.results.folder}: {runs} of suite {self.suite}, {cells}"
+
+    @property
+    def suite(self) -> str:
+        """Name of the suite that was run."""
+        return self.results.manifest.specification.suite
 
     @property
     def runs(self) -> pd.DataFrame:
@@ -75,9 +63,14 @@ class Study:
         """The constants of movement of all runs."""
         return self.results.manifest.specification.model
 
+    @property
+    def sequences(self) -> pd.DataFrame:
+        """Reward of the corrective process alone with every hand sequence of each task."""
+        return self.results.sequences
+
     @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
-        """Rows of the runs, in the order of the plan."""
+        """Runs by task and label (method with its variant), in the order of the plan."""
         return self.results.cells
 
     @cached_property
@@ -85,90 +78,44 @@ class Study:
         """Ids of the runs of every cell."""
         return {key: tuple(map(str, cell.runs.run_id)) for key, cell in self.cells.items()}
 
-    movements = cached_property(movements_by_run)
-    trajectories = cached_property(all_trajectories)
-    optima = cached_property(optima)
-    method_rows = cached_property(method_rows)
-    pair_rows = cached_property(compared)
-    best_so_far = cached_property(best_so_far)
-    anytime = cached_property(anytime_curves)
-    targets = cached_property(targets)
-    reached = cached_property(reached)
-    areas = cached_property(areas)
-    pareto = cached_property(pareto_sets)
-    signature_rows = cached_property(signature_rows)
-    instances = cached_property(sample)
-    judged = cached_property(judge)
+    @cached_property
+    def movements(self) -> tuple[dict[str, pd.DataFrame], dict[str, pd.DataFrame]]:
+        """Movements of each run's solution, and waypoints of those along a path, by run id."""
+        tables = (self.results.solutions(), self.results.paths())
+        movements, waypoints = (table[table.run_id.isin(self.runs.run_id)] for table in tables)
+        return _by_run(movements), _by_run(waypoints)
+
+    def trajectories(self, task: str, label: str) -> Trajectories:
+        """Solutions of a cell, executed again tick by tick, each cell once."""
+        key = task, label
+        if key not in self._executed:
+            self._executed[key] = trajectories_of(
+                self.cells[key], self.tasks[task], self.model, self.movements, self.sequences
+            )
+        return self._executed[key]
 
     @cached_property
-    def contrasts(self) -> list[Contrast]:
-        """More exploration against less on instances of families; none without any."""
-        return contrasts(self.instances) if self.instances else []
+    def _executed(self) -> dict[CellKey, Trajectories]:
+        return {}
 
     @cached_property
-    def growth(self) -> list[Growth]:
-        """How computing and gaps grow with goals and joints; none without instances."""
-        return scaling(self.instances) if self.instances else []
-
-    @cached_property
-    def signs(self) -> dict[CellKey, Signs]:
-        """Hands and signatures of the learner's runs on instances of families."""
-        return signs(self.instances) if self.instances else {}
-
-    @cached_property
-    def methods(self) -> pd.DataFrame:
-        """``method_rows`` as ``methods.csv`` has them: a column per field."""
-        return pd.DataFrame(list(self.method_rows.values()))
-
-    @cached_property
-    def pairs(self) -> pd.DataFrame:
-        """``pair_rows`` as ``comparisons.csv`` has them: a column per field."""
-        return pairs_table(self.pair_rows)
-
-    @cached_property
-    def scores(self) -> pd.DataFrame:
-        """Normalised rewards of every run, labels in place of methods and variants."""
-        return combined(normalised_scores(self))
-
-    @cached_property
-    def overall(self) -> pd.DataFrame:
-        """Methods over all tasks (:func:`~coartic.analysis.comparisons.overall.over_tasks`)."""
-        return over_tasks(self.scores)
-
-    @cached_property
-    def profiles(self) -> pd.DataFrame:
-        """Shares of runs by threshold (:func:`~coartic.analysis.comparisons.overall.profiles`)."""
-        return profiles(self.scores)
-
-    @cached_property
-    def signatures(self) -> pd.DataFrame:
-        """``signature_rows`` as a table, with the place in columns (docs/signatures.md)."""
-        return signatures_table(self.signature_rows)
-
-    @cached_property
-    def claims(self) -> pd.DataFrame:
-        """``judged`` as ``claims.csv`` has it, one row a claim."""
-        return register_table(self.judged)
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """Figures by id (docs/figures.md), each drawn when it is first asked for."""
-        from coartic.analysis.figures import Figures
-
-        return Figures(self)
-
-    @cached_property
-    def tables(self) -> Mapping[str, pd.DataFrame]:
-        """The report's tables by id, with the columns of their CSV files."""
-        from coartic.analysis.report.build import report_tables
-
-        return Tables(report_tables(self))
+    def optima(self) -> dict[tuple[str, str], KnownOptimum]:
+        """Best known reward by task and other arm (``"free"``, ``"still"``)."""
+        return known_optima(self.results)
 
 
-class Tables(dict[str, pd.DataFrame]):
-    """Tables by id."""
+def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]:
+    """A function of a study that computes its result once for each study."""
 
-    def __missing__(self, name: object) -> NoReturn:
-        """Raise KeyError, which names the table that may have been meant."""
-        hint = did_you_mean(str(name), self) or "; `list(study.tables)` names them"
-        raise KeyError(f"no table {name!r}{hint}")
+    @wraps(function)
+    def once(study: Study) -> Computed:
+        if function not in study._computed:
+            study._computed[function] = function(study)
+        result: Computed = study._computed[function]
+        return result
+
+    return once
+
+
+def _by_run(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    return {str(run_id): rows for run_id, rows in table.groupby("run_id")} if len(table) else {}

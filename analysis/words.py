@@ -15,17 +15,14 @@ if TYPE_CHECKING:
 
 NONE = "–"
 """Shown where there is no value."""
-NO_SPREAD = "no spread"
-"""Shown for an interval that is a point, which would look like certainty."""
-MINUS, NARROW_SPACE, TIMES = "−", "\N{NARROW NO-BREAK SPACE}", "×"
-RECONSTRUCTED = "† Reconstructed: what the paper does not print of this task was inferred."
+MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
+RECONSTRUCTED = "† The paper does not print the goals of this task; ours are a reconstruction."
 LONGEST_SLUG = 80
-"""Characters of a slug before its number; names of files must not be too long."""
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Characters of a slug before its number, since names of files must not be too long."""
 
 
-def stated(module: str, name: str = "") -> dict[str, Any]:
-    """What the TOML file beside a module says, of the module's name or another.
+def read_beside(module: str, name: str = "") -> dict[str, Any]:
+    """The TOML file beside a module, of the module's name or another.
 
     ``module``: its ``__file__``.
     """
@@ -34,29 +31,52 @@ def stated(module: str, name: str = "") -> dict[str, Any]:
     return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
-def short(value: float) -> str:
-    """With three figures: 950, 12.3 k, 4.98 M, 0.21; ∞, and a dash for NaN."""
+def number(value: float, digits: int | None = None) -> str:
+    """A number with a true minus and its thousands apart; a dash for NaN.
+
+    ``digits``: decimals; without them integers are whole and others have three figures.
+    """
     if math.isnan(value):
         return NONE
     if math.isinf(value):
-        return "∞" if value > 0 else "−∞"
-    for size, unit in ((1e6, " M"), (1e3, " k")):
-        if abs(value) >= 0.9995 * size:
-            return f"{value / size:.3g}{unit}"
-    return f"{value:.3g}"
+        return "∞" if value > 0 else f"{MINUS}∞"
+    if digits is None:
+        digits = 0 if value == round(value) else max(0, 2 - math.floor(math.log10(abs(value))))
+        if digits > 6:
+            return f"{value:.1e}".replace("-", MINUS)
+    text = f"{abs(value):,.{digits}f}"
+    if abs(value) < 10_000:
+        text = text.replace(",", "")
+    sign = MINUS if value < 0 and float(text.replace(",", "")) else ""
+    return sign + text.replace(",", NARROW_SPACE)
 
 
-def interval(found: Inference, style: str = ".1f") -> str:
-    """``2.1 [1.3, 2.9]``; without the brackets where there is no interval.
+def two_figures(value: float) -> str:
+    """With two figures: 0.46, 13, 7300, 980 000."""
+    rounded = float(f"{value:.2g}")
+    return number(rounded, 1 if 1 <= abs(rounded) < 10 else None)
 
-    An interval that is a point would look like certainty: it is given in words.
+
+def p_value(p: float) -> str:
+    """``p < 0.001`` or ``p = 0.012``, which no line breaks; empty for NaN."""
+    if math.isnan(p):
+        return ""
+    return ("p < 0.001" if p < 0.001 else f"p = {p:.2g}").replace(" ", NO_BREAK)
+
+
+def in_brackets(low: float, high: float, digits: int | None = None) -> str:
+    """An interval ``[1.3, 2.9]``; empty where there is none.
+
+    An interval that is a point shows no spread, and would look like certainty: it is left out.
     """
-    text = format(found.estimate, style)
-    if math.isnan(found.low) or math.isnan(found.high):
-        return text
-    if found.low == found.high:
-        return f"{text} (no spread in {' and '.join(map(str, found.n))} runs)"
-    return f"{text} [{found.low:{style}}, {found.high:{style}}]"
+    if math.isnan(low) or math.isnan(high) or low == high:
+        return ""
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def estimate(of: Inference, digits: int | None = None) -> str:
+    """``2.1 [1.3, 2.9]``; without the brackets where there is no interval."""
+    return f"{number(of.estimate, digits)} {in_brackets(of.low, of.high, digits)}".strip()
 
 
 def marked(name: str, task: Task) -> str:
@@ -64,45 +84,26 @@ def marked(name: str, task: Task) -> str:
     return f"{name} †" if task.reconstructed else name
 
 
-def tally(of: Mapping[Any, int]) -> str:
+def tally(counts: Mapping[Any, int]) -> str:
     """``LRLR 17, RRLR 3``, the commonest first; a dash for none."""
-    ordered = sorted(of.items(), key=lambda item: (-item[1], item[0]))
+    ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{name} {count}" for name, count in ordered) or NONE
 
 
-def true_minus(text: str) -> str:
-    """Text with a minus where a hyphen before a digit begins a word, in brackets or not."""
-    return re.sub(r"(?<![^\s(\[])-(?=\d)", MINUS, text)
-
-
-def typographic(number: str) -> str:
-    """A number of :func:`number_text` with a true minus and its thousands apart."""
-    comparison = number[:1] if number[:1] in ("<", ">") else ""
-    number = number.removeprefix(comparison)
-    sign = MINUS if number.startswith("-") else ""
-    number = number.removeprefix("-")
-    if number == "inf":
-        return f"{sign}∞"
-    mantissa, _, power = number.partition("e")
-    whole, dot, decimals = mantissa.partition(".")
-    if len(whole) > 4:
-        whole = f"{int(whole):,}".replace(",", NARROW_SPACE)
-    shown = f"{comparison}{sign}{whole}{dot}{decimals}"
-    return f"{shown} {TIMES} 10{power.translate(_SUPERSCRIPTS)}" if power else shown
+def listed(words: Iterable[str]) -> str:
+    """``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """Small letters, digits and dashes, all different: ``A_b`` is ``a-b``, ``a.b`` then ``a-b-2``.
-
-    A minus sign after an underscore is spelled out: ``goal_-1`` is ``goal-minus1``. A name with
-    none of them is ``x``.
-    """
-    found: dict[str, str] = {}
+    """A slug for every name (small letters, digits, dashes), no two the same."""
+    taken: dict[str, str] = {}
     for name in names:
-        signed = re.sub(r"(?<=[_=])-(?=\d)", "minus", name.lower())
-        base = re.sub(r"[^a-z0-9]+", "-", signed)[:LONGEST_SLUG].strip("-") or "x"
-        slug, number = base, 2
-        while slug in found.values():
-            slug, number = f"{base}-{number}", number + 1
-        found[name] = slug
-    return found
+        base = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:LONGEST_SLUG] or "x"
+        slug, count = base, 1
+        while slug in taken.values():
+            count += 1
+            slug = f"{base}-{count}"
+        taken.setdefault(name, slug)
+    return taken

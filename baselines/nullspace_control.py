@@ -244,7 +244,5 @@ class Controller:
         return moved
 
     def _error(self, q: Array, aim: Aim) -> Array:
-        error: Array = self.task.goal_array[aim.goal] - self.session.forward_kinematics(
-            q, aim.hand
-        )
+        error: Array = self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
         return error

@@ -115,9 +115,7 @@ class Optimum(Method):
         }
         return Result(made, details, bound=bound)
 
-    def _proof(
-        self, session: Session, task: Task, ticks: int
-    ) -> tuple[int | None, dict[str, Any]]:
+    def _proof(self, session: Session, task: Task, ticks: int) -> tuple[int | None, dict[str, Any]]:
         """Reward that is proven never to be exceeded, and how hard that was."""
         return None, {}
 

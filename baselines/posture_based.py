@@ -411,9 +411,7 @@ class _Planner:
             noise = sd * np.stack([search.noise[number] for search in searches])
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
-            accurate = self._accurate(
-                start, postures, [search.hands for search in searches], goals
-            )
+            accurate = self._accurate(start, postures, [search.hands for search in searches], goals)
             travel = np.where(accurate, _travel(start, postures), np.inf)
             order = np.argsort(travel, axis=1, kind="stable")
             centre, best = centre.copy(), best.copy()

@@ -62,9 +62,7 @@ def sample_postures(
     q = starts + spread * rng.standard_normal((count, robot.dof)) * moving
     # Anywhere in the disc, more often towards its rim, where short paths end.
     offset = rng.standard_normal((count, 2))
-    offset *= (
-        task.radius * rng.random((count, 1)) ** 0.25 / np.linalg.norm(offset, axis=1)[:, None]
-    )
+    offset *= task.radius * rng.random((count, 1)) ** 0.25 / np.linalg.norm(offset, axis=1)[:, None]
     aim = task.goal_array[goal] + 0.98 * offset
     miss = aim - robot.forward_kinematics(q, hand)
     far = np.maximum(1.0 - _NEAR / np.maximum(np.hypot(*miss.T), _NEAR), 0.0)

@@ -300,9 +300,7 @@ class Lagrangian:
             angles = found[:, side]
             for _ in range(_PARABOLAS):
                 excess = np.maximum(self.at(angles) - limit, 0.0)
-                rise = sign * (
-                    self.slopes - self.sizes * directions(angles - self.towards)[..., 1]
-                )
+                rise = sign * (self.slopes - self.sizes * directions(angles - self.towards)[..., 1])
                 safe = (rise + np.sqrt(rise**2 + 2.0 * size * excess)) / size
                 angles = np.where(excess > 0.0, angles + sign * safe, angles)
             found[:, side] = angles

@@ -114,9 +114,7 @@ class _MethodChecks:
     def tasks(self) -> list[Task]:
         found = [task for task in self._tasks if self.entry.why_not(task, self.defaults) is None]
         if not found:
-            raise _BrokenError(
-                "it applies to none of the shipped tasks, so nothing can be checked"
-            )
+            raise _BrokenError("it applies to none of the shipped tasks, so nothing can be checked")
         return found
 
     def spec(self, task: Task, seed: int = 1, budget: int | None = None) -> RunSpec:

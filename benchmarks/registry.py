@@ -107,8 +107,7 @@ class Entry:
             )
         except MethodFileError as error:
             raise MethodFileError(
-                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
-                f"{error}"
+                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: {error}"
             ) from None
         return None if reason is None else plain(str(reason))
 

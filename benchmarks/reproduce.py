@@ -14,7 +14,6 @@ from coartic.benchmarks.specification import Limits, RunSpec, Setting
 from coartic.benchmarks.store import Store
 from coartic.packs import Packs, check_layout
 from coartic.record import Record, RecordError
-from coartic.text import shell_line
 
 
 def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
@@ -27,9 +26,7 @@ def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
     for place in folders:
         check_layout(place)
     packs = [(Store(place), Packs(place)) for place in folders]
-    found = [
-        (store, run_id) for store, own in packs for run_id in own if run_id.startswith(wanted)
-    ]
+    found = [(store, run_id) for store, own in packs for run_id in own if run_id.startswith(wanted)]
     ids = sorted({run_id for _, run_id in found})
     if not ids:
         raise RecordError(f"no run {prefix!r} below {folder}; name another folder with --in")
@@ -72,14 +69,6 @@ def spec_of(record: Record, known: Registry, limits: Limits) -> RunSpec:
 def perform_once(spec: RunSpec) -> Record:
     """The record of one run, performed in a process of its own."""
     return record_of(supervise(spec.job()), spec)
-
-
-def command_for(record: Record, folder: Path) -> str:
-    """The command that performs the run of a record again."""
-    words: list[str | Path] = ["coartic", "reproduce", record.run_id, "--in", folder]
-    if record.origin.endswith(".py"):
-        words += ["--method-file", Path(record.origin)]
-    return shell_line(*words)
 
 
 def differences(a: Record, b: Record) -> list[str]:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -32,14 +32,12 @@ from coartic.benchmarks.suites import (
     select_cells,
 )
 from coartic.benchmarks.tables import (
-    OWNER,
-    PAGES,
     check_results_folder,
     is_done,
     statuses,
     write_tables,
 )
-from coartic.files import folder_named, publish
+from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.packs import Chosen, Packs
 from coartic.readings import ChosenReading, load_readings
@@ -118,10 +116,18 @@ class RunReport:
         return statuses(self.folder)["crashed"]
 
     def __repr__(self) -> str:
+        return self.sentence(self.wall_s)
+
+    def sentence(self, seconds: float) -> str:
+        """How many runs were made in so many seconds, how many failed, and where they are."""
         progress = self.progress
+        time = (
+            f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min {seconds % 60:.0f} s"
+        )
+        reused = f" ({progress.present} reused)" if progress.present else ""
+        failed = f"{progress.failed} failed" if progress.failed else "none failed"
         return (
-            f"{counted(progress.total, 'run')}: {progress.present} were there, {progress.done} "
-            f"done in {self.wall_s:.1f} s; {progress.failed} failed. Results in {self.folder}"
+            f"{counted(progress.total, 'run')}{reused} in {time}, {failed}: {self.folder}"
             f"{self._without}"
         )
 
@@ -131,16 +137,13 @@ class RunReport:
 
     @property
     def _without(self) -> str:
-        said, unasked = [], self.others - self.stale
+        """What else the folder keeps: runs that this command did not ask for."""
+        parts, unasked = [], self.others - self.stale
         if self.stale:
-            said.append(f"{counted(self.stale, 'run')} that other code made")
+            parts.append(f"{counted(self.stale, 'run')} made by a different version of the code")
         if unasked:
-            said.append(
-                f"{counted(unasked, 'run')} that the folder also keeps: tables are of what one "
-                "command asks for, so name all in one, and give other seeds, runs and trials a "
-                "folder of their own"
-            )
-        return f" (without {' and '.join(said)})" if said else ""
+            parts.append(f"{counted(unasked, 'run')} that this command did not ask for")
+        return f" (leaving out {' and '.join(parts)})" if parts else ""
 
 
 @dataclass(frozen=True)
@@ -168,14 +171,12 @@ class SuitePlan:
         retry_failed: bool = False,
         redo: bool = False,
         watch: Watcher | None = None,
-        pages: Callable[[Path], Mapping[str, bytes]] | None = None,
     ) -> RunReport:
         """Perform what a results folder lacks, then write its tables.
 
         ``executor`` is this machine, a process for every core, by default; ``retry_failed`` and
         ``redo`` perform anew what timed out or crashed, or everything; ``watch`` is called before
-        the first run and after each; ``pages`` makes further files, by name, of the
-        folder's tables, to be written before anybody else may work in it.
+        the first run and after each.
 
         A KeyboardInterrupt ends it and keeps what is done; so does whatever else. Called again,
         it goes on from there. Raises CoarticError where something else is in the way in the
@@ -194,8 +195,7 @@ class SuitePlan:
         store = Store(folder)
         with store.locked():
             watch = watch or (lambda progress, spec: None)
-            names = () if pages is None else PAGES
-            if not (retry_failed or redo) and is_done(store, manifest, names):
+            if not (retry_failed or redo) and is_done(store, manifest):
                 total = sum(cell.runs for cell in self.cells)
                 failed = total - statuses(folder)["ok"]
                 progress = Progress(total, present=total, failed=failed)
@@ -215,14 +215,10 @@ class SuitePlan:
             wall_s = time.perf_counter() - clock
             store.drop_superseded()
             write_tables(store, manifest)
-            if pages is not None:
-                publish(folder, pages(folder), owner=OWNER, alone=False)
             return RunReport(folder, progress, wall_s, manifest, len(store.packs()))
 
     def _manifest(self) -> Manifest:
-        return manifest_of(
-            self.suite, self.runs, self.seed, self.cells, self.limits, self.readings
-        )
+        return manifest_of(self.suite, self.runs, self.seed, self.cells, self.limits, self.readings)
 
 
 def _import_early() -> None:
@@ -295,6 +291,8 @@ def plan_cells(
     readings: Sequence[str] = (),
 ) -> SuitePlan:
     """As :func:`plan_suite`, of cells made by hand in place of the suite's."""
+    if runs is not None:  # asked for of all cells
+        cells = [replace(cell, runs=None) for cell in cells]
     runs = suite.runs if runs is None else runs
     trials = suite.trials if trials is None else trials
     limits = Limits(suite.time_limit_s) if limits is None else limits

@@ -81,9 +81,7 @@ class Times:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        prog="python -m coartic.benchmarks.speed", description=__doc__
-    )
+    parser = argparse.ArgumentParser(prog="python -m coartic.benchmarks.speed", description=__doc__)
     parser.add_argument("--repeats", type=int, default=1, help="measure so many times")
     repeats = parser.parse_args().repeats
     suite = load_suite("paper")
@@ -95,9 +93,7 @@ def main() -> None:
     print("compiling, unless it was done before ...", flush=True)
     warm_up()
     for number in range(repeats):
-        print(
-            f"\nMeasurement {number + 1} of {repeats}, microseconds of processor time a trial:\n"
-        )
+        print(f"\nMeasurement {number + 1} of {repeats}, microseconds of processor time a trial:\n")
         _print_cells(suite, cells, trials)
     _print_growth()
 

@@ -123,6 +123,8 @@ class _Block(BaseModel):
     move: _Move | None = None
     free_base: Annotated[bool, Field(strict=True)] = False
     """Whether the base moves in both directions, whatever the task locks."""
+    runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
+    """Runs per cell, where it is not the suite's number."""
     parameters: Annotated[dict[str, _Value], Field(max_length=MOST_PARAMETERS)] = {}
     grid: Annotated[
         dict[str, Annotated[tuple[_Value, ...], Field(min_length=1, max_length=MOST_CELLS)]],
@@ -192,6 +194,8 @@ class Cell:
     task: Task
     entry: Entry
     parameters: tuple[tuple[str, Scalar], ...] = ()
+    runs: int | None = None
+    """Where the suite asks for another number of runs than of its other cells."""
 
     @property
     def method(self) -> str:
@@ -422,14 +426,15 @@ def cell_plans(
     limits: Limits = UNLIMITED,
     chosen: Sequence[ChosenReading] = (),
 ) -> list[CellPlan]:
-    """What is asked for of every cell. ``trials`` goes to methods that have it.
+    """What is asked for of every cell; ``runs`` of those that do not say how many.
 
-    So does what is ``chosen`` of an exploration condition.
+    ``trials`` goes to methods that have it. So does what is ``chosen`` of an exploration
+    condition.
 
     Raises CoarticError for wrong parameters, for more than :data:`MOST_PLANNED` runs or
     :data:`MOST_TRIALS` trials, and where two cells ask for the same runs.
     """
-    count = sum(runs if cell.stochastic else 1 for cell in cells)
+    count = sum((cell.runs or runs) if cell.stochastic else 1 for cell in cells)
     if count > MOST_PLANNED:
         raise CoarticError(
             f"{count:_} runs are planned ({len(cells)} cells, {runs:_} runs of each that is "
@@ -453,7 +458,7 @@ def cell_plans(
                 f"at most {MOST_TRIALS:_} are kept"
             )
         setting = Setting(cell.task, cell.entry, tuple(parameters.items()), limits, model)
-        plan = CellPlan(cell, setting, runs if cell.stochastic else 1, seed)
+        plan = CellPlan(cell, setting, (cell.runs or runs) if cell.stochastic else 1, seed)
         first = names.setdefault(next(plan.specs()).run_id, cell)
         if first is not cell:
             raise CoarticError(
@@ -496,7 +501,7 @@ def _cells_of(suite: Suite, block: _Block, known: Registry, task: Task) -> list[
         for combination in itertools.product(*block.grid.values()):
             point = dict(zip(block.grid, combination, strict=True))
             parameters = {**block.parameters, **point}
-            cell = Cell(task, known[name], tuple(parameters.items()))
+            cell = Cell(task, known[name], tuple(parameters.items()), block.runs)
             cell.entry.complete(parameters)
             cells.append(cell)
     return cells
@@ -603,6 +608,7 @@ def _plan(
                 variant=cell.variant,
                 parameters=dict(cell.parameters),
                 complete=parameters,
+                runs=cell.runs,
             )
             for cell, parameters in complete
         ),

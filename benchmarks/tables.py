@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pyarrow as pa
@@ -29,21 +29,22 @@ from coartic.tables import (
 from coartic.text import plain
 
 OWNER = "run"
-"""Whose files of a results folder these are, and ``comparison.md`` and ``methods.csv``."""
-PAGES = ("comparison.md", "methods.csv")
+"""Whose files of a results folder these are."""
 DERIVED = (*(f"{name}.parquet" for name in TABLES), "manifest.json")
 
 
 def check_results_folder(folder: Path) -> None:
-    """Raises CoarticError where something in a folder is in the way of its tables, and for a
-    report's folder."""
-    names = (*DERIVED, *PAGES)
-    check_folder(folder, owner=OWNER, alone=False, names=names, derived=DERIVED)
+    """Raises CoarticError for a folder in which something is in the way of results."""
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / "records").is_dir():
+        raise CoarticError(
+            f"{folder} is not empty and holds no results of coartic. Choose another folder."
+        )
+    check_folder(folder, owner=OWNER, alone=False, names=DERIVED, derived=DERIVED)
     check_no_report(folder)
 
 
-def is_done(store: Store, manifest: Manifest, pages: Collection[str]) -> bool:
-    """Whether a folder holds the tables of a plan, and ``pages``, made of the records that it
+def is_done(store: Store, manifest: Manifest) -> bool:
+    """Whether a folder holds the tables of a plan, made of the records that it
     has now by this very version: what was checked then need not be checked again.
 
     Raises CoarticError where the list of its files is damaged.
@@ -51,7 +52,7 @@ def is_done(store: Store, manifest: Manifest, pages: Collection[str]) -> bool:
     now = manifest.environment
     if now.commit is not None and now.commit.dirty:
         return False  # nobody knows which code made them
-    if not holds(store.folder, (*DERIVED, *pages), owner=OWNER):
+    if not holds(store.folder, DERIVED, owner=OWNER):
         return False  # the list has tables and manifest as they were written together
     with contextlib.suppress(CoarticError, ValueError, LookupError, TypeError, RecursionError):
         data = read_bytes(store.folder / "manifest.json", LARGEST_MANIFEST)
@@ -94,9 +95,6 @@ def write_tables(store: Store, manifest: Manifest) -> None:
         digests = {f"{name}.parquet": digest_of(part) for name, part in parts.items()}
         whole = manifest.model_copy(update={"records": packs.digest, "tables": digests})
         files = {f"{name}.parquet": part for name, part in parts.items()}
-        for name in PAGES:  # of the tables before these: none is better than an old one
-            if holds(store.folder, [name], owner=OWNER):
-                (store.folder / name).unlink()
         publish(
             store.folder,
             {**files, "manifest.json": whole.text().encode()},

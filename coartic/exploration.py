@@ -165,6 +165,4 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:
         known = ", ".join(CONDITIONS | VARIANTS)
-        raise CoarticError(
-            f"unknown exploration condition {condition!r}; known: {known}"
-        ) from None
+        raise CoarticError(f"unknown exploration condition {condition!r}; known: {known}") from None

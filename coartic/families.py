@@ -54,7 +54,6 @@ from coartic.task import (
 from coartic.text import Line, counted, did_you_mean
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
-MOST_NUMBER = 999_999
 MOST_ATTEMPTS = 10_000
 """Draws of one instance; a family that needs more cannot be used."""
 CORRECTIVE = "corrective"

@@ -71,9 +71,7 @@ def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionM
     if model.arrival_tick not in (0, 1):
         raise ValueError(f"model.arrival_tick is {model.arrival_tick}; it must be 0 or 1")
     if model.max_iterations < 0:
-        raise ValueError(
-            f"model.max_iterations is {model.max_iterations}; it must not be negative"
-        )
+        raise ValueError(f"model.max_iterations is {model.max_iterations}; it must not be negative")
     if radius is not None and model.correction_tolerance >= radius:
         raise ValueError(
             f"model.correction_tolerance {model.correction_tolerance} is not below the goals' "

@@ -172,9 +172,7 @@ class Robot:
             result[..., 0, arm.first + k], result[..., 1, arm.first + k] = lever(xs, ys, k, tip)
         return self._hand(xs, ys, array), result
 
-    def nullspace_projector(
-        self, q: ArrayLike, hand: Hand, free: ArrayLike | None = None
-    ) -> Array:
+    def nullspace_projector(self, q: ArrayLike, hand: Hand, free: ArrayLike | None = None) -> Array:
         """Orthogonal projector on the nullspace of the hand's Jacobian.
 
         Joint displacements in its range leave the hand where it is, to first

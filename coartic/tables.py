@@ -147,6 +147,8 @@ class PlannedCell(Plain):
     """What the suite says of its parameters."""
     complete: Values
     """All of them, as its runs have them."""
+    runs: Count | None = None
+    """Where they are not the plan's."""
 
     @property
     def label(self) -> str:
@@ -204,7 +206,8 @@ class Manifest(Plain):
             model=plan.model._asdict(),
             trial_budget=self.limits.trials,
         )
-        seeds = run_seeds(plan.seed, cell.task, plan.runs if method.stochastic else 1)
+        runs = cell.runs or plan.runs
+        seeds = run_seeds(plan.seed, cell.task, runs if method.stochastic else 1)
         return [f"{key}-{method.code}" for key in asked.keys(seeds)]
 
     def seal(self) -> str:

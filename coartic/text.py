@@ -9,14 +9,13 @@ through :func:`one_line` wherever it comes from: each language escapes its own m
 from __future__ import annotations
 
 import difflib
-import json
 import os
 import re
 import shlex
 import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
@@ -50,20 +49,6 @@ def printed(text: str) -> str:
 
     def shown(match: re.Match[str]) -> str:
         return match[0] if _prints(match[0]) else match[0].encode("unicode_escape").decode()
-
-    return _DOUBTFUL.sub(shown, text)
-
-
-def json_text(content: Any, *, indent: int | None = None, allow_nan: bool = True) -> str:
-    """JSON in which every character prints; compact without ``indent``."""
-    separators = None if indent else (",", ":")
-    text = json.dumps(
-        content, indent=indent, separators=separators, ensure_ascii=False, allow_nan=allow_nan
-    )
-
-    def shown(match: re.Match[str]) -> str:
-        # Line breaks are only between values, where indent makes them.
-        return match[0] if _prints(match[0]) or match[0] == "\n" else json.dumps(match[0])[1:-1]
 
     return _DOUBTFUL.sub(shown, text)
 

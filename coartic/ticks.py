@@ -53,9 +53,7 @@ class Trajectory:
         return self.configurations[first : self.hits[goal - 1] + 1]
 
 
-def trajectory(
-    task: Task, movements: Iterable[Movement], model: MotionModel = PAPER
-) -> Trajectory:
+def trajectory(task: Task, movements: Iterable[Movement], model: MotionModel = PAPER) -> Trajectory:
     """Execute a solution and keep every control tick.
 
     Agrees with :func:`~coartic.solution.execute` bit for bit in the number of ticks and

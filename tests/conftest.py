@@ -97,30 +97,6 @@ def _plain_width(monkeypatch):
 
 
 @pytest.fixture
-def undrawn():
-    """Reports without figures, which take long and have tests of their own."""
-    from tests.support import reports
-
-    with reports.undrawn():
-        yield
-
-
-@pytest.fixture(scope="module")
-def read_once():
-    """Commands one after the other read a folder once: what they find in it is found once."""
-    from functools import cache
-
-    from coartic.analysis import study
-    from coartic.analysis.comparisons import versions
-
-    once = cache(study.load)
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (study, versions):
-            patch.setattr(module, "load", once)
-        yield
-
-
-@pytest.fixture
 def in_this_process(monkeypatch):
     """Runs without processes of their own, which take long and have tests of their own."""
     import coartic.benchmarks.executors

@@ -228,10 +228,9 @@ def test_command(tmp_path, monkeypatch, capsys):
     assert found == ["coartic", PAPER, "whitney1969", "method-test-good"]
     assert "% the paper, corrective-alone/given\n" in text
     assert "% test/good, a method of others, cites: None (2026).\n" in text
-    _, every, _ = call(monkeypatch, capsys, "cite", "--analysis", "--format", "bibtex")
+    _, every, _ = call(monkeypatch, capsys, "cite", "--analysis")
     assert set(re.findall(r"@\w+\{([^,]+),", every)) == {"coartic", *BIB}
     for arguments, words in (
-        (("--format", "ris"), "--format ris: the one format is bibtex"),
         ((tmp_path / "nowhere",), "does not exist"),
         ((tmp_path,), "is not a results folder"),
     ):

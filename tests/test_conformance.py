@@ -14,10 +14,9 @@ from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.specification import RunSpec
 from coartic.task import TASK_FOLDER
+from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
 from tests.support.suites import InProcess, ask_here, performed, spec_of
-
-from .attacks.inputs import GOOD
 
 BROKEN = Path(__file__).parent / "plugins" / "broken.py"
 BUILT_IN = registry()

@@ -294,9 +294,7 @@ def logged():
     """What reaches the handlers of Dask's loggers, which write on the terminal."""
     records = queue.SimpleQueue()
     handler = logging.handlers.QueueHandler(records)
-    loggers = [
-        logging.getLogger(name) for name in ("distributed", "distributed.client", "asyncio")
-    ]
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client", "asyncio")]
     for logger in loggers:
         logger.addHandler(handler)
     yield records

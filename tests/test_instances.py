@@ -12,7 +12,6 @@ from coartic.analysis.statistics.instances import (
     components,
     other_tasks,
     paired,
-    regression,
 )
 from coartic.analysis.statistics.power import power
 
@@ -137,42 +136,3 @@ def test_instances_that_show_a_difference():
     assert chance(0.5, 1.0, 20, 0.05) == pytest.approx((np.abs(t) > 2.093).mean(), abs=0.03)
     with pytest.raises(ValueError, match="difference of 0"):
         found.needed(0.0, 1)
-
-
-def test_intervals_of_slopes_are_those_of_fits_to_drawn_instances():
-    """Beside the obvious: instances drawn one by one, each draw fitted."""
-    rng = np.random.default_rng(3)
-    groups = np.repeat(["a", "b"], (10, 20))
-    table = rng.uniform(0, 1, (30, 2))
-    values = table @ [1.0, -2.0] + rng.exponential(0.3, 30)
-    table[groups == "b"] += 1.0  # what sets groups apart is no slope
-    values[groups == "b"] += 5.0
-    effects, _ = regression(values, table, list(groups), seed=0)
-    design = np.column_stack([groups == "a", groups == "b", table]).astype(float)
-    fits = []
-    for _ in range(4000):
-        drawn = np.concatenate(
-            [rng.choice(np.flatnonzero(groups == g), (groups == g).sum()) for g in "ab"]
-        )
-        fits.append(np.linalg.lstsq(design[drawn], values[drawn], rcond=None)[0])
-    for effect, own in zip(effects, np.transpose(fits)[2:], strict=True):
-        ends = np.quantile(own, (0.025, 0.975))
-        np.testing.assert_allclose((effect.low, effect.high), ends, atol=0.12 * own.std() * 2)
-
-
-def test_a_planted_property_is_found_and_another_is_not():
-    rng = np.random.default_rng(8)
-    groups = ["a"] * 60 + ["b"] * 60
-    table = rng.uniform(0, 1, (120, 3))
-    table[:, 1] = 4.0  # no instance differs in it
-    values = 0.2 + 0.5 * table[:, 0] + rng.normal(0, 0.1, 120)
-    (pays, same, idle), explained = regression(values, table, groups, seed=0)
-    assert pays.low < 0.5 < pays.high
-    assert pays.low > 0.3
-    assert math.isnan(same.estimate)
-    assert idle.low < 0 < idle.high
-    assert 0.5 < explained < 0.9
-    again, _ = regression(values, table, groups, seed=0)
-    assert again[0] == pays
-    with pytest.raises(ValueError, match="too few"):
-        regression(values[:6], table[:6], groups[:6], seed=0)

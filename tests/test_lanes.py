@@ -155,9 +155,7 @@ def results(store):
 
 
 def test_what_goes_wrong_side_by_side_is_performed_again_in_parts(tmp_path):
-    cells = paper_cells(
-        tasks=["ascending"], methods=["dual-process/EC1", "corrective-alone/given"]
-    )
+    cells = paper_cells(tasks=["ascending"], methods=["dual-process/EC1", "corrective-alone/given"])
     planned = [spec for _, spec in run_specs(cells, runs=LANES + 2, seed=0, trials=3)]
     found = []
     for number, executor in enumerate((InProcess(), Nobody())):

@@ -373,9 +373,7 @@ def test_failed_trials_are_recorded_and_teach_nothing():
 
 
 def test_run_without_any_completed_trial():
-    task = tiny_task(
-        locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]], initial_hands="R"
-    )
+    task = tiny_task(locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]], initial_hands="R")
     run = learn(task, "EC1", seed=0, trials=20)
     assert run.status == "infeasible"
     assert "all 20 trials" in run.reason

@@ -25,7 +25,6 @@ from coartic.baselines.corrective_alone import EverySequence
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES, Aim, Controller
 from coartic.baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
-from coartic.benchmarks import qp_solvers
 from coartic.method import MethodError, Session
 from coartic.robot import directions
 from tests.support.strategies import configurations, tiny_task
@@ -69,9 +68,7 @@ def exact(rows, least, preferred):
             found = preferred + np.linalg.pinv(some) @ (least[list(active)] - some @ preferred)
             if (rows @ found < least - 1e-9).any():
                 continue
-            if best is None or np.linalg.norm(found - preferred) < np.linalg.norm(
-                best - preferred
-            ):
+            if best is None or np.linalg.norm(found - preferred) < np.linalg.norm(best - preferred):
                 best = found
         return best
 
@@ -479,25 +476,3 @@ def test_looking_farther_ahead_pays():
     alone, none, one, two = totals
     assert none < one < two
     assert two > 0.9 * alone
-
-
-def test_table_of_solvers(monkeypatch):
-    monkeypatch.setattr(qp_solvers, "HANDS", "RRR")
-    monkeypatch.setattr(qp_solvers, "TASK", "ascending")
-    monkeypatch.setattr(qp_solvers, "_reward", lambda solver: "-293")
-    monkeypatch.setattr(qp_solvers, "_WARM_UP", 1)
-    found = qp_solvers.recorded(3)
-    figures = qp_solvers.measure(found)
-    figures["osqp"].modelled.failures.append("level 2: osqp ended user_limit")
-    figures["osqp"].modelled.solutions[0] = None
-    text = qp_solvers.table(found, figures)
-    rows = [line.strip("| ").split(" | ") for line in text.splitlines()[2:6]]
-    assert [row[0] for row in rows] == list(qp_solvers.SOLVERS)
-    for row in rows:
-        assert all(0 < float(figure) < 60_000 for figure in row[1:6])  # ms
-        assert max(float(figure) for figure in row[7:9] if figure != "-") < 1e-5
-        if row[0] in ("clarabel", "daqp"):  # the others give up now and then
-            assert row[9] == "0, 0"
-            assert 0 < int(row[6].rstrip("%")) < 100
-    assert "osqp: level 2: osqp ended user_limit" in text
-    assert all(f"{name} " in qp_solvers.conditions() for name in ("cvxpy", "daqp", "osqp"))

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from coartic import PAPER, CoarticError, Robot, corrective_trial, hand_sequences, load_task
 from coartic.analysis import printed
-from coartic.analysis.claims.statements import STATEMENTS
+from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.printed import (
     ENTRIES,
     Base,
@@ -173,7 +173,7 @@ def test_numbers_of_a_condition_fit_together(name):
 
 def test_entries_refer_to_what_is_there():
     for entry in ENTRIES.values():
-        assert set(entry.claims) <= set(STATEMENTS), entry.id
+        assert set(entry.claims) <= set(CLAIMS), entry.id
         if entry.task is None:
             continue
         goals = len(load_task(entry.task).goals)

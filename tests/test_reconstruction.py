@@ -6,7 +6,6 @@ import itertools
 import math
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -47,7 +46,6 @@ from coartic.analysis.reconstruction.scoring import (
 from coartic.analysis.reconstruction.search import Search
 from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from coartic.sequences import CorrectiveTrials, corrective_trials
-from tests.support.commands import call
 
 TASK = load_task("two-armed-1")
 NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
@@ -263,9 +261,7 @@ def test_a_chance_is_that_of_the_rounded_figures() -> None:
     figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
     (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
     drawn = rng.choice(rewards, (60_000, 20))
-    alike = (np.round(drawn.mean(axis=1)) == -301) & (
-        np.round(drawn.std(axis=1, ddof=1), 1) == 2.9
-    )
+    alike = (np.round(drawn.mean(axis=1)) == -301) & (np.round(drawn.std(axis=1, ddof=1), 1) == 2.9)
     assert math.exp(part.log_chance) == pytest.approx(alike.mean(), rel=0.2)
     (part,) = likelihoods(figures[:1], Learned(np.full(100, -301.0), ("R",) * 100))
     assert math.exp(part.log_chance) == pytest.approx(1.0, abs=0.1)
@@ -348,29 +344,6 @@ def test_lines_stand_beside_what_is_printed() -> None:
     assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
     with pytest.raises(CoarticError, match="unknown task 'nope'"):
         lines(["nope"], runs=3)
-
-
-def test_tables_of_others_are_not_written_over(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    """Said before anything is computed; what the command wrote itself it replaces."""
-    own = tmp_path / "own"
-
-    def said(folder: Path) -> str:
-        asked = ("printed", "ascending", "--runs=3", "--trials=20", "--out", folder)
-        code, _, error = call(monkeypatch, capsys, *asked)
-        assert (code == 0) == (folder == own), error
-        return error
-
-    said(own), said(own)
-    assert "EC1 mean" in (own / "printed.csv").read_text(encoding="utf-8")
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "printed.csv").write_text("mine", encoding="utf-8")
-    monkeypatch.setattr("coartic.analysis.reconstruction.lines.lines", None)  # nothing is computed
-    assert "printed.csv" in said(other)
-    assert (other / "printed.csv").read_text(encoding="utf-8") == "mine"
-    assert str(own / "printed.csv") in said(own / "printed.csv")
 
 
 def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:

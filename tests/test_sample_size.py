@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from coartic.analysis.statistics.power import POWER, power, runs_needed, smallest_difference
+from coartic.analysis.statistics.power import POWER, power, runs_needed
 
 
 @pytest.mark.parametrize(("effect", "runs"), [(0.2, 310), (0.5, 51), (0.8, 21), (1.0, 14)])
@@ -64,16 +64,3 @@ def test_limits():
     for sds, runs in (((1, 1), 1), ((1, -1), 5)):
         with pytest.raises(ValueError, match="power needs"):
             power(1, *sds, runs)
-
-
-@pytest.mark.parametrize("sds", [(3, 3), (7, 2), (12, 0)])
-def test_the_smallest_difference_is_what_the_runs_find(sds):
-    found = smallest_difference(*sds, 20)
-    assert power(found, *sds, 20) == pytest.approx(POWER, abs=1e-6)
-    assert runs_needed(found * 1.0001, *sds) <= 20 < runs_needed(found * 0.98, *sds)
-
-
-def test_the_smallest_difference_of_textbooks_and_without_spread():
-    """51 runs of each find half an SD, 50 do not."""
-    assert smallest_difference(10, 10, 51) <= 5 < smallest_difference(10, 10, 50)
-    assert smallest_difference(0, 0, 5) == 0

@@ -12,10 +12,7 @@ from hypothesis import strategies as st
 from scipy import integrate, stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
-from coartic.analysis.calibration import signatures as simulated
-from coartic.analysis.calibration.simulation import rate
 from coartic.analysis.references import references
-from coartic.analysis.report.tables.files import FILES
 from coartic.analysis.results.folder import Results
 from coartic.analysis.signatures.context import (
     context_dependence,
@@ -40,19 +37,17 @@ from coartic.analysis.signatures.paths import (
     spectral_arc_length,
     turning_angles,
 )
-from coartic.analysis.signatures.register import REGISTER
-from coartic.analysis.signatures.rows import Place
+from coartic.analysis.signatures.register import REGISTER, signatures
 from coartic.analysis.signatures.subtasks import (
-    change_from,
     excess,
     isolated_agreement,
     isolated_reaches,
     sacrifice_p,
     sacrifices,
 )
-from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, entropy
 from coartic.analysis.statistics import intervals
 from coartic.analysis.study import Study
+from coartic.analysis.trajectories import Trajectories, best_sequences, change_from, entropy
 from coartic.rows import movement_rows
 from coartic.solution import other_arm_travel
 from tests.support.made_up import manifest_for
@@ -242,16 +237,18 @@ def test_jackknife_is_the_loop_over_runs():
 
 
 def test_synergy_finds_what_is_planted():
-    null, complement = subspaces(simulated.JACOBIAN)
-    runs = simulated.SCATTERS["normal"](rng(7), 20)
-    quiet = synergy(runs, simulated.JACOBIAN)
+    task = load_task("ascending")
+    jacobian = task.robot.jacobian(task.q0, "right")[:, movable(task, "right")]
+    null, complement = subspaces(jacobian)
+    runs = 0.05 * rng(7).standard_normal((20, 6))
+    quiet = synergy(runs, jacobian)
     assert quiet.z.p > 0.05
     assert quiet.z.low < quiet.neutral < quiet.z.high
     squeezed = runs @ (null @ null.T + 0.2 * complement @ complement.T)
-    assert synergy(squeezed, simulated.JACOBIAN).z.p < 1e-6
-    assert synergy(squeezed, simulated.JACOBIAN).delta > 1.2
-    assert math.isnan(synergy(runs[:1], simulated.JACOBIAN).delta)
-    assert math.isnan(synergy(runs[[0, 0, 0]], simulated.JACOBIAN).delta)
+    assert synergy(squeezed, jacobian).z.p < 1e-6
+    assert synergy(squeezed, jacobian).delta > 1.2
+    assert math.isnan(synergy(runs[:1], jacobian).delta)
+    assert math.isnan(synergy(runs[[0, 0, 0]], jacobian).delta)
 
 
 # Subtasks and hands
@@ -322,7 +319,7 @@ def test_other_hands_are_no_sacrifice(tmp_path):
     initial, other = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
     assert change_from(other, initial)[0] > 1  # the old comparison took this for a sacrifice
     assert other.ticks < initial.ticks
-    frame = Study(results(tmp_path, [(task, "every", [other.movements])])).signatures
+    frame = signatures(Study(results(tmp_path, [(task, "every", [other.movements])])))
     rows = frame.set_index("signature")
     assert rows.loc["first subtask against initial"].value > 1
     assert rows.loc["first subtask against the same hands"].value == 0
@@ -674,9 +671,7 @@ def results(folder, solved, runs=None):
             rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
                          "status": "ok", "run": run, "reward": execution.reward,
                          "hands": execution.hands})  # fmt: skip
-            movements += [
-                {"run_id": run_id, **r} for r in movement_rows(task, execution.movements)
-            ]
+            movements += [{"run_id": run_id, **r} for r in movement_rows(task, execution.movements)]
         if not solutions:
             rows.append({"run_id": f"{task.name}-{method}", "task": task.name, "method": method,
                          "variant": "", "status": "infeasible", "run": 0})  # fmt: skip
@@ -700,8 +695,8 @@ def test_frame_of_two_contexts(tmp_path):
             (task, "failed", []),
         ]
     folder = results(tmp_path, solved)
-    frame = Study(folder).signatures
-    assert frame.equals(Study(folder).signatures)  # nothing is random but by its seed
+    frame = signatures(Study(folder))
+    assert frame.equals(signatures(Study(folder)))  # nothing is random but by its seed
 
     def one(method, signature):
         rows = frame[(frame.task == "ascending") & (frame.method == method)]
@@ -734,13 +729,7 @@ def test_frame_of_a_family(tmp_path):
         lower = 0.02 * (height - 2.0)
         targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
         solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
-    study = Study(results(tmp_path, solved))
-    frame = study.signatures
-    whole = frame[frame.moving.notna()].drop(columns="label").to_dict("records")
-    assert whole
-    for row in whole:  # all tasks are behind a slope
-        cells = [*FILES["signatures.csv"].cells(study, row)]
-        assert cells == [(task.name, "planner") for task, *_ in solved]
+    frame = signatures(Study(results(tmp_path, solved)))
     slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
     assert set(slopes.moving) == {2}
     norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])
@@ -768,7 +757,7 @@ def test_frame_has_the_student_interval_of_its_runs(tmp_path):
     bends = (0.0, 0.1, 0.2, 0.5)
     solutions = [planned(posture(1.0, left_4=b), posture(4.0), hands="RL") for b in bends]
     travelled = [execute(task, solution).configurations[0, 5] for solution in solutions]
-    frame = Study(results(tmp_path, [(task, "planner", solutions)])).signatures
+    frame = signatures(Study(results(tmp_path, [(task, "planner", solutions)])))
     row = frame[(frame.signature == "travel of the other arm") & (frame.goal == 1)]
     half = 3.1824463 * np.std(travelled, ddof=1) / 2  # Student's t, 3 degrees of freedom
     mean = np.mean(travelled)
@@ -776,22 +765,6 @@ def test_frame_has_the_student_interval_of_its_runs(tmp_path):
         [mean, mean - half, mean + half], abs=1e-7
     )
     assert row.n.item() == 4
-
-
-def test_places_in_words():
-    """As ``signatures.csv`` has always had them."""
-    assert str(Place()) == ""
-    assert str(Place(joint="base_x")) == "base x"
-    assert str(Place(hand="chosen")) == "chosen hand"
-    follows = Place(goal=1, moving=2, hand="right", joint="base_y")
-    assert str(follows) == "goal 1, anticipatory of goal 2, right hand, base_y"
-    assert str(Place(goal=3, moving=2)) == "goal 3, carry-over of goal 2"
-    context = Place(goal=1, hand="right", against="descending", longest=141)
-    assert str(context) == "goal 1, right hand, against descending, of at most 141"
-    assert (
-        str(Place(goal=2, hand="left", hands="RL", neutral=0.34657))
-        == "goal 2, left hand, RL, neutral at 0.347"
-    )
 
 
 def test_the_register_and_its_documentation_say_the_same():
@@ -814,43 +787,3 @@ def test_trajectories_put_like_sequences_together():
     assert [run.execution.hands for run in cell.typical] == ["RLRR", "RLRR"]
     assert len(cell.with_hand("left", 2)) == 2
     assert cell.initial.hands == "RRRR"
-
-
-# The simulations; their full grid is the module's command
-
-
-def share_of(check, simulations):
-    return rate(check, simulations, simulated.seed_of(simulated.SEED, 0, check))
-
-
-def test_nulls_are_nulls():
-    """Every simulated null has mean zero or equal variances, and rejects sometimes only."""
-    nulls = simulated.tests(planted=False)
-    assert len({null.name for null in nulls}) == len(nulls)
-    null, complement = simulated.NULLSPACE, simulated.RANGE
-    scatter = simulated.correlated(rng(9), 40_000)
-    per_dimension = [(scatter @ basis).var() for basis in (null, complement)]
-    assert per_dimension[0] == pytest.approx(per_dimension[1], rel=0.03)
-    for test in nulls:
-        if "20 and 20 runs" in test.data or test.subject == "ΔV z":
-            assert share_of(test, 40).value < 0.2
-
-
-def test_every_test_finds_what_is_planted():
-    """Each test that has nulls has effects as well, and finds them more often than nulls."""
-    planted = simulated.tests(planted=True)
-    subjects = {check.subject for check in planted}
-    assert subjects == {check.subject for check in simulated.tests(planted=False)}
-    for check in planted:
-        share, low, *_ = share_of(check, 12)
-        assert low > simulated.ALPHA, f"{check.name}: {share}"
-
-
-def test_intervals_hold_the_truth():
-    for check in simulated.coverage():
-        if check.subject in ("mean", "share") or "normal" in check.data:
-            share, _, high, _ = share_of(check, 60)
-            low_counts = "Poisson, 0.1" in check.data
-            assert high > (0.6 if low_counts else 0.9), f"{check.name}: {share}"
-    (_, first), (truth, second), _ = simulated.entropies(400)
-    assert first < second < truth == pytest.approx(0.8813, abs=1e-4)  # biased downwards

@@ -158,9 +158,7 @@ def test_a_planned_movement_is_always_made():
 
 
 def test_uncorrectable_plan_has_a_reason():
-    task = tiny_task(
-        locked_base=["x", "y"], goals=[[2.5, 0.1]], hands=["right"], initial_hands="R"
-    )
+    task = tiny_task(locked_base=["x", "y"], goals=[[2.5, 0.1]], hands=["right"], initial_hands="R")
     execution = execute(task, [Movement(1, "right", "corrective")])
     assert not execution.completed
     assert execution.reward is None

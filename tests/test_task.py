@@ -17,9 +17,8 @@ from coartic import (
     load_task,
 )
 from coartic.task import TASK_FOLDER, parse_task
+from tests.support.bad_inputs import GOOD, TASKS
 from tests.support.strategies import tiny_task
-
-from .attacks.inputs import GOOD, TASKS
 
 
 def write(tmp_path, text):

@@ -43,9 +43,7 @@ def polynomial(order, start, end, time):
     rows = []
     for at in (0.0, time):
         for d in range(order):
-            rows.append(
-                [math.perm(k, d) * (at ** (k - d) if k >= d else 0.0) for k in range(size)]
-            )
+            rows.append([math.perm(k, d) * (at ** (k - d) if k >= d else 0.0) for k in range(size)])
     return np.linalg.solve(rows, [*start, *end])
 
 

@@ -2,48 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.comparisons.methods import TOLD, MethodRow
+from coartic.analysis.comparisons.methods import MethodRow, method_rows
 from coartic.analysis.methods import LEARNER
-from coartic.analysis.published import TRIALS, published_cells
-from coartic.analysis.report.document import RestsOn
-from coartic.analysis.signatures.rows import SignatureRow
-from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, initial_solution
+from coartic.analysis.published import TRIALS
 from coartic.analysis.statistics.estimates import FEWEST
-from coartic.method import Information
+from coartic.analysis.study import Study
+from coartic.analysis.trajectories import Trajectories, best_sequences, initial_solution
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 ASCENDING, DESCENDING = "ascending", "descending"
 ONE, TWO = "two-armed-1", "two-armed-2"
 FREE = f"{ONE}.free-base"
 """Two-armed task 1 with a base that moves in both directions (suite ``ablations``)."""
 
-Cells = tuple[tuple[str, str], ...]
-"""Tasks with a condition each."""
-
-CELLS: Cells = published_cells()
-BEST: Cells = tuple(dict(CELLS).items())
-"""The condition that explores most, by task."""
-
-UNINFORMED = {TOLD[Information.CORRECTIVE_PROCESS], TOLD[Information.REWARD_BY_TRIAL]}
-"""All that the paper's learner is told (condition 2 is also told where the hands are)."""
-
 SMOOTH = ("squared-changes", "acceleration", "jerk")
 """Smoothness costs of trajectory optimisation; the first is Jordan's, the last Flash & Hogan's."""
-
-Read = TypeVar("Read")
 
 
 class MissingError(Exception):
@@ -57,23 +37,6 @@ class Data:
     study: Study
     run_ids: list[str] = field(default_factory=list)
     """Runs read so far, some of them more than once."""
-    others: dict[str, RestsOn] = field(default_factory=dict)
-    """What else was read, in words, and of which kind it is."""
-    _cells: list[tuple[str, str]] = field(default_factory=list)
-
-    def recorded(
-        self, read: Callable[[Data, str], Read | None], method: str
-    ) -> tuple[Read | None, tuple[tuple[str, str], ...]]:
-        """What ``read`` gives of a method, and the cells that it has read: tasks and labels.
-
-        None where the folder lacks what it reads.
-        """
-        before = len(self._cells)
-        try:
-            found = read(self, method)
-        except MissingError:
-            found = None
-        return found, tuple(dict.fromkeys(self._cells[before:]))
 
     def runs(self, task: str, method: str, hands: str | None = None) -> pd.DataFrame:
         """Solved runs of a method, of ``hands`` only those that learned that sequence.
@@ -98,7 +61,6 @@ class Data:
                 )
             if len(cell.runs) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}")
-        self._cells.append((task, method))
         found = cell.good if hands is None else cell.good[cell.good.hands == hands]
         self.run_ids.extend(found.run_id)
         return found
@@ -106,7 +68,7 @@ class Data:
     def row(self, task: str, method: str) -> MethodRow:
         """The row of :meth:`runs` in the table of methods."""
         self.runs(task, method)
-        return self.study.method_rows[task, method]
+        return method_rows(self.study)[task, method]
 
     def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
         """:meth:`runs` of the paper's learner."""
@@ -114,9 +76,8 @@ class Data:
 
     def rewards(self, task: str, condition: str, hands: str | None = None) -> Array:
         """Learned rewards of runs (that learned ``hands``), shape ``(runs,)``."""
-        return self._enough(
-            rewards_of(self.learned(task, condition, hands)), task, condition, hands
-        )
+        found = self.learned(task, condition, hands).reward.to_numpy(dtype=np.float64)
+        return self._enough(found, task, condition, hands)
 
     @staticmethod
     def _enough(found: Array, task: str, condition: str, hands: str | None) -> Array:
@@ -148,18 +109,7 @@ class Data:
     def cell(self, task: str, method: str) -> Trajectories:
         """Executed solutions; raises MissingError where there are none."""
         self.runs(task, method)
-        return self.study.trajectories[task, method]
-
-    def signature(
-        self, task: str, method: str, name: str, goal: int | None = None
-    ) -> SignatureRow:
-        """The first value of a signature (at a goal); MissingError without one."""
-        self.runs(task, method)
-        for row in self.study.signature_rows:
-            wanted = (row.task, row.label, row.signature) == (task, method, name)
-            if wanted and goal in (None, row.place.goal) and not math.isnan(row.value):
-                return row
-        raise MissingError(f"{name} of {method} on {task} has no value")
+        return self.study.trajectories(task, method)
 
     def task(self, name: str) -> Task:
         """A task of the folder."""
@@ -172,32 +122,25 @@ class Data:
         execution = initial_solution(self.task(name), self.study.model)
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
-        self.others[f"the corrective process on {name}"] = "simulation"
         return execution
 
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""
-        table = self.study.results.sequences
+        table = self.study.sequences
         own = table[table.task == task]
         if not len(own):
             raise MissingError(
                 f"this folder has no rewards of the corrective process alone on {task}"
             )
-        self.others["sequences.parquet"] = "simulation"
         rewards = own.reward.to_numpy(dtype=np.float64, na_value=np.nan)
         return dict(zip(map(str, own.hands), rewards.tolist(), strict=True))
 
     def best_sequences(self, task: str) -> tuple[list[str], float]:
         """Hand sequences that are best by the corrective process alone, and their reward."""
         known = self.sequences(task)
-        best = best_sequences(self.study.results.sequences, task)
+        best = best_sequences(self.study.sequences, task)
         if not best:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"
             )
         return best, known[best[0]]
-
-
-def rewards_of(runs: pd.DataFrame) -> Array:
-    """Rewards as numbers, shape ``(runs,)``."""
-    return runs.reward.to_numpy(dtype=np.float64)

@@ -1,8 +1,4 @@
-"""The paper's claims about all tasks, its processes, and informed search.
-
-Each is judged on the one-armed tasks, which are printed, and apart on the two-armed ones, which
-are a reconstruction.
-"""
+"""Judges of the paper's claims about the processes, informed search, and its own statistics."""
 
 from __future__ import annotations
 
@@ -15,20 +11,17 @@ import numpy as np
 from scipy import optimize, stats
 
 from coartic import Hand, Task
-from coartic.analysis.claims.data import BEST, CELLS, SMOOTH, UNINFORMED, Cells, Data, MissingError
-from coartic.analysis.claims.evidence import all_hold, exceeds, shown
-from coartic.analysis.claims.power import welch_p
-from coartic.analysis.claims.register import Finding
-from coartic.analysis.claims.statements import MARGINS, decides, decides_apart
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.claims.data import SMOOTH, Data
+from coartic.analysis.claims.register import MARGINS, Claim, Finding
+from coartic.analysis.claims.rules import all_hold, exceeds, shown
+from coartic.analysis.methods import name_of
 from coartic.analysis.printed import ENTRIES, Order, Solved
-from coartic.analysis.published import TRIALS, Summary, published_cell
+from coartic.analysis.published import Summary, published_cell
 from coartic.analysis.signatures.manifold import movable
 from coartic.analysis.signatures.subtasks import postures_before
 from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.words import short
+from coartic.analysis.words import number
 from coartic.learner import PARTS
-from coartic.record import SEARCH
 from coartic.robot import Array, Robot
 from coartic.task import hands_of
 
@@ -39,29 +32,29 @@ SPREAD = 0.3
 _PLAN = "trajectory-optimisation/"
 
 
-@decides_apart("corrective-ensures", CELLS)
-def _corrective_ensures(data: Data, cells: Cells) -> Finding:
+def corrective_ensures(data: Data, claim: Claim) -> Finding:
+    """Whether no trial fails, and the corrective process completes every hand sequence."""
     trials = failed = sequences = missed = 0
-    for task, condition in cells:
-        runs = data.learned(task, condition)
-        trials += int(runs.trials.sum())
-        failed += int(runs.failed_trials.sum())
-    for task in dict.fromkeys(task for task, _ in cells):
+    for task, conditions in claim.cells.items():
+        for condition in conditions:
+            runs = data.learned(task, condition)
+            trials += int(runs.trials.sum())
+            failed += int(runs.failed_trials.sum())
         rewards = list(data.sequences(task).values())
         sequences += len(rewards)
         missed += sum(map(math.isnan, rewards))
     return Finding(
         not failed and not missed,
-        f"{failed} of {trials} trials of the learner do not hit every goal; alone and without "
-        f"any practice it completes its task with {sequences - missed} of {sequences} hand "
-        "sequences",
+        f"{failed} of {number(trials)} trials of the learner fail to hit every goal. Without any "
+        f"experience, the corrective process completes {sequences - missed} of {sequences} hand "
+        "sequences.",
     )
 
 
-@decides_apart("corrective-near-shortest", CELLS)
-def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
+def corrective_near_shortest(data: Data, claim: Claim) -> Finding:
+    """Whether no subtask of the initial solution is much longer than the shortest path."""
     parts, all_excess = [], []
-    for name in dict.fromkeys(task for task, _ in cells):
+    for name in claim.cells:
         task, initial = data.task(name), data.initial(name)
         before, after = postures_before(initial, task), initial.configurations
         reaches = zip(before, hands_of(initial.hands), itertools.count(1), after, strict=False)
@@ -70,12 +63,12 @@ def _corrective_near_shortest(data: Data, cells: Cells) -> Finding:
         excess = ways / shortest - 1
         all_excess += excess.tolist()
         parts.append(
-            f"{name} {', '.join(f'{share:+.1%}' for share in excess)} (in all "
-            f"{ways.sum() / shortest.sum() - 1:+.1%})"
+            f"{name} {', '.join(f'{share:.1%}' for share in excess)} (in all "
+            f"{ways.sum() / shortest.sum() - 1:.1%})"
         )
     return Finding(
         max(all_excess) <= MARGINS["close"],
-        f"joint-space length of each subtask against the shortest: {'; '.join(parts)}",
+        f"By so much each subtask is longer than the shortest path: {'; '.join(parts)}.",
     )
 
 
@@ -140,71 +133,26 @@ def _shortest(
     return best
 
 
-@decides_apart("less-experience", BEST)
-def _less_experience(data: Data, cells: Cells) -> Finding:
-    parts = []
-    for task, condition in cells:
-        learner = data.row(task, LEARNER + condition)
-        plans = {cost: data.row(task, _PLAN + cost) for cost in ("path-length", *SMOOTH)}
-        better = [f"{cost} ({p.told})" for cost, p in plans.items() if p.reward >= learner.reward]
-        parts.append(
-            f"{task}: learner {learner.reward:.1f} after {learner.trials:.0f} trials, told "
-            f"{learner.told}; as good or better without any: {', '.join(better) or 'none'}"
-        )
-    return Finding(None, "; ".join(parts))
-
-
-@decides_apart("low-computation", BEST)
-def _low_computation(data: Data, cells: Cells) -> Finding:
-    parts = []
-    for task, condition in cells:
-        run = data.row(task, LEARNER + condition).evaluations
-        informed = {label: data.row(task, label).evaluations for label in _informed(data, task)}
-        if not informed:
-            raise MissingError(f"this folder has no runs of informed search on {task}")
-        few, many = (pick(informed, key=informed.__getitem__) for pick in (min, max))
-        parts.append(
-            f"{task}: learner {short(run)} in {TRIALS} trials, {short(run / TRIALS)} in one; "
-            f"{len(informed)} informed methods {short(informed[few])} ({few}) to "
-            f"{short(informed[many])} ({many})"
-        )
-    return Finding(None, "; ".join(parts))
-
-
-def _informed(data: Data, task: str) -> list[str]:
-    """Methods with default parameters that are told more than the learner, with solutions."""
-    return [
-        label
-        for (name, label), cell in data.study.cells.items()
-        if name == task
-        and " " not in label
-        and not label.startswith((LEARNER, SEARCH))
-        and len(cell.good) == len(cell.runs) > 0
-        and set(data.study.method_rows[task, label].told) - UNINFORMED
-    ]
-
-
-@decides_apart("beats-inaccurate", BEST)
-def _beats_inaccurate(data: Data, cells: Cells) -> Finding:
+def beats_inaccurate(data: Data, claim: Claim) -> Finding:
+    """Whether the learner beats a plan for smoothness on some task."""
     tests, parts = [], []
-    for task, condition in cells:
+    for task, (condition,) in claim.cells.items():
         rewards = data.rewards(task, condition)
         plans = []
-        for cost in SMOOTH:
-            plan = data.row(task, _PLAN + cost).reward
+        for label in (_PLAN + cost for cost in SMOOTH):
+            plan = data.row(task, label).reward
             tests.append(exceeds(rewards, plan))
-            plans.append(f"{cost} {plan:.0f}")
+            plans.append(f"{name_of(label)} {number(plan, 0)}")
         parts.append(f"{task}: learner {shown(rewards)}, {', '.join(plans)}")
     holds = any(test.estimate > 0 for test in tests)
     # The claim is that there are such cases: the best of all tests, corrected for their number.
     best = min(tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
     if holds:
         best = replace(best, p=min(1.0, best.p * len(tests)))
-    return Finding(holds, "; ".join(parts), (best,))
+    return Finding(holds, f"{'; '.join(parts)}.", (best,))
 
 
-@decides("printed-p-values")
-def _printed_p_values(data: Data) -> Finding:
+def printed_p_values(_: Data, claim: Claim) -> Finding:
     """Welch's test on what is printed of both sides, as far apart as rounding lets them be."""
     parts, holds = [], []
     for entry in ENTRIES.values():
@@ -216,8 +164,14 @@ def _printed_p_values(data: Data) -> Finding:
         p = [_welch(first, second, off) for off in (0.0, 1.0)]
         holds.append(p[1] < entry.p_below)
         parts.append(f"{entry.id} p = {p[0]:.2g} ({p[1]:.2g} at best, printed < {entry.p_below})")
-    data.others["the paper's print"] = "paper"
-    return Finding(all(holds), "; ".join(parts))
+    return Finding(all(holds), f"{'; '.join(parts)}.")
+
+
+def _welch_p(n: int, mean: float, variance: float, m: int, other: float, spread: float) -> float:
+    """One-tailed p of Welch's t-test that ``mean`` of n values is above ``other`` of m."""
+    one, two = variance / n, spread / m
+    freedom = (one + two) ** 2 / (one**2 / (n - 1) + two**2 / (m - 1))
+    return float(stats.t.sf((mean - other) / math.sqrt(one + two), freedom))
 
 
 def _printed(task: str | None, of: Solved) -> Summary | None:
@@ -234,22 +188,13 @@ def _welch(first: Summary, second: Summary, off: float) -> float:
     apart = sum(0.5 * 10.0 ** -(s.digits[0] if s.digits else 0) for s in (first, second))
     both = ((s.runs, s.mean, math.nan if s.sd is None else s.sd**2) for s in (first, second))
     (n, mean, variance), other = both
-    return float(welch_p(n, mean + off * apart, variance, *other))
+    return _welch_p(n, mean + off * apart, variance, *other)
 
 
-@decides_apart("not-normal", CELLS)
-def _not_normal(data: Data, cells: Cells) -> Finding:
-    parts = []
-    for task, condition in cells:
-        rewards = data.rewards(task, condition)
-        p = float(stats.shapiro(rewards).pvalue) if np.ptp(rewards) else math.nan
-        parts.append(f"{task} {condition} p = {p:.2g}")
-    return Finding(None, "; ".join(parts))
-
-
-@decides_apart("corrections", CELLS)
-def _corrections(data: Data, cells: Cells) -> Finding:
+def corrections(data: Data, claim: Claim) -> Finding:
+    """Whether fewer movements are corrected in the last tenth of the trials than in the first."""
     tests, parts = [], []
+    cells = ((task, name) for task, names in claim.cells.items() for name in names)
     for task, condition in cells:
         runs = data.learned(task, condition)
         movements = (runs.trials - 1) * len(data.task(task).goals) / PARTS
@@ -263,6 +208,6 @@ def _corrections(data: Data, cells: Cells) -> Finding:
     return all_hold(
         tests,
         parts,
-        "movements to goals that were corrected, in the first and the last tenth of the trials "
-        "and in the learned solution: ",
+        "Movements that were corrected, in the first and the last tenth of the trials and in the "
+        "learned solution: ",
     )

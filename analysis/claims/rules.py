@@ -1,9 +1,10 @@
-"""Judges of the rules that ``claims.toml`` states by what they compare or count."""
+"""Judges of claims that name what they compare or count."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -11,30 +12,25 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from coartic.analysis.claims.data import Data
-from coartic.analysis.claims.evidence import all_hold, exceeds, shown
-from coartic.analysis.claims.register import Claim, Finding
-from coartic.analysis.claims.statements import JUDGED, MARGINS, STATEMENTS
+from coartic.analysis.claims.register import MARGINS, Claim, Finding
 from coartic.analysis.printed import ENTRIES, Count
 from coartic.analysis.published import published_cell, published_exhaustive, published_initial
 from coartic.analysis.statistics.estimates import (
     Inference,
     difference_of_means,
+    mean,
     probability_of_improvement,
 )
-from coartic.analysis.statistics.hypotheses import Alternative, share_p, share_test
-from coartic.analysis.words import interval, tally
+from coartic.analysis.statistics.hypotheses import (
+    Alternative,
+    bootstrap_test,
+    share_p,
+    share_test,
+)
+from coartic.analysis.words import estimate, number, tally
 from coartic.robot import Array
 
 FEW, MOST = MARGINS["few"], MARGINS["most"]
-IN_WORDS = {
-    "higher": "one-tailed bootstrap test of the mean reward, each",
-    "most": f"exact binomial test that more than {MOST:.0%} of all runs do",
-    "few": f"exact binomial test that fewer than {MOST:.0%} of all runs do",
-    "about": f"exact binomial tests that more than {FEW:.0%} and fewer than {MOST:.0%} of all "
-    "runs do; the contrary: the share lies outside, and Fisher's exact test tells the counts from "
-    "the printed ones",
-}
-"""What the rules of this module test."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class Side:
         return self.name in ("initial", "best")
 
     def __str__(self) -> str:
-        return f"{self.name} {self.hands}".strip()
+        return f"{'replay of ' * self.replay}{self.name} {self.hands}".strip()
 
 
 def sides(pair: str) -> tuple[Side, Side]:
@@ -75,113 +71,42 @@ def counted_hands(text: str) -> tuple[str, str, bool]:
     return condition, hands, inverse == ["not"]
 
 
-def printed_known(task: str, side: Side) -> float | None:
-    """Printed reward of the corrective process alone."""
-    printed = published_initial(task) if side.name == "initial" else published_exhaustive(task)
-    return None if printed is None else printed[1]
-
-
-def _as_printed(task: str, side: Side) -> str | None:
-    """Mean reward of one side as the paper has it, in words."""
-    if side.known:
-        initial = published_initial(task)
-        derived = side.name == "initial" and initial is not None and initial.derived
-        value = printed_known(task, side)
-    else:
-        cell = published_cell(task, side.name)
-        of_hands = {s.hands: s.summary for s in cell.sequences} if cell else {}
-        summary = of_hands.get(side.hands) if side.hands else cell and cell.summary
-        value, derived = (summary.mean, summary.derived) if summary else (None, False)
-    return None if value is None else f"{value:.4g}{' (derived)' * derived}"
-
-
-def _rewards(data: Data, task: str, side: Side, other: Side) -> Array | float:
-    hands = side.hands or None
-    if side.name == "initial":
-        return data.initial_reward(task, other.name, other.hands or None)
-    if side.name == "best":
-        return data.best_sequences(task)[1]
-    if side.replay:
-        return data.replays(task, side.name, hands)
-    return data.rewards(task, side.name, hands)
-
-
-def _higher(data: Data, claim: Claim) -> Finding:
+def higher(data: Data, claim: Claim) -> Finding:
+    """one-tailed bootstrap test of the mean reward for each comparison"""
     tests, parts = [], []
     for task, pairs in claim.pairs.items():
         for first, second in map(sides, pairs):
             a, b = _rewards(data, task, first, second), _rewards(data, task, second, first)
-            assert not isinstance(a, float)
             tests.append(exceeds(a, b))
-            if isinstance(b, float):
-                found = f"{shown(a)} against {b:.0f} ({second})"
+            if second.known:
+                seen = f"{shown(a)} against {number(float(np.asarray(b)))} ({second})"
             else:
-                chance = probability_of_improvement(a, b)
-                found = (
-                    f"{shown(a)} in {len(a)} runs against {second} {shown(b)} in {len(b)}: "
-                    f"{interval(difference_of_means(a, b))}, "
-                    f"P(higher) {interval(chance, '.2f')}"
+                seen = (
+                    f"{shown(a)} against {shown(b)} ({second}), a difference of "
+                    f"{estimate(difference_of_means(a, b), 1)} ticks; the first is better with "
+                    f"probability {estimate(probability_of_improvement(a, b), 2)}"
                 )
             printed = [_as_printed(task, side) for side in (first, second)]
             if None not in printed:
-                found += f"; published {' and '.join(map(str, printed))}"
-            parts.append(f"{task} {'replay of ' * first.replay}{first} {found}")
+                seen += f"; published {printed[0]} and {printed[1]}"
+            parts.append(f"{task}, {first}: {seen}")
     return all_hold(tests, parts)
 
 
-def _count(data: Data, task: str, text: str) -> tuple[str, int, Counter[str]]:
-    """What is counted in words, how often, and all hand sequences."""
-    condition, hands, inverse = counted_hands(text)
-    found = data.hands(task, condition)
-    count, words = found[hands], f"{condition} {hands}"
-    if inverse:
-        count, words = found.total() - count, f"{condition} other hands than {hands}"
-    return words, count, found
+def most(data: Data, claim: Claim) -> Finding:
+    """exact binomial test that more than {most:.0%} of all runs do"""
+    return _share(data, claim, "most")
 
 
-def nearly_all(
-    words: str, count: int, total: int, rule: Literal["most", "few"] = "most"
-) -> Finding:
-    """Whether most runs do something; ``few``: whether it is not most of them."""
-    most = rule == "most"
-    alternative: Literal["greater", "less"] = "greater" if most else "less"
-    found = stats.binomtest(count, total, alternative=alternative).proportion_ci()
-    bound = f"at least {found.low:.0%}" if most else f"at most {found.high:.0%}"
-    return Finding(
-        count > MOST * total if most else count < MOST * total,
-        f"{words} in {count} of {total} runs, {bound} of all (95 %)",
-        (share_test(count, total, MOST, alternative),),
-        (share_test(count, total, MOST, "less" if most else "greater"),),
-    )
+def few(data: Data, claim: Claim) -> Finding:
+    """exact binomial test that fewer than {most:.0%} of all runs do"""
+    return _share(data, claim, "few")
 
 
-def _share(data: Data, claim: Claim) -> Finding:
-    ((task, text),) = claim.runs.items()
-    words, count, found = _count(data, task, text)
-    rule: Literal["most", "few"] = "most" if claim.rule == "most" else "few"
-    return nearly_all(f"{words} ({tally(found)})", count, found.total(), rule)
-
-
-def half_p(count: ArrayLike, total: int) -> Array:
-    """p that a share lies between :data:`FEW` and :data:`MOST`: the larger of two exact tests."""
-    bounds: tuple[tuple[float, Alternative], ...] = (FEW, "greater"), (MOST, "less")
-    return np.maximum(*(share_p(count, total, bound, side) for bound, side in bounds))
-
-
-def unlike_p(ours: tuple[int, int], printed: tuple[int, int]) -> float:
-    """Fisher's exact p of two counts, each out of so many runs."""
-    return float(stats.fisher_exact([[k, n - k] for k, n in (ours, printed)]).pvalue)
-
-
-def printed_count(task: str, condition: str, hands: str) -> tuple[int, int]:
-    """Runs that the paper prints for a hand sequence, and out of how many."""
-    cell = published_cell(task, condition)
-    assert cell is not None
-    known = {s.hands: s.summary.runs for s in cell.sequences}
-    return known[hands], sum(known.values())
-
-
-def _about(data: Data, claim: Claim) -> Finding:
+def about(data: Data, claim: Claim) -> Finding:
+    """exact binomial tests that more than {few:.0%} and fewer than {most:.0%} of all runs do; \
+for the opposite: the share lies outside, and Fisher's exact test tells the counts from the \
+printed ones"""
     ((task, text),) = claim.runs.items()
     condition, hands, _ = counted_hands(text)
     words, count, found = _count(data, task, text)
@@ -206,31 +131,97 @@ def _about(data: Data, claim: Claim) -> Finding:
     )
 
 
-_JUDGES = {"higher": _higher, "most": _share, "few": _share, "about": _about}
+def exceeds(values: ArrayLike, bound: ArrayLike | float) -> Inference:
+    """One-tailed bootstrap test that the mean is above a number, or above another sample's."""
+    return bootstrap_test(values, bound)
 
 
-def _enter(name: str) -> None:
-    said = STATEMENTS[name]
-    if said.rule not in _JUDGES:
-        return
-    what = "; ".join(
-        f"{task} {', '.join([own] if isinstance(own, str) else own)}"
-        for task, own in (said.pairs or said.runs).items()
+def shown(values: ArrayLike, digits: int = 1) -> str:
+    """The mean with its BCa interval."""
+    return estimate(mean(values), digits)
+
+
+def all_hold(tests: Sequence[Inference], parts: Sequence[str], before: str = "") -> Finding:
+    """What is seen where every test points as claimed; ``parts`` of a sentence say so."""
+    seen = all(test.estimate > 0 for test in tests)
+    return Finding(seen, f"{before}{'; '.join(parts)}.", tuple(tests))
+
+
+def nearly_all(
+    words: str, count: int, total: int, rule: Literal["most", "few"] = "most"
+) -> Finding:
+    """Whether most runs do something; ``few``: whether it is not most of them."""
+    greater = rule == "most"
+    alternative: Literal["greater", "less"] = "greater" if greater else "less"
+    found = stats.binomtest(count, total, alternative=alternative).proportion_ci()
+    bound = f"at least {found.low:.0%}" if greater else f"at most {found.high:.0%}"
+    return Finding(
+        count > MOST * total if greater else count < MOST * total,
+        f"{words} in {count} of {total} runs, {bound} of all (95 %)",
+        (share_test(count, total, MOST, alternative),),
+        (share_test(count, total, MOST, "less" if greater else "greater"),),
     )
-    judge = _JUDGES[said.rule]
-    test = f"{IN_WORDS[said.rule]}: {what}"
-    JUDGED[name] = said.claim(name, test, lambda data: judge(data, JUDGED[name]))
 
 
-def of_task(claim: Claim, task: str) -> Claim:
-    """A claim of comparisons on one task alone; other claims as they are."""
-    if claim.pairs.keys() <= {task}:
-        return claim
-    own = replace(
-        claim, pairs={name: pairs for name, pairs in claim.pairs.items() if name == task}
-    )
-    return replace(own, judge=lambda data: _JUDGES[own.rule](data, own)) if own.pairs else claim
+def half_p(count: ArrayLike, total: int) -> Array:
+    """p that a share lies between few and most: the larger of two exact tests."""
+    bounds: tuple[tuple[float, Alternative], ...] = (FEW, "greater"), (MOST, "less")
+    return np.maximum(*(share_p(count, total, bound, side) for bound, side in bounds))
 
 
-for _name in STATEMENTS:
-    _enter(_name)
+def unlike_p(ours: tuple[int, int], printed: tuple[int, int]) -> float:
+    """Fisher's exact p of two counts, each out of so many runs."""
+    return float(stats.fisher_exact([[k, n - k] for k, n in (ours, printed)]).pvalue)
+
+
+def printed_count(task: str, condition: str, hands: str) -> tuple[int, int]:
+    """Runs that the paper prints for a hand sequence, and out of how many."""
+    cell = published_cell(task, condition)
+    assert cell is not None
+    known = {s.hands: s.summary.runs for s in cell.sequences}
+    return known[hands], sum(known.values())
+
+
+def printed_known(task: str, side: Side) -> float | None:
+    """Printed reward of the corrective process alone."""
+    printed = published_initial(task) if side.name == "initial" else published_exhaustive(task)
+    return None if printed is None else printed[1]
+
+
+def _as_printed(task: str, side: Side) -> str | None:
+    """Mean reward of one side as the paper has it, in words."""
+    if side.known:
+        initial = published_initial(task)
+        derived = side.name == "initial" and initial is not None and initial.derived
+        value = printed_known(task, side)
+    else:
+        cell = published_cell(task, side.name)
+        of_hands = {s.hands: s.summary for s in cell.sequences} if cell else {}
+        summary = of_hands.get(side.hands) if side.hands else cell and cell.summary
+        value, derived = (summary.mean, summary.derived) if summary else (None, False)
+    return None if value is None else f"{number(value)}{' (derived)' * derived}"
+
+
+def _rewards(data: Data, task: str, side: Side, other: Side) -> ArrayLike:
+    hands = side.hands or None
+    if side.name == "initial":
+        return data.initial_reward(task, other.name, other.hands or None)
+    if side.name == "best":
+        return data.best_sequences(task)[1]
+    return (data.replays if side.replay else data.rewards)(task, side.name, hands)
+
+
+def _count(data: Data, task: str, text: str) -> tuple[str, int, Counter[str]]:
+    """What is counted in words, how often, and all hand sequences."""
+    condition, hands, inverse = counted_hands(text)
+    found = data.hands(task, condition)
+    count, words = found[hands], f"{condition} {hands}"
+    if inverse:
+        count, words = found.total() - count, f"{condition} other hands than {hands}"
+    return words, count, found
+
+
+def _share(data: Data, claim: Claim, rule: Literal["most", "few"]) -> Finding:
+    ((task, text),) = claim.runs.items()
+    words, count, found = _count(data, task, text)
+    return nearly_all(f"{words} ({tally(found)})", count, found.total(), rule)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,13 +11,11 @@ import pandas as pd
 from coartic.analysis.results.folder import CellIdentity, CellKey, CellRuns
 from coartic.analysis.results.optima import locks_base
 from coartic.analysis.statistics.spread import sd
+from coartic.analysis.study import Study, cached
 from coartic.analysis.words import tally
 from coartic.method import Information
 from coartic.record import SEARCH
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 TOLD = {
     Information.GOALS: "G",
@@ -32,12 +29,12 @@ TOLD = {
     Information.SECONDARY_OBJECTIVES: "S",
 }
 """A letter for each kind of information, in the order in which the tables show them."""
-INFORMED = {
-    Information.REWARD_FORMULA: "told the reward as a formula",
-    Information.REWARD_BY_TRIAL: "told each trial's reward",
-}
-"""What a method is told of the reward, the most first, in words."""
-UNTOLD = "not told the reward"
+BY_TRIAL, BY_FORMULA, UNTOLD = GROUPS = (
+    "learn from the reward of each trial",
+    "know the reward as a formula",
+    "do not know the reward",
+)
+"""What methods know of the reward: those that learn it, compute it, or neither."""
 _SPENT = (
     *("trials", "movement_ticks", "forward_kinematics", "jacobians"),
     *("solver_iterations", "build_s"),
@@ -88,12 +85,14 @@ class MethodRow(CellIdentity):
     """Forward kinematics and Jacobians together."""
 
 
-def informed(told: str) -> str:
-    """What letters of :data:`TOLD` say that a method knows of the reward, in words."""
-    known = (words for item, words in INFORMED.items() if TOLD[item] in told)
-    return next(known, UNTOLD)
+def knows(told: str) -> str:
+    """What letters of :data:`TOLD` say that a method knows of the reward: of :data:`GROUPS`."""
+    if TOLD[Information.REWARD_FORMULA] in told:
+        return BY_FORMULA
+    return BY_TRIAL if TOLD[Information.REWARD_BY_TRIAL] in told else UNTOLD
 
 
+@cached
 def method_rows(study: Study) -> dict[CellKey, MethodRow]:
     """Every method on every task: within a task the optimum, then the best mean reward first."""
     order = {name: place for place, name in enumerate(study.tasks)}

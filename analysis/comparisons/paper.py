@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import (
@@ -12,14 +11,11 @@ from coartic.analysis.published import (
     PublishedCell,
     Summary,
     published_cell,
-    published_initial,
 )
 from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.statistics.equivalence import Equivalence, difference
+from coartic.analysis.study import Study, cached
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 
 @dataclass(frozen=True)
@@ -45,15 +41,6 @@ class PaperRow:
         """Of that verdict, ticks."""
         return self.difference.margin if self.difference and self.comparable else None
 
-    @property
-    def margin_of_gain(self) -> float | None:
-        """The margin as a share of what learning gained in the paper."""
-        initial, summary = published_initial(self.cell.task), self.paper.summary
-        if self.margin is None or initial is None or summary is None:
-            return None
-        gain = summary.mean - initial.reward
-        return self.margin / gain if gain > 0 else None
-
 
 @dataclass(frozen=True)
 class SequenceRow:
@@ -76,6 +63,7 @@ def published_of(cell: CellRuns) -> PublishedCell | None:
     return published_cell(cell.task, cell.method.removeprefix(LEARNER))
 
 
+@cached
 def paper_rows(study: Study) -> list[PaperRow]:
     """Every cell that the paper has too, in the order of the plan."""
     rows = []
@@ -88,6 +76,7 @@ def paper_rows(study: Study) -> list[PaperRow]:
     return rows
 
 
+@cached
 def sequence_rows(study: Study) -> list[SequenceRow]:
     """The same by hand sequence, where the paper or our runs tell several apart.
 

@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coartic.analysis.comparisons.methods import keeps_still, numbers, solve_times
+from coartic.analysis.comparisons.methods import numbers, solve_times
 from coartic.analysis.results.folder import CellRuns
-from coartic.analysis.results.optima import ARMS, locks_base
+from coartic.analysis.results.optima import locks_base
+from coartic.analysis.study import Study, cached
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
 """What can be spent: columns of ``runs.parquet``; ``solve_s`` is wall time in s."""
-LABELS = {
-    "trials": "trials",
-    "movement_ticks": "ticks",
-    "forward_kinematics": "kinematics",
-    "solve_s": "solve s",
-    "jacobians": "Jacobians",
-    "information": "information",
-}
-"""Spends in short. Jacobians and kinds of information are known of whole runs alone."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +32,6 @@ class BestSoFar:
     """Spend of the whole run; NaN where it is not known, as for the time of cold runs."""
     learns: bool
     """Whether it made trials."""
-    stopped: bool = False
-    """Whether its budget of trials ended it: it could have gone on."""
 
     @property
     def solved(self) -> bool:
@@ -65,6 +49,7 @@ class BestSoFar:
         return values
 
 
+@cached
 def best_so_far(study: Study) -> dict[str, BestSoFar]:
     """:class:`BestSoFar` of every run of a folder, by run id.
 
@@ -76,23 +61,16 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
     a learner without its corrective process spends most of them on its first trial. Times
     are those of :func:`coartic.analysis.comparisons.methods.solve_times`: without building.
-
-    A run was stopped if it made as many trials as it was given: by its parameter ``trials``
-    or by ``--trial-budget`` (``limits`` of the manifest), whichever is less. A method that
-    makes fewer, or has no budget, ended by itself.
     """
     trials_of = dict(study.results.rewards())
-    limit = study.results.manifest.limits.trials or math.inf
     found = {}
     for cell in study.cells.values():
         runs = cell.runs
         own_times = solve_times(cell.good).reindex(runs.index)
         columns = (own_times if name == "solve_s" else runs[name] for name in SPENDS)
         table = zip(*(numbers(column).tolist() for column in columns), strict=True)
-        rows = zip(
-            map(str, runs.run_id), table, runs.status, runs.reward, runs.parameters, strict=True
-        )
-        for run_id, spent, status, reward, parameters in rows:
+        rows = zip(map(str, runs.run_id), table, runs.status, runs.reward, strict=True)
+        for run_id, spent, status, reward in rows:
             total = dict(zip(SPENDS, spent, strict=True))
             trials = trials_of.get(run_id)
             if status != "ok":
@@ -103,8 +81,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
                 at_once = {name: np.array([value]) for name, value in total.items()}
                 found[run_id] = BestSoFar(np.array([float(reward)]), at_once, total, False)
             else:
-                budget = min(json.loads(parameters).get("trials", math.inf), limit)
-                found[run_id] = by_trial(trials, total, stopped=len(trials) >= budget)
+                found[run_id] = by_trial(trials, total)
     return found
 
 
@@ -116,25 +93,12 @@ def cells_by_spend(study: Study) -> Iterator[tuple[CellRuns, str, list[BestSoFar
     for cell in study.cells.values():
         if locks_base(cell.runs):
             continue
-        runs = [study.best_so_far[str(run_id)] for run_id in cell.runs.run_id]
+        runs = [best_so_far(study)[str(run_id)] for run_id in cell.runs.run_id]
         for spend in SPENDS:
             yield cell, spend, [run for run in runs if run.known(spend)]
 
 
-def cells_by_optimum(
-    study: Study,
-) -> Iterator[tuple[str, int, CellRuns, str, list[BestSoFar]]]:
-    """The same with other arm and reward of each optimum that the method's solutions keep to."""
-    found = list(cells_by_spend(study))
-    still = {id(cell): keeps_still(cell.good) for cell in study.cells.values()}
-    for other_arm in ARMS:
-        for cell, spend, runs in found:
-            best = study.optima.get((cell.task, other_arm))
-            if best is not None and runs and (other_arm == "free" or still[id(cell)]):
-                yield other_arm, best.reward, cell, spend, runs
-
-
-def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) -> BestSoFar:
+def by_trial(rewards: Array, total: dict[str, float]) -> BestSoFar:
     """A run from the reward of each of its trials (n,), NaN where it failed."""
     failed = np.isnan(rewards)
     best = np.maximum.accumulate(np.where(failed, -np.inf, rewards))
@@ -146,4 +110,4 @@ def by_trial(rewards: Array, total: dict[str, float], *, stopped: bool = False) 
     share = number / len(rewards)
     spent = {name: total[name] * share for name in SPENDS}
     spent |= {"trials": number, "movement_ticks": np.cumsum(ticks)[steps]}
-    return BestSoFar(best[steps], spent, total, True, stopped)
+    return BestSoFar(best[steps], spent, total, True)

@@ -1,126 +1,129 @@
-"""Shares of targets reached within a budget: empirical distributions over runs and targets.
+"""What it costs to reach targets on the way from the initial solution to the optimum.
 
-After COCO (Hansen et al. 2021): a target is a reward between those of the initial solution and of
-the optimum, and what counts is the share of pairs of run and target that have been reached.
+After COCO (Hansen et al. 2021): targets are rewards evenly spaced between those of the initial
+solution and of the optimum, and what counts is the share of pairs of run and target that have
+been reached. Shares and the budgets that they take are exact, not read off a grid.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.comparisons.overall import ends, variant
 from coartic.analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
-from coartic.analysis.statistics.across_tasks import band
-from coartic.analysis.statistics.estimates import FEWEST
-from coartic.record import SEARCH
+from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps
+from coartic.analysis.methods import is_search, is_variant
+from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS
+from coartic.analysis.study import Study, cached
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 WAY = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
-ALL_TASKS = "all tasks"
-"""In the column of tasks: the mean over all of them."""
-_BUDGETS = 60
-_RESAMPLES = 200  # of runs, for bands that are looked at
+_RESAMPLES = 1_999
 
 
-class Reached(NamedTuple):
-    """Share of pairs of run and target that a method has reached within a budget."""
+class Crossing(NamedTuple):
+    """The budget within which a method reaches a share of its pairs of run and target."""
 
-    task: str
-    """Or :data:`ALL_TASKS`."""
-    method: str
-    """Label, or the learner's over one-armed and two-armed tasks."""
-    spend: str
-    """Of :data:`~coartic.analysis.comparisons.progress.SPENDS`."""
     budget: float
-    """0 is for what spends nothing."""
-    share: float
+    """Infinite where it never does."""
     low: float
-    """Of the pointwise 95 % percentile interval over runs; NaN where runs are too few."""
+    """Of the 95 % percentile interval over runs; NaN where runs are too few."""
     high: float
-    runs: int
 
 
-def reached(study: Study) -> pd.DataFrame:
-    """Rows as :class:`Reached`, where a share changes, of all methods without their variants.
+class Targets:
+    """One method's pairs of run and target over one or several tasks, which count alike."""
 
-    Of the tasks that have a scale (:func:`~coartic.analysis.comparisons.overall.ends`); a run
-    whose steps are not known, such as the time of a cold one, has no part. A method has rows over
-    all tasks if it ran on every one of them.
+    def __init__(self, spends: Sequence[Array]) -> None:
+        """``spends``: a task each, what every run had spent at every target, ``(runs, 20)``.
+
+        Infinite where the target is not reached.
+        """
+        self.runs = sum(map(len, spends))
+        weights = [np.full(own.shape, 1 / own.size / len(spends)) for own in spends]
+        values = np.concatenate([own.ravel() for own in spends])
+        self._order = np.argsort(values, kind="stable")
+        self._values = values[self._order]
+        self._weights = np.concatenate([own.ravel() for own in weights])
+        self._sizes = tuple(map(len, spends))
+
+    def curve(self) -> tuple[Array, Array]:
+        """Budgets at which the share rises, and the share from there on."""
+        last = np.append(self._values[1:] != self._values[:-1], True)
+        reached = last & np.isfinite(self._values)
+        return self._values[reached], np.cumsum(self._weights[self._order])[reached]
+
+    def share(self) -> float:
+        """Share that is reached in the end."""
+        return float(self._weights[self._order][np.isfinite(self._values)].sum())
+
+    def crossing(self, level: float) -> Crossing:
+        """The least budget within which ``level`` of the pairs are reached."""
+        budget = self._least(self._weights[None], level)[0]
+        if min(self._sizes) < FEWEST:
+            return Crossing(budget, math.nan, math.nan)
+        drawn = self._least(self._resampled(), level)
+        low, high = np.quantile(drawn, TAILS, method="inverted_cdf")
+        return Crossing(budget, float(low), float(high))
+
+    def _resampled(self) -> Array:
+        """Weights of the pairs with runs drawn anew within their task, ``(resamples, pairs)``."""
+        rng = np.random.default_rng(SEED)
+        shape = (_RESAMPLES, len(WAY))
+        counts = []
+        for size in self._sizes:
+            drawn = rng.multinomial(size, np.full(size, 1 / size), size=_RESAMPLES)
+            counts.append(np.repeat(drawn, shape[1], axis=1))
+        weights: Array = np.concatenate(counts, axis=1) * self._weights
+        return weights
+
+    def _least(self, weights: Array, level: float) -> Array:
+        """For each row of weights, the least value at which their sum reaches the level."""
+        shares = np.cumsum(weights[:, self._order], axis=1)
+        place = (shares < level - 1e-9).sum(axis=1)
+        found: Array = np.append(self._values, math.inf)[place]
+        return found
+
+
+@cached
+def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
+    """Pairs of run and target by task (or :data:`ALL_TASKS`), method and spend.
+
+    Of the tasks of :func:`~.standings.ends`, and of all methods but variants and searches for
+    the optimum. A run whose steps are not known, such as the time of a cold one, has no part.
     """
     scale = ends(study)
-    curves: dict[tuple[str, str, str], Array] = {}
-    budgets = _budgets(study)
+    spends: dict[tuple[str, str, str], Array] = {}
     for cell, spend, runs in cells_by_spend(study):
-        shown = not variant(cell.label) and not cell.label.startswith(SEARCH)
-        if cell.task in scale and runs and shown and spend in budgets:
-            curve = _shares(runs, spend, budgets[spend], *scale[cell.task])
-            curves[cell.task, cell.label, spend] = curve
-    rows: list[Reached] = []
-    for (task, label, spend), runs_by_budget in curves.items():
-        rows += _rows(task, label, spend, budgets[spend], [runs_by_budget])
-    for label, labels in _everywhere(study).items():
-        for spend in budgets:
-            keys = [(task, own, spend) for task, own in labels.items()]
-            if len(scale) > 1 and all(key in curves for key in keys):
-                parts = [curves[key] for key in keys]
-                rows += _rows(ALL_TASKS, label, spend, budgets[spend], parts)
-    return pd.DataFrame(rows, columns=Reached._fields)
-
-
-def _budgets(study: Study) -> dict[str, Array]:
-    """Of each spend 0, then a logarithmic grid over all that runs spent."""
+        if cell.task in scale and runs and not is_variant(cell.label) | is_search(cell.label):
+            spends[cell.task, cell.label, spend] = _spends(runs, spend, *scale[cell.task])
     found = {}
-    for spend in SPENDS:
-        parts = [run.spent[spend] for run in study.best_so_far.values() if run.known(spend)]
-        spent = np.concatenate(parts) if parts else np.empty(0)
-        spent = spent[np.isfinite(spent) & (spent > 0)]
-        if len(spent):
-            grid = np.geomspace(spent.min(), spent.max(), _BUDGETS)
-            grid[-1] = spent.max()
-            found[spend] = np.concatenate([[0.0], grid])
-    return found
+    for (method, labels), spend in ((m, s) for m in _everywhere(study).items() for s in SPENDS):
+        keys = [(task, label, spend) for task, label in labels.items()]
+        if len(scale) > 1 and all(key in spends for key in keys):
+            found[ALL_TASKS, method, spend] = Targets([spends[key] for key in keys])
+    return found | {key: Targets([own]) for key, own in spends.items()}
 
 
-def _shares(
-    runs: Sequence[BestSoFar], spend: str, budgets: Array, start: float, best: float
-) -> Array:
-    """Share of the targets that each run has reached within each budget, ``(runs, budgets)``."""
-    targets = np.ceil(start + WAY * (best - start) - 1e-9)
-    return np.array([(run.best(spend, budgets)[:, None] >= targets).mean(axis=1) for run in runs])
+def _spends(runs: Sequence[BestSoFar], spend: str, start: float, best: float) -> Array:
+    """What each run had spent when it reached each target, ``(runs, 20)``."""
+    wanted = np.ceil(start + WAY * (best - start) - 1e-9)
+    rows = [
+        np.append(run.spent[spend], math.inf)[np.searchsorted(run.rewards, wanted)] for run in runs
+    ]
+    return np.array(rows)
 
 
 def _everywhere(study: Study) -> Mapping[str, dict[str, str]]:
     """Methods that ran on all tasks: their labels by task."""
-    own = study.scores.drop_duplicates(["method", "task"])
     found: dict[str, dict[str, str]] = {}
-    for method in map(str, study.overall.method):
-        if not variant(method):
-            rows = own[own.method == method]
-            found[method] = dict(zip(map(str, rows.task), map(str, rows.label), strict=True))
+    rows: pd.DataFrame = gaps(study).drop_duplicates(["method", "task"])
+    for method, own in rows.groupby("method", sort=False):
+        if len(own) == len(ends(study)) and not is_variant(str(method)):
+            found[str(method)] = dict(zip(map(str, own.task), map(str, own.label), strict=True))
     return found
-
-
-def _rows(
-    task: str, label: str, spend: str, budgets: Array, parts: Sequence[Array]
-) -> Iterator[Reached]:
-    """One where the mean over ``parts`` changes, of the first budget and of the last."""
-    share = np.mean([runs.mean(axis=0) for runs in parts], axis=0)
-    low = high = np.full(len(share), math.nan)
-    if min(map(len, parts)) >= FEWEST:
-        low, high = band(parts, resamples=_RESAMPLES)
-    count = sum(len(runs) for runs in parts)
-    for place, budget in enumerate(budgets):
-        inner = 0 < place < len(budgets) - 1
-        if inner and share[place] == share[place - 1]:
-            continue
-        ends_here = float(low[place]), float(high[place])
-        yield Reached(task, label, spend, float(budget), float(share[place]), *ends_here, count)

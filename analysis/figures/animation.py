@@ -23,11 +23,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from coartic import CoarticError, Trajectory
-from coartic.analysis.figures.moving import moving_picture
 from coartic.analysis.figures.robot import MARKERS, box, numbered_below
 from coartic.files import check_outputs, write_outputs
 
-FORMATS = (".gif", ".mp4", ".svg")
+FORMATS = (".gif", ".mp4")
 LASTS_S = 10.0
 """Seconds that the longest movement takes unless a speed is given."""
 HOLD_S = 2.0
@@ -92,9 +91,6 @@ def animate(
     if not any(panel.trajectory.ticks for panel in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
     timed = timing(max(len(panel.trajectory.configurations) for panel in panels), speed)
-    if path.suffix.lower() == ".svg":
-        write_outputs({path: moving_picture(panels, timed, width)}, replace=replace)
-        return timed
     figure, scenes = _figure(panels, width)
     writer = _writer(path, timed)
     try:
@@ -153,9 +149,7 @@ class _Scene:
         self._trajectory = trajectory
         task = trajectory.task
         self._paths = {hand: trajectory.hand_path(hand) for hand in task.hands}
-        self._traces = {
-            hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands
-        }
+        self._traces = {hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands}
         self._base = Polygon(
             task.robot.base_outline(task.q0), facecolor="0.85", edgecolor="black", linewidth=1
         )

@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 
 from coartic.analysis.comparisons.paper import published_of
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import has, missing, solved
 from coartic.analysis.figures.configurations import initial_solution
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import has, missing, solved
-from coartic.analysis.methods import CONDITIONS, LEARNER, short_name
+from coartic.analysis.methods import CONDITIONS, LEARNER, name_of
 from coartic.analysis.published import Summary, published_cell, published_initial
 from coartic.analysis.statistics.estimates import RESAMPLES, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
@@ -133,7 +133,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
             _interval(axes, x, row["published"], row["published_low"], row["published_high"])
             axes.plot(x, row["published"], "D", color=style.INK, **diamond)
     _brackets(axes, rows, runs)
-    names = ["initial", *(short_name(label) for label in rows.method[1:])]
+    names = ["initial", *(name_of(label) for label in rows.method[1:])]
     axes.set_xticks(range(len(rows)), names)
     axes.set_xlim(-0.45, len(rows) - 0.4)
     axes.tick_params(axis="x", length=0)
@@ -154,9 +154,7 @@ def _interval(axes: Axes, x: float, value: float, low: float, high: float) -> No
 def _brackets(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     """One between neighbours, above all that the two show."""
     shown = rows[["reward", "high", "published", "published_high"]].max(axis=1).tolist()
-    tops = [
-        max([top, *runs.get(label, ())]) for top, label in zip(shown, rows.method, strict=True)
-    ]
+    tops = [max([top, *runs.get(label, ())]) for top, label in zip(shown, rows.method, strict=True)]
     bottom = min(rows[["reward", "published"]].min().min(), *(min(r) for r in runs.values()))
     step = 0.055 * max(max(tops) - bottom, 1.0)  # tick; nothing learned by anyone
     level = -math.inf

@@ -13,13 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from coartic import Execution, Task
+from coartic.analysis import trajectories
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import missing, solved
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
-from coartic.analysis.figures.selection import missing, solved
-from coartic.analysis.methods import CONDITIONS, short_name
-from coartic.analysis.signatures import trajectories
+from coartic.analysis.methods import CONDITIONS, name_of
 from coartic.analysis.study import Study
+from coartic.analysis.words import number
 from coartic.robot import Array
 from coartic.task import hands_of
 
@@ -38,12 +39,12 @@ ROWS = 2
 COMMON = 0.2
 """Share of a method's runs that have a hand sequence which is drawn."""
 _TYPICAL = (
-    "Of each method the run with the commonest hand sequence whose reward is nearest to the "
-    "method's median"
+    "Each method is shown by the run with its commonest hand sequence whose reward is nearest to "
+    "the method's median"
 )
 _BY_SEQUENCE = (
-    "Of each method and hand sequence that is found in a fifth of its runs "
-    f"(at most {ROWS}, and the commonest anyway) the run nearest to the median reward of them"
+    f"Each method is shown by up to {ROWS} hand sequences that at least a fifth of its runs find, "
+    "each by the run nearest to their median reward"
 )
 
 
@@ -62,7 +63,7 @@ class Solution:
     @property
     def name(self) -> str:
         """As the row is headed."""
-        name = short_name(self.method) if self.method else "initial solution"
+        name = name_of(self.method) if self.method else "initial solution"
         found = f" ({self.share})" if self.share else ""
         return f"{name}, {self.execution.hands}{found}"
 
@@ -111,7 +112,7 @@ def learned_solution(study: Study, task: str, label: str, run_id: str) -> Soluti
     ids = good.run_id.tolist()
     if run_id not in ids:
         raise missing(study, f"{run_id} is no solved run of {label} on {task}")
-    execution = study.trajectories[task, label].runs[ids.index(run_id)].execution
+    execution = study.trajectories(task, label).runs[ids.index(run_id)].execution
     alike = int((good.hands == execution.hands).sum())
     share = f"{alike} of {len(good)}" if len(good) > 1 else ""
     return Solution(study.tasks[task], label, run_id, execution, share)
@@ -151,7 +152,7 @@ def configurations(
     figure = _draw(shown)
     tasks = {solution.task.name: solution.task for solution in shown}
     totals = "; ".join(
-        f"{s.task.label}, {s.name}, total {style.number(-s.execution.ticks)}" for s in shown
+        f"{s.task.label}, {s.name}, total {number(-s.execution.ticks)}" for s in shown
     )
     labels = ", ".join(task.label for task in tasks.values())
     of = {"tasks": labels, "which": _TYPICAL if sequences == 1 else _BY_SEQUENCE, "like": like}
@@ -178,7 +179,7 @@ def paper_configurations(name: str, study: Study, *, methods: Sequence[str] | No
 
 def _draw(shown: Sequence[Solution]) -> Figure:
     end, gap, head, foot = 0.46, 0.08, 0.34, 0.3  # inches
-    wide = (style.widest() - end) / max(len(solution.task.goals) for solution in shown)
+    wide = (style.TWO - end) / max(len(solution.task.goals) for solution in shown)
     postures: dict[str, list[Array]] = {}
     for s in shown:
         postures.setdefault(s.task.name, [s.task.q0]).extend(s.execution.configurations)
@@ -187,7 +188,7 @@ def _draw(shown: Sequence[Solution]) -> Figure:
     scale = (wide - gap) / max(extent[0] for extent in extents.values())
     sizes = [scale * extents[s.task.name] for s in shown]
     height = sum(size[1] for size in sizes) + head * len(shown) + foot
-    figure = Figure(figsize=(style.widest(), height))
+    figure = Figure(figsize=(style.TWO, height))
     top = height
     bold: Any = {"va": "top", "fontsize": style.NORMAL, "weight": "bold"}
     for solution, (width, tall) in zip(shown, sizes, strict=True):
@@ -195,21 +196,20 @@ def _draw(shown: Sequence[Solution]) -> Figure:
         title = f"{task.label}: {solution.name}" if len(extents) > 1 else solution.name
         figure.text(0.004, (top - 0.03) / height, title, **bold)
         top -= head + tall
-        across, up = width / style.widest(), tall / height
-        lefts = ((k * wide + gap / 2) / style.widest() for k in range(len(task.goals)))
+        across, up = width / style.TWO, tall / height
+        lefts = ((k * wide + gap / 2) / style.TWO for k in range(len(task.goals)))
         panels = [figure.add_axes((left, top / height, across, up)) for left in lefts]
         _panels(panels, solution, *corners[task.name])
-        total = f"total\n{style.number(-solution.execution.ticks)}"
-        place = 1 - 0.02 / style.widest(), (top + tall / 2) / height
+        total = f"total\n{number(-solution.execution.ticks)}"
+        place = 1 - 0.02 / style.TWO, (top + tall / 2) / height
         figure.text(*place, total, ha="right", va="center", fontsize=style.NORMAL)
     before = style.entry("before", color=style.GREY, linewidth=0.9)
     handles = legend_entries(hand for solution in shown for hand in solution.task.hands)
-    columns = 2 if style.narrow() else 4
-    place_of: Any = {"loc": "lower center", "ncols": columns, "borderaxespad": 0.2}
+    place_of: Any = {"loc": "lower center", "ncols": 4, "borderaxespad": 0.2}
     figure.legend(handles=[*handles, before], **place_of)
-    bar = np.array([0.08, 0.08 + scale]) / style.widest()
+    bar = np.array([0.08, 0.08 + scale]) / style.TWO
     figure.add_artist(Line2D(bar, [0.13 / height] * 2, color=style.INK, linewidth=1.2))
-    figure.text(bar[1] + 0.04 / style.widest(), 0.13 / height, "1 length unit", va="center")
+    figure.text(bar[1] + 0.04 / style.TWO, 0.13 / height, "1 length unit", va="center")
     return figure
 
 
@@ -225,8 +225,9 @@ def _panels(panels: Sequence[Axes], solution: Solution, low: Array, high: Array)
         draw_robot(axes, task, before, color=style.GREY)
         draw_goals(axes, task, current=k + 1)
         draw_robot(axes, task, q, marked=(hands[k],))
-        goal = "" if style.narrow() else f"goal {k + 1}: "  # they stand in order
-        axes.set_title(f"{goal}{hands[k]}, {style.number(-ticks[k])}", fontsize=style.SMALL, pad=1)
+        axes.set_title(
+            f"goal {k + 1}: {hands[k]}, {number(-ticks[k])}", fontsize=style.SMALL, pad=1
+        )
         before = q
 
 

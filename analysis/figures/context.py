@@ -13,9 +13,10 @@ from matplotlib.axes import Axes
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.bars import stars
+from coartic.analysis.figures.choice import NO_CONTEXTS, chosen, missing
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import NO_CONTEXTS, chosen, missing
-from coartic.analysis.methods import short_name
+from coartic.analysis.methods import name_of
+from coartic.analysis.signatures.register import signatures
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study
 
@@ -59,7 +60,7 @@ def context(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
 
 def _parts(study: Study, methods: Sequence[str] | None) -> pd.DataFrame:
     """One row a place and method: both parts, with p raw and adjusted over all rows."""
-    frame = study.signatures
+    frame = signatures(study)
     frame = frame[frame.signature.isin(_PARTS) & frame.value.notna()]
     labels = chosen(study, list(dict.fromkeys(frame.task)), methods) if len(frame) else []
     frame = frame[frame.label.isin(labels)]
@@ -93,5 +94,5 @@ def _panel(axes: Axes, data: pd.DataFrame) -> None:
         if not math.isnan(row["p_equivalent"]):
             mark, end = stars(row["holm_equivalent"]), (max(values), -place)
             axes.annotate(mark, end, (5, -0.5), textcoords="offset points", va="center")
-    style.name_rows(axes, [short_name(method) for method in data.method])
+    style.name_rows(axes, [name_of(method) for method in data.method])
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.4)

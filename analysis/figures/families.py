@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import missing
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import missing
 from coartic.analysis.generality.exploration import CONTRASTS, gains
-from coartic.analysis.generality.sample import Sample
-from coartic.analysis.methods import INITIAL, short_name
+from coartic.analysis.generality.sample import Sample, sample
+from coartic.analysis.methods import INITIAL, name_of
 from coartic.analysis.statistics.instances import RESAMPLES, Runs, other_tasks, value
 from coartic.analysis.study import Study
 
@@ -24,9 +24,10 @@ _FARTHEST = 1.0
 
 
 def _sample(study: Study) -> Sample:
-    if study.instances is None:
+    found = sample(study)
+    if found is None:
         raise missing(study, "no instances of a family of tasks")
-    return study.instances
+    return found
 
 
 @style.styled
@@ -35,25 +36,25 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
 
     By default of methods without variants. Raises CoarticError where the folder has no instances.
     """
-    sample = _sample(study)
-    labels = [label for label in methods or sample.labels if methods or " " not in label]
+    instances = _sample(study)
+    labels = [label for label in methods or instances.labels if methods or " " not in label]
     data = pd.DataFrame(
         [
             {"method": label, "family": family, "task": name, "gap": float(np.mean(gap))}
-            for family, names in sample.families.items()
+            for family, names in instances.families.items()
             for label in labels
             for name in names
-            if (gap := sample.gap(name, label)) is not None
+            if (gap := instances.gap(name, label)) is not None
         ]
     )
     if data.empty:
         raise missing(study, f"no solved runs of {', '.join(labels)} on instances of families")
-    ends = _means(sample, labels)
+    ends = _means(instances, labels)
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
     looks = style.looks(order)
-    families = list(sample.families)
+    families = list(instances.families)
     rows, columns = style.grid(len(families), len(families))
-    size = style.widest(), (0.9 + 0.19 * len(order)) * rows
+    size = style.TWO, (0.9 + 0.19 * len(order)) * rows
     figure, panels = style.figure_of((rows, columns), size, sharey=True)
     for axes, family in zip(panels, families, strict=True):
         for place, label in enumerate(order):
@@ -69,7 +70,7 @@ def gaps_by_family(study: Study, *, methods: Sequence[str] | None = None) -> Plo
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"], minor=False)
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
-    style.name_rows(panels[0], [short_name(label) for label in order])
+    style.name_rows(panels[0], [name_of(label) for label in order])
     panels[len(panels) // 2 if columns > 1 else -1].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
     joined = data.merge(ends, on=["method", "family"])
@@ -110,13 +111,13 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
     ``methods`` chooses nothing here: pairs of the paper's conditions are shown, without those
     against the initial solution. Raises CoarticError where the folder has no such pairs.
     """
-    sample = _sample(study)
+    instances = _sample(study)
     rows = []
     for first, second in (pair for pair in CONTRASTS if pair[1] != INITIAL):
-        names = sample.shared(first, second)
-        scores = gains(sample, first, second, names)
+        names = instances.shared(first, second)
+        scores = gains(instances, first, second, names)
         for family, own in scores.items():
-            pair = f"{short_name(first)} over {short_name(second)}"
+            pair = f"{name_of(first)} over {name_of(second)}"
             found = _mean(family, own)
             rows += [
                 {"method": pair, "family": family, "task": name, "gain": value(runs), **found}
@@ -128,7 +129,7 @@ def exploration_by_family(study: Study, *, methods: Sequence[str] | None = None)
     families = list(dict.fromkeys(data.family))
     order = list(dict.fromkeys(data.method))
     shape = style.grid(len(order), len(order))
-    size = style.widest(), 2.0 * shape[0]
+    size = style.TWO, 2.0 * shape[0]
     figure, panels = style.figure_of(shape, size, sharey=True, sharex=True)
     for axes, pair in zip(panels, order, strict=True):
         axes.axvline(0, **style.INITIAL)

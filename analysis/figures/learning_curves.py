@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 
 from coartic import Task
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import has, missing
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import has, missing
-from coartic.analysis.methods import CONDITIONS, EC1, short_name
-from coartic.analysis.signatures.trajectories import initial_solution
+from coartic.analysis.methods import CONDITIONS, EC1, name_of
 from coartic.analysis.study import Study
+from coartic.analysis.trajectories import initial_solution
 from coartic.robot import Array
 
 WINDOW = 100
@@ -52,7 +52,7 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
     for axes, task in zip(panels, shown.values(), strict=True):
         _panel(axes, study, task, data[data.task == task.name], labels)
     handles = [
-        style.entry(short_name(label), linewidth=1.3, **look.line)
+        style.entry(name_of(label), linewidth=1.3, **look.line)
         for label, look in style.looks(labels).items()
     ]
     handles += [style.entry("initial", **style.INITIAL), style.entry("optimum", **style.OPTIMUM)]
@@ -118,9 +118,7 @@ class _Curves:
         return (sums / counts).to_numpy()
 
 
-def _panel(
-    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
-) -> None:
+def _panel(axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]) -> None:
     look_of = style.looks(labels)
     for label, rows in data.groupby("method", sort=False):
         look = look_of[str(label)]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,101 +10,37 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from coartic import Hand, Task
+from coartic import Task
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import NO_CONTEXTS, missing
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.robot import MARKERS, box
-from coartic.analysis.figures.selection import NO_CONTEXTS, chosen, missing
-from coartic.analysis.methods import CONDITIONS, spoken_name
+from coartic.analysis.methods import name_of
+from coartic.analysis.signatures.shared_goal import SharedGoal, shared_goal
 from coartic.analysis.study import Study
 from coartic.robot import Array
-from coartic.task import hands_of
 
 _COLORS = (style.BLUE, style.VERMILLION)
 _LETTERS = 9  # points: beside others on the first screen it is small
 _RUNS: Any = {"linewidth": 0.4, "alpha": 0.25, "zorder": 1}
 
 
-@dataclass(frozen=True)
-class ContextPair:
-    """A method's runs that hit one goal before either of two others."""
-
-    method: str
-    """Label."""
-    goal: int
-    """Number of the goal that both tasks have, from 1; the next one differs."""
-    tasks: tuple[Task, Task]
-    postures: tuple[Array, Array]
-    """Where each run hits it, ``(runs, dof)``; with the hand that most runs choose."""
-    hand: Hand
-    apart: float
-    """Distance of the mean postures, length unit and rad."""
-    hands_apart: float
-    """Distance of the hands in them, length unit."""
-    spreads: float
-    """The first in pooled SDs of the runs; NaN where there is none."""
-    p: float
-    """Of the permutation test; NaN where there is none."""
-
-
-def contexts(study: Study, methods: Sequence[str] | None = None) -> ContextPair | None:
-    """The first goal that two tasks share before they differ, by the paper's learner if it ran.
-
-    None where no method has solved runs on two such tasks.
-    """
-    found = study.signatures
-    found = found[(found.signature == "context distance") & found.value.notna()]
-    if not len(found):
-        return None
-    labels = chosen(study, list(dict.fromkeys(found.task)), methods)
-    labels = [label for label in (*CONDITIONS, *labels) if label in set(found.label)]
-    found = found[found.label == (labels or list(found.label))[0]]
-    row = found.iloc[0]
-    label, goal = str(row.label), int(row.goal)
-    hand: Hand = "left" if row.hand == "left" else "right"
-    names = str(row.task), str(row.against)
-    both = [_postures(study, name, label, goal, hand) for name in names]
-    first, second = (study.tasks[name] for name in names)
-    ends = [first.robot.forward_kinematics(q.mean(axis=0), hand) for q in both]
-    same = study.signatures
-    same = same[(same.task == row.task) & (same.label == label) & (same["where"] == row["where"])]
-    of = same.set_index("signature")
-    spreads = of.loc["context dependence"] if "context dependence" in of.index else None
-    return ContextPair(
-        label,
-        goal,
-        (first, second),
-        (both[0], both[1]),
-        hand,
-        float(row.value),
-        float(np.linalg.norm(ends[0] - ends[1])),
-        math.nan if spreads is None else float(spreads.value),
-        math.nan if spreads is None else float(spreads.p),
-    )
-
-
-def _postures(study: Study, task: str, label: str, goal: int, hand: Hand) -> Array:
-    runs = (run.execution for run in study.trajectories[task, label].runs)
-    alike = [run.configurations[goal - 1] for run in runs if hands_of(run.hands)[goal - 1] == hand]
-    return np.array(alike)
-
-
 @style.styled
-def postures(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
+def postures(study: Study) -> Plot:
     """The postures at one goal before two others, overlaid: all runs faint, their means strong.
 
     Raises CoarticError where no method has solved runs on two tasks that share their first goals.
     """
-    found = contexts(study, methods)
+    found = shared_goal(study)
     if found is None:
         raise missing(study, NO_CONTEXTS)
     figure = Figure(figsize=(style.ONE, 1.6), layout="constrained")
     _draw(figure.subplots(), found)
-    method = spoken_name(found.method)
+    method = name_of(found.method)
     return worded("postures", figure, _data(found), found.tasks, found=found, method=method)
 
 
-def _draw(axes: Axes, found: ContextPair) -> None:
+def _draw(axes: Axes, found: SharedGoal) -> None:
     axes.set_axis_off()
     axes.set_aspect("equal")
     shown = np.concatenate([q.mean(axis=0)[None] for q in found.postures])
@@ -139,9 +72,9 @@ def _draw(axes: Axes, found: ContextPair) -> None:
         up = following[1] >= shared[1]
         axes.annotate(
             f"then goal {found.goal + 1}\n({task.label.lower()})", following, (5, 0),
-            textcoords="offset points", color=color, va="center", ha="left", fontsize=_LETTERS,
+            textcoords="offset points", va="center", ha="left", fontsize=_LETTERS,
         )  # fmt: skip
-        _base(axes, task, mean, color, above=up)
+        _base(axes, task, mean, above=up)
     axes.add_artist(
         Circle(shared, found.tasks[0].radius, fill=False, edgecolor=style.INK, linewidth=1.1)
     )
@@ -151,17 +84,17 @@ def _draw(axes: Axes, found: ContextPair) -> None:
     )  # fmt: skip
 
 
-def _base(axes: Axes, task: Task, q: Array, color: str, *, above: bool) -> None:
+def _base(axes: Axes, task: Task, q: Array, *, above: bool) -> None:
     """Which posture is which, at its base."""
     outline = task.robot.base_outline(q)
     place = outline.mean(axis=0)[0], outline[:, 1].max() if above else outline[:, 1].min()
     axes.annotate(
         f"base,\n{task.label.lower()}", place, (0, 3 if above else -3), textcoords="offset points",
-        color=color, ha="center", va="bottom" if above else "top", fontsize=_LETTERS,
+        ha="center", va="bottom" if above else "top", fontsize=_LETTERS,
     )  # fmt: skip
 
 
-def _data(found: ContextPair) -> pd.DataFrame:
+def _data(found: SharedGoal) -> pd.DataFrame:
     """One row a run: task and posture at the shared goal."""
     parts = []
     for task, runs in zip(found.tasks, found.postures, strict=True):

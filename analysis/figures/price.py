@@ -1,94 +1,83 @@
-"""At what price: shares of levels of reward reached within a budget, over runs and tasks."""
+"""What it costs to come near the optimum: shares of targets reached within a budget."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from coartic.analysis.comparisons.reached import WAY
+from coartic.analysis.comparisons.reached import WAY, targets
 from coartic.analysis.figures import style
-from coartic.analysis.figures.frontier import NAMES
+from coartic.analysis.figures.choice import missing
 from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.figures.selection import HEADLINES, missing
-from coartic.analysis.methods import CONDITIONS, LEARNER, TOGETHER, short_name
+from coartic.analysis.methods import in_order, look_alike, main_methods, name_of
 from coartic.analysis.study import Study
 
-SHOWN = ("trials", "forward_kinematics")
-"""Spends that the printed figure has a panel of."""
-_BAND: Any = {"step": "post", "alpha": 0.15, "linewidth": 0}
-
-
-def look_alike(label: str) -> str:
-    """Whose look a method has: the learner over all tasks that of its two-armed condition."""
-    ends = (name for name in reversed(CONDITIONS) if name.removeprefix(LEARNER) in label)
-    return next(ends, label) if label.startswith(TOGETHER) else label
-
-
-def look_of(label: str) -> style.Look:
-    """The look of :func:`look_alike`."""
-    alike = look_alike(label)
-    return style.looks([alike])[alike]
-
-
-def main_methods(data: pd.DataFrame) -> list[str]:
-    """Of the labels in ``data`` those that stand for their families, in the order of figures."""
-    labels = list(dict.fromkeys(data.method))
-    joint = [label for label in labels if label != look_alike(label)]
-    own = [label for label in HEADLINES if label in labels]
-    own = [label for label in own if not (joint and label.startswith(LEARNER))]
-    return [*joint[:1], *own] or labels
+PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
+"""Spends that the figure has a panel of, and their axes."""
+POINTS = 150
+"""Steps of a curve that are drawn, at most."""
 
 
 @style.styled
 def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
-    """Share of pairs of run and level of reward reached, against trials and kinematics.
+    """Share of targets reached, against trials and kinematics.
 
     Raises CoarticError where no task has a known optimum beyond its initial solution.
     """
-    data = study.reached
-    if methods is not None:
-        data = data[data.method.isin(methods)]
-    if not len(data):
+    known = list(targets(study))
+    if not known:
         raise missing(study, "no method has runs on a task with a known optimum")
-    task = data.task.iloc[-1]  # all together come last
-    shown = data[data.task == task]
-    labels = list(methods or main_methods(shown))
-    spends = [spend for spend in SHOWN if (shown.spend == spend).any()]
-    rows = -(-len(labels) // 4)
-    size = style.TWO, 2.2 + 0.15 * rows
-    figure, panels = style.figure_of((1, len(spends)), size, sharey=True)
+    over = known[0][0]  # all tasks together come first
+    labels = list(dict.fromkeys(method for task, method, _ in known if task == over))
+    labels = [label for label in methods if label in labels] if methods else main_methods(labels)
+    data = _curves(study, over, in_order(labels))
+    spends = [spend for spend in PANELS if (data.spend == spend).any()]
+    figure, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
-        _panel(axes, shown[shown.spend == spend], labels, NAMES[spend])
-    panels[0].set_ylabel("levels of reward reached (%)")
+        _panel(axes, data[data.spend == spend])
+        axes.set_xlabel(PANELS[spend])
+    panels[0].set_ylabel("targets reached (%)")
     style.letters(panels)
-    handles = [style.entry(short_name(label), **look_of(label).line) for label in labels]
-    style.legend(figure, handles, 4)
-    ends = shown[(shown.spend == spends[0]) & shown.method.isin(labels)]
-    ends = ends.groupby("method", sort=False).tail(1)
-    return worded(
-        "price",
-        figure,
-        data,
-        study.tasks.values(),
-        targets=len(WAY),
-        over=task,
-        ends=spoken(ends.assign(share=100 * ends.share), "{method} {share:.0f} %"),
-    )
+    ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
+    names = dict(zip(map(name_of, ends.method), 100 * ends.share, strict=True))
+    style.label_ends(panels[-1], names, 5.5)
+    words = spoken(ends.assign(share=100 * ends.share), "{method} {share:.0f} %")
+    tasks = study.tasks.values()
+    return worded("price", figure, data, tasks, targets=len(WAY), over=over, ends=words)
 
 
-def _panel(axes: Axes, data: pd.DataFrame, labels: Sequence[str], name: str) -> None:
-    style.log_axis(axes)
-    least = data.budget[data.budget > 0].min()
-    edge = least / 2
+def _curves(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
+    """A row at every step that is drawn: ``method``, ``spend``, ``budget``, ``share``."""
+    parts = []
     for label in labels:
-        own = data[data.method == label]
-        look = look_of(label)
-        x = own.budget.clip(lower=edge)
-        axes.step(x, 100 * own.share, where="post", **look.line)
-        axes.fill_between(x, 100 * own.low, 100 * own.high, color=look.color, **_BAND)
-    axes.set_xlim(edge, data.budget.max())
+        for spend in PANELS:
+            found = targets(study).get((task, label, spend))
+            if found is None:
+                continue
+            budget, share = found.curve()
+            kept = np.unique(np.linspace(0, len(budget) - 1, min(len(budget), POINTS)).round())
+            at = kept.astype(int)
+            rows = {"budget": budget[at], "share": share[at]}
+            parts.append(pd.DataFrame({"method": label, "spend": spend, **rows}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _panel(axes: Axes, data: pd.DataFrame) -> None:
+    style.log_axis(axes)
+    positive = data.budget[data.budget > 0]
+    least, most = positive.min(), positive.max()
+    edge = least / 1.5
+    axes.axhline(50, color=style.GREY, linewidth=0.5)
+    for label, rows in data.groupby("method", sort=False):
+        look = style.looks([look_alike(str(label))])[look_alike(str(label))]
+        x = np.concatenate([rows.budget.clip(lower=edge), [most]])
+        y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
+        line: Any = {**look.line, "linewidth": 1.3}
+        (drawn,) = axes.step(x, y, where="post", **line)
+        style.tip(drawn, f"{name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
+    axes.set_xlim(edge, most)
     axes.set_ylim(-2, 102)
-    axes.set_xlabel(name)

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from coartic.analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import missing
 from coartic.analysis.figures.plot import Plot, worded
-from coartic.analysis.figures.selection import missing
-from coartic.analysis.methods import CONDITIONS, short_name
+from coartic.analysis.methods import CONDITIONS, name_of
 from coartic.analysis.published import TRIALS, Summary
 from coartic.analysis.statistics.equivalence import MARGIN, Equivalence
 from coartic.analysis.study import Study
@@ -58,7 +58,7 @@ def published(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     _draw(axes, data, {name: marked(name, own) for name, own in found.items()})
     shown = {name: found[name] for name in data.task.unique()}
     words = "; ".join(
-        f"{row['task']}, {short_name(row['method'])} {row['hands']}".strip()
+        f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
         + f": {row['difference']:+.1f}"
         for row in rows
         if row["runs"]
@@ -115,11 +115,11 @@ def _draw(axes: Axes, data: pd.DataFrame, marked: dict[str, str]) -> None:
             names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
         else:
             star = "*" if row["pooled"] else ""
-            names.append(f"{marked[row['task']]}, {short_name(row['method'])}{star}")
+            names.append(f"{marked[row['task']]}, {name_of(row['method'])}{star}")
     axes.axvline(0, color=style.INK, linewidth=0.6)
     style.name_rows(axes, names)
     axes.spines["left"].set_visible(False)
     # The widest interval need not hide the others: symmetric about zero at least to margins.
     reach = np.nanmax(np.abs(data[["low", "high", "difference", "margin"]].to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
-    axes.set_xlabel("ours − published (ticks; right: ours higher)")
+    axes.set_xlabel("ours − published (ticks)")

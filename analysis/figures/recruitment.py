@@ -12,9 +12,9 @@ from matplotlib.patches import Patch
 from coartic import Task
 from coartic.analysis.comparisons.paper import published_of
 from coartic.analysis.figures import style
+from coartic.analysis.figures.choice import chosen, has, missing, solved
 from coartic.analysis.figures.plot import Plot, worded
-from coartic.analysis.figures.selection import chosen, has, missing, solved
-from coartic.analysis.methods import short_name
+from coartic.analysis.methods import name_of
 from coartic.analysis.published import RUNS
 from coartic.analysis.study import Study
 
@@ -43,7 +43,7 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
     bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
     shape = style.grid(len(found), len(found))
-    size = style.widest(), (0.75 + 0.155 * max(bars)) * shape[0]
+    size = style.TWO, (0.75 + 0.155 * max(bars)) * shape[0]
     figure, panels = style.figure_of(shape, size)
     colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
     for axes, task in zip(panels, found.values(), strict=True):
@@ -53,7 +53,7 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     handles = [Patch(facecolor=color, label=hands, **_EDGE) for hands, color in colors.items()]
     style.legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)
     words = "; ".join(
-        f"{task}, {short_name(str(label))}{'' if source == 'ours' else ', published'}: "
+        f"{task}, {name_of(str(label))}{'' if source == 'ours' else ', published'}: "
         + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
         for (task, label, source), rows in data.groupby(["task", "method", "source"], sort=False)
     )
@@ -84,7 +84,7 @@ def _panel(
     groups = data.groupby(["method", "source"], sort=False)
     for place, ((label, source), rows) in enumerate(groups):
         ours, left = source == "ours", 0.0
-        names.append(short_name(str(label)) if ours else "published")
+        names.append(name_of(str(label)) if ours else "published")
         for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["hands"])):
             color, share = colors.get(row["hands"], style.GREY), row["share"]
             hatch = "" if ours else "//////"

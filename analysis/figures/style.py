@@ -7,9 +7,8 @@ white. All are legible on white and on #111; marks and dashes tell what colours 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any, NamedTuple
@@ -42,6 +41,8 @@ SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
 CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Of all intervals, for captions."""
 PAPER = "#ffffff"
+TIP = "tip:"
+"""How the id of a mark with a :func:`tip` begins."""
 _COLORS: Mapping[Color, str] = {
     "blue": "#0072b2",
     "sky": "#56b4e9",
@@ -114,45 +115,14 @@ def dagger(tasks: Iterable[Task]) -> str:
     return f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
 
 
-_WIDEST: ContextVar[float] = ContextVar("widest", default=TWO)
-
-
-def widest() -> float:
-    """How wide a figure may be, inches: two columns of a journal, one :func:`on_a_phone`."""
-    return _WIDEST.get()
-
-
-def narrow() -> bool:
-    """Whether there is room for one column alone."""
-    return widest() <= ONE
-
-
-@contextmanager
-def on_a_phone() -> Iterator[None]:
-    """Figures that are drawn within are one column wide: their panels stand below each other."""
-    before = _WIDEST.set(ONE)
-    try:
-        yield
-    finally:
-        _WIDEST.reset(before)
-
-
 def column_width(inches: float) -> float:
-    """Width in inches of a figure that needs so many: one column, or all that there is."""
-    return ONE if inches <= ONE else widest()
-
-
-def number(value: float, digits: int = 0) -> str:
-    """A number with a true minus sign."""
-    return f"{value:.{digits}f}".replace("-", "−")
+    """Width in inches of a figure that needs so many: one column or two."""
+    return ONE if inches <= ONE else TWO
 
 
 def grid(panels: int, columns: int | None = None) -> tuple[int, int]:
-    """Rows and columns of so many panels: one column where a figure is narrow.
-
-    ``columns``: where there is room for more; two or three by default.
-    """
-    columns = 1 if narrow() else min(columns or (2 if panels <= 6 else 3), panels)
+    """Rows and columns of so many panels; two or three columns by default."""
+    columns = min(columns or (2 if panels <= 6 else 3), panels)
     return -(-panels // columns), columns
 
 
@@ -172,8 +142,8 @@ def task_panels(
     ``tall``, ``legend``: inches of a panel, where the page allows, and of the legend.
     """
     rows, columns = grid(len(tasks))
-    height = tall * rows + legend * (1 if columns > 1 else 2)
-    figure, panels = figure_of((rows, columns), (widest(), min(height, TALLEST)), **subplots)
+    height = tall * rows + legend
+    figure, panels = figure_of((rows, columns), (TWO, min(height, TALLEST)), **subplots)
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
@@ -194,11 +164,28 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """A legend below all panels, of fewer columns where the figure is narrow."""
-    if narrow():
-        columns = min(columns, 2)
-        more = {"fontsize": SMALL - 1, "columnspacing": 0.8, **more}
+    """A legend below all panels."""
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
+
+
+def label_ends(axes: Axes, ends: Mapping[str, float], least: float) -> None:
+    """Names of lines at the right of a panel, each at its end or moved so that none overlap.
+
+    ``ends``: height of each line's end by its name; ``least``: distance between two names.
+    """
+    place = math.inf
+    for name, height in sorted(ends.items(), key=lambda item: -item[1]):
+        place = min(height, place - least)
+        where: Any = {
+            "xycoords": ("axes fraction", "data"),
+            "textcoords": ("axes fraction", "data"),
+        }
+        axes.annotate(name, (1, height), (1.02, place), va="center", annotation_clip=False, **where)
+
+
+def tip(artist: Artist, text: str) -> None:
+    """What a picture in a page of HTML says when the pointer rests on a mark."""
+    artist.set_gid(f"{TIP}{text}")
 
 
 def entry(label: str, **line: Any) -> Line2D:

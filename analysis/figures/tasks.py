@@ -13,8 +13,8 @@ from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_e
 from coartic.analysis.study import Study
 
 
-def tasks_of(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
-    """:func:`tasks_plot` of a folder's tasks, whichever methods are shown elsewhere."""
+def tasks(study: Study) -> Plot:
+    """:func:`tasks_plot` of a folder's tasks."""
     return tasks_plot(list(study.tasks.values()))
 
 
@@ -31,7 +31,7 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
     rows, columns = style.grid(len(tasks))
     above, around = 0.62, 0.55  # inches of a panel for title and axes
     scale = min(
-        (style.widest() / columns - around) / width,
+        (style.TWO / columns - around) / width,
         (style.TALLEST - 0.3 - rows * above) / rows / height,
         0.42,
     )

@@ -6,11 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coartic.analysis.generality.sample import Sample
+from coartic.analysis.comparisons.progress import best_so_far
+from coartic.analysis.generality.sample import Sample, sample
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.statistics.estimates import LEVEL, Inference
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Scores, other_tasks, value
+from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
 BUDGETS = (1_000, 10_000, 100_000)
@@ -48,15 +50,19 @@ class Contrast(NamedTuple):
     """Instances on which the runs tell the two apart, in either direction."""
 
 
-def contrasts(sample: Sample) -> list[Contrast]:
-    """Every contrast of :data:`CONTRASTS` in every family, then over all of them."""
-    found = []
+@cached
+def contrasts(study: Study) -> list[Contrast]:
+    """Every contrast of :data:`CONTRASTS` in every family, then over all; none without any."""
+    instances = sample(study)
+    found: list[Contrast] = []
+    if instances is None:
+        return found
     for first, second in CONTRASTS:
-        names = sample.shared(first, second)
-        own = [_contrast(sample, first, second, {family: names[family]}) for family in names]
+        names = instances.shared(first, second)
+        own = [_contrast(instances, first, second, {family: names[family]}) for family in names]
         found += own
         if len(own) > 1:
-            found.append(_contrast(sample, first, second, names))
+            found.append(_contrast(instances, first, second, names))
     return found
 
 
@@ -157,7 +163,7 @@ def _curves(sample: Sample, label: str) -> dict[int, dict[str, Array]]:
         cell = sample.study.cells.get((name, label))
         if cell is None or not len(cell.runs):
             continue
-        runs = [sample.study.best_so_far[str(run)] for run in cell.runs.run_id]
+        runs = [best_so_far(sample.study)[str(run)] for run in cell.runs.run_id]
         if not all(run.learns and run.solved for run in runs):
             continue
         made = min(int(run.total["trials"]) for run in runs)

@@ -10,14 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from coartic import Trajectory
-from coartic.analysis.generality.sample import Sample
+from coartic.analysis.generality.sample import Sample, sample
 from coartic.analysis.methods import CONDITIONS, TWO_ARMED
 from coartic.analysis.signatures.other_arm import preshaping
 from coartic.analysis.signatures.subtasks import isolated_agreement, served
-from coartic.analysis.signatures.trajectories import Trajectories, best_sequences, trajectories_of
 from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import other_tasks
+from coartic.analysis.study import Study, cached
+from coartic.analysis.trajectories import Trajectories, best_sequences
 from coartic.robot import Array
 
 SIGNS = {
@@ -46,15 +47,17 @@ class Signs:
     """Sequences that are best by the corrective process alone."""
 
 
-def signs(sample: Sample) -> dict[tuple[str, str], Signs]:
+@cached
+def signs(study: Study) -> dict[tuple[str, str], Signs]:
     """Of every instance and condition of the learner, by name and label."""
-    found = {}
-    for name in sample.references:
+    found: dict[tuple[str, str], Signs] = {}
+    instances = sample(study)
+    for name in instances.references if instances else ():
         for label in CONDITIONS:
-            cell = sample.study.cells.get((name, label))
+            cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
-                runs = trajectories_of(sample.study, (name, label))
-                best = best_sequences(sample.study.results.sequences, name)
+                runs = study.trajectories(name, label)
+                best = best_sequences(study.sequences, name)
                 initial = str(cell.good.initial_hands.iloc[0])
                 found[name, label] = Signs(
                     _values(runs), tuple(runs.sequences), initial, tuple(best)
@@ -104,9 +107,9 @@ THERE = {"hand": 0.1, "arm": 1.0, "other arm": 0.1, "first": 1.0, "whole": 1.0}
 rounding can make."""
 
 
-def presence(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Presence]:
+def presence(sample: Sample) -> list[Presence]:
     """Every signature by condition and family, and over all families."""
-    rows = []
+    rows, found = [], signs(sample.study)
     for label in CONDITIONS:
         for sign in SIGNS:
             scores = {}
@@ -146,9 +149,9 @@ class Recruitment(NamedTuple):
     """Share of runs that use both."""
 
 
-def recruitment(sample: Sample, found: dict[tuple[str, str], Signs]) -> list[Recruitment]:
+def recruitment(sample: Sample) -> list[Recruitment]:
     """Of each condition with two arms in each family."""
-    rows = []
+    rows, found = [], signs(sample.study)
     for label in TWO_ARMED:
         for family, names in sample.families.items():
             own = [(name, found[name, label]) for name in names if (name, label) in found]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -13,11 +12,9 @@ from coartic import Task
 from coartic.analysis.results.optima import locks_base
 from coartic.analysis.statistics.across_tasks import gap_share
 from coartic.analysis.statistics.instances import Runs, Scores
+from coartic.analysis.study import Study, cached
 from coartic.record import SEARCH
 from coartic.robot import Array
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
@@ -59,12 +56,6 @@ class Sample:
         for name in self.references:
             found.setdefault(str(self.tasks[name].family), []).append(name)
         return {family: tuple(names) for family, names in found.items()}
-
-    @cached_property
-    def splits(self) -> dict[str, int]:
-        """How many instances are for what: development, test or fresh ones."""
-        kinds = [str(task.split) for task in self.tasks.values()]
-        return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
     @cached_property
     def references(self) -> dict[str, ReferenceReward]:
@@ -152,7 +143,7 @@ class Sample:
         The corrective process alone with every sequence counts as well. The best that a sequence
         can give is at least that.
         """
-        runs, sequences = self.study.runs, self.study.results.sequences
+        runs, sequences = self.study.runs, self.study.sequences
         columns = ["task", "hands", "reward"]
         solved = runs[runs.status == "ok"][columns]
         every = pd.concat([solved, sequences[sequences.reward.notna()][columns]])
@@ -170,6 +161,7 @@ def one_by_one(study: Study) -> set[str]:
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
 
 
+@cached
 def sample(study: Study) -> Sample | None:
     """The instances of a folder; None where it has none with a solution."""
     found = Sample(study)

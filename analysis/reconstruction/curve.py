@@ -13,10 +13,10 @@ from coartic.text import counted
 
 _COLORS = {
     "supported": style.BLUE,
-    "cannot tell": style.GREY,
+    "undecided": style.GREY,
     "not supported": style.VERMILLION,
 }
-_MARKS = {"supported": "o", "cannot tell": ".", "not supported": "X"}
+_MARKS = {"supported": "o", "undecided": ".", "not supported": "X"}
 _COLUMNS = 3
 _HEIGHT = 1.9  # of a panel, inches
 _LEAST = 2  # specifications that make a curve

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.analysis.words import stated
+from coartic.analysis.words import read_beside
 from coartic.robot import Array
 
 
@@ -94,5 +94,5 @@ def layouts() -> dict[str, Layout]:
             float(entry["apart"]),
             {name: tuple(map(tuple, goals)) for name, goals in entry["known"].items()},
         )
-        for task, entry in stated(__file__, "layouts").items()
+        for task, entry in read_beside(__file__, "layouts").items()
     }

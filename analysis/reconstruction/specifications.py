@@ -11,15 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
-from coartic.analysis.claims.catalogue import CLAIMS, judge
-from coartic.analysis.claims.register import Claim, Judged, Verdict
-from coartic.analysis.claims.rules import of_task
+from coartic.analysis.claims.judge import Judged, by_tests, judge, opposite_p, p_of
+from coartic.analysis.claims.register import CLAIMS, Claim
 from coartic.analysis.reconstruction.constraints import sequences_of, try_sequences
 from coartic.analysis.reconstruction.reconstruct import search_for
 from coartic.analysis.results.folder import Results
@@ -29,8 +28,8 @@ from coartic.readings import condition_under, load_readings
 from coartic.tables import variant_of
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
-PAPERS = tuple(claim for claim in CLAIMS if claim.rule != "measured")
-VERDICTS = get_args(Verdict)[:3]
+PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
+VERDICTS = ("supported", "not supported", "undecided")
 
 
 @dataclass(frozen=True)
@@ -127,8 +126,8 @@ def judged_specifications(
 
     Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
     ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. Of
-    a member are the claims that some member's runs can judge; where another's cannot, it *cannot
-    tell*. p-values are not corrected: of most of a family's claims there are no runs here. In
+    a member are the claims that some member's runs can judge; where another's cannot, it is
+    *undecided*. p-values are not corrected: of most of a family's claims there are no runs here. In
     ``jobs`` processes; the result is the same.
     """
     known: set[tuple[str, str]] = set()
@@ -151,15 +150,20 @@ def _judged(
     """Rows of a specification, and the claims that its own runs can judge."""
     seen, rows, known = Study(results), [], []
     own = set(seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id)
-    wanted = [claim for claim in CLAIMS if claim.id in claims]
+    wanted = [CLAIMS[name] for name in claims]
     if spec.task:  # what the default goals of the other task do is no matter of a member's
-        wanted = [of_task(claim, spec.task) for claim in wanted]
+        wanted = [_of_task(claim, spec.task) for claim in wanted]
     for judged in judge(seen, wanted):
         if own.intersection(judged.run_ids):
             known.append(judged.claim.id)
-        alone = replace(judged, adjusted_p=judged.p, adjusted_contrary_p=judged.contrary_p)
-        rows.append(dict(_row(spec, alone)))
+        rows.append(dict(_row(spec, judged)))
     return spec, rows, known
+
+
+def _of_task(claim: Claim, task: str) -> Claim:
+    """A claim of comparisons on one task alone; other claims as they are."""
+    pairs = {name: pairs for name, pairs in claim.pairs.items() if name == task}
+    return claim.model_copy(update={"pairs": pairs}) if pairs else claim
 
 
 def _row(spec: Assumptions, judged: Judged) -> Iterator[tuple[str, Any]]:
@@ -167,8 +171,9 @@ def _row(spec: Assumptions, judged: Judged) -> Iterator[tuple[str, Any]]:
     yield "task", spec.task
     yield "member", spec.member
     yield "claim", judged.claim.id
-    yield "verdict", judged.verdict
-    first = judged.tests[0] if judged.tests else None
+    claim, finding = judged.claim, judged.finding
+    yield "verdict", by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
+    first = finding.tests[0] if finding.tests else None
     for name in ("estimate", "low", "high", "p"):
         column = "effect" if name == "estimate" else name
         yield column, math.nan if first is None else getattr(first, name)

@@ -16,9 +16,7 @@ _Cell = tuple[str | None, str | None]  # condition and hands
 
 def constraints_of(task: Task) -> tuple[Constraint, ...]:
     """What the corrective process alone has to give, of what may select; the rewards first."""
-    found = [
-        made for entry in printed.constraints(task.name) for made in _constraints(entry, task)
-    ]
+    found = [made for entry in printed.constraints(task.name) for made in _constraints(entry, task)]
     return tuple(sorted(found, key=lambda each: not isinstance(each, RewardIs)))
 
 
@@ -57,9 +55,7 @@ def tests_of(task: str) -> tuple[Test, ...]:
 
 def _implied(test: Test, counts: Mapping[_Cell, int]) -> Test:
     """Marked where it follows from others: of all runs, beside parts that make up all runs."""
-    parts = [
-        n for (condition, hands), n in counts.items() if condition == test.condition and hands
-    ]
+    parts = [n for (condition, hands), n in counts.items() if condition == test.condition and hands]
     if isinstance(test, Figure) and test.hands is None and sum(parts) == RUNS:
         return replace(test, implied=True)
     return test
@@ -74,13 +70,9 @@ def _tests(
     match entry:
         case printed.Reward(condition=str(condition)):
             sd = spreads.get((condition, entry.hands))
-            yield Figure(
-                condition, "mean", float(entry.value), runs, entry.hands, sd, entry.digits
-            )
+            yield Figure(condition, "mean", float(entry.value), runs, entry.hands, sd, entry.digits)
         case printed.Sd(condition=str(condition)):
-            yield Figure(
-                condition, "sd", float(entry.value), runs, entry.hands, None, entry.digits
-            )
+            yield Figure(condition, "sd", float(entry.value), runs, entry.hands, None, entry.digits)
         case printed.Count(condition=str(condition)):
             yield Figure(condition, "share", int(entry.value) / RUNS, RUNS, entry.hands)
         case printed.Sequences(condition=condition, found=(only,)):

@@ -1,144 +1,117 @@
-"""Headline values as LaTeX macros, each with what it was computed from.
+"""Headline numbers as LaTeX macros, at most a hundred, each with a comment that names its runs.
 
-A value with macro ``\\coarticAscendingECOneReward`` has companions ``...Low`` and ``...High``
-(95 % interval), ``...SD``, ``...N`` (runs) and ``...Full`` (value, interval and runs as text), as
-far as there are any. A value without ``...N`` has as many runs as its cell's reward.
+A macro names a cell of a table, so that ``coartic trace TABLE ROW`` prints the runs behind it.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import Any
 
-from coartic.analysis.methods import LEARNER
-from coartic.analysis.report.document import CellKey, RestsOn
-from coartic.analysis.report.formats.templates import LATEX, template
-from coartic.analysis.results.optima import SHIPPED
-from coartic.text import one_line
+import pandas as pd
 
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
+from coartic.analysis import tables
+from coartic.analysis.methods import is_learner, is_variant, main_methods, name_of
+from coartic.analysis.report import facts
+from coartic.analysis.study import Study
 
-PREFIX = "coartic"
-ORIGINS: dict[RestsOn, str] = {
-    "optimum": f"the optimum of the {SHIPPED}",
-    "ours": "ours, chosen or assumed, not the paper's (Shah, Barto & Fagg, 2013)",
-    "derived": "derived from what the paper prints (Shah, Barto & Fagg, 2013)",
-    "paper": "printed in the paper (Shah, Barto & Fagg, 2013)",
-    "simulation": "computed from the corrective process alone",
-    "runs": "computed of no runs, since none of its cells has any",
-    "text": "text",
-}
-"""What a value is that no runs are behind; the first that it rests on says it."""
+MOST = 100
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
+Number = tuple[str, str, str]
+"""Name behind ``\\coartic``, text, and what it is with where its runs are."""
 
 
-@dataclass(frozen=True)
-class Number:
-    """One value that a paper may print."""
-
-    macro: str
-    meaning: str
-    value: float
-    digits: int
-    """Decimals that are shown."""
-    unit: str = ""
-    low: float = math.nan
-    high: float = math.nan
-    sd: float = math.nan
-    sd_digits: int | None = None
-    """Decimals of the SD, where they are others."""
-    n: int | None = None
-    how: str = ""
-    """How value and interval were obtained."""
-    cells: tuple[CellKey, ...] = ()
-    """What it was computed from; none for what the paper prints and for shipped optima."""
-    of: str = ""
-    """What the meaning is said of, such as a method on a task."""
-    origin: str = ""
-    """What a value without cells is, such as printed in the paper."""
-
-    def __post_init__(self) -> None:
-        if not (self.macro.isascii() and self.macro.isalpha()):
-            raise ValueError(f"macro {self.macro!r}: letters alone")
-
-    def companions(self) -> Iterator[tuple[str, str]]:
-        """What follows the macro's name, first nothing, with the text that it stands for."""
-        yield "", self.text(self.value)
-        if not math.isnan(self.sd):
-            yield "SD", self.text(self.sd, self.sd_digits)
-        if not math.isnan(self.low):
-            yield "Low", self.text(self.low)
-            yield "High", self.text(self.high)
-        if self.n is not None:
-            yield "N", str(self.n)
-        if not math.isnan(self.low):
-            yield "Full", self.full(str)
-
-    def full(self, show: Callable[[str], str], n: str = "n") -> str:
-        """Value, interval and runs; ``show`` writes a number, ``n`` their symbol."""
-        value, low, high = (show(self.text(x)) for x in (self.value, self.low, self.high))
-        runs = "" if self.n is None else f"{n} = {self.n}"
-        # A point would look like certainty.
-        if self.low == self.high:
-            return f"{value} (no spread{f', {runs}' if runs else ''})"
-        return f"{value} [{low}, {high}]{f' ({runs})' if runs else ''}"
-
-    def text(self, value: float, digits: int | None = None) -> str:
-        """A value with this number's decimals, or ``digits``; never minus zero."""
-        shown = f"{value:.{self.digits if digits is None else digits}f}"
-        return shown.lstrip("-") if float(shown) == 0 else shown
+def numbers_tex(study: Study) -> str:
+    """The macros as a file that LaTeX inputs."""
+    about = facts.made(study)
+    lines = [
+        f"% Headline numbers of suite {about['suite']}, seed {about['seed']}: {about['runs']} runs",
+        f"% of coartic {about['version']} {about['commit']}, {about['date']}.",
+        "% `coartic trace TABLE ROW` prints the runs behind a row that a comment names.",
+    ]
+    taken: set[str] = set()
+    for name, text, comment in _numbers(study):
+        if text and name not in taken and len(taken) < MOST:
+            taken.add(name)
+            lines.append(f"\\newcommand{{\\coartic{name}}}{{{text}}} % {comment}")
+    return "\n".join(lines) + "\n"
 
 
-@dataclass(frozen=True)
-class Names:
-    """Tasks and labels in letters alone, all different."""
-
-    tasks: dict[str, str]
-    labels: dict[str, str]
-
-    def renamed(self) -> list[str]:
-        """A sentence for each name that another one would have in letters."""
-        return [
-            f"{name} is {word} in macros, as another name is {words(name)}."
-            for names in (self.tasks, self.labels)
-            for name, word in names.items()
-            if word != words(name)
-        ]
+def letters(text: str) -> str:
+    """A name in letters alone: ``two-armed-1`` is ``TwoArmedOne``."""
+    spelled = re.sub(r"\d", lambda digit: _DIGITS[int(digit[0])].join("  "), text)
+    return "".join(word[:1].upper() + word[1:] for word in re.findall("[A-Za-z]+", spelled))
 
 
-def words(name: str) -> str:
-    """A name in letters alone, as LaTeX's macros need: ``two-armed-1`` is ``TwoArmedOne``.
-
-    The paper's conditions are named without their family: ``dual-process/EC1`` is ``ECOne``.
-    """
-    name = re.sub(r"(?<=\d)[.](?=\d)", " point ", name.removeprefix(LEARNER))
-    name = re.sub(r"(?<=[_=])-(?=\d)", " minus ", name)
-    parts = re.findall(r"[A-Za-z]+|\d", name)
-    return "".join(_DIGITS[int(p)] if p.isdigit() else p[0].upper() + p[1:] for p in parts)
+def plain(value: float, digits: int) -> str:
+    """A number for LaTeX in decimals; empty for NaN, and for what is infinite."""
+    return "" if math.isnan(value) or math.isinf(value) else f"{value:.{digits}f}"
 
 
-def macro_names(study: Study) -> Names:
-    """Names of tasks and labels, ``...Alt`` where an earlier one has the same letters."""
-    return Names(
-        _distinct(study.tasks), _distinct(dict.fromkeys(label for _, label in study.cells))
-    )
+def _with_interval(
+    name: str, row: pd.Series, column: str, digits: int, scale: float, comment: str
+) -> Iterator[Number]:
+    for ending, suffix in (("", ""), ("_low", "Low"), ("_high", "High")):
+        if f"{column}{ending}" in row:
+            yield f"{name}{suffix}", plain(scale * float(row[f"{column}{ending}"]), digits), comment
 
 
-def numbers_tex(numbers: Iterable[Number], about: Iterable[str]) -> str:
-    """The macros as a LaTeX file. Numbers go through ``\\coarticnum``, which may be redefined."""
-    layout = template("numbers.tex.jinja", one_line, **LATEX)
-    return layout.render(numbers=numbers, about=about, prefix=PREFIX)
+def _numbers(study: Study) -> Iterator[Number]:
+    """The headline first: gaps, prices, verdicts; then rewards."""
+    yield from _headline(study)
+    ranking = tables.ranking(study)
+    for label in main_methods(str(m) for m in ranking.index if not is_variant(str(m))):
+        row: Any = ranking.loc[label]
+        comment = f"gap to the optimum, per cent: table ranking, row '{label}'"
+        yield from _with_interval(f"Gap{letters(name_of(label))}", row, "gap", 1, 100, comment)
+    for name, row in tables.published(study).iterrows():
+        of = letters(str(name))
+        comment = f"published learned reward: table published, row '{name}'"
+        yield f"Published{of}", plain(_float(row.published), 1), comment
+        comment = f"mean learned reward: table published, row '{name}'"
+        yield f"Reward{of}", plain(row.ours, 1), comment
+        yield f"Reward{of}SD", plain(row.ours_sd, 1), comment
+    for name, row in tables.tasks(study).iterrows():
+        comment = f"best known reward: table tasks, row '{name}'"
+        yield f"Optimum{letters(str(name))}", plain(_float(row.optimum), 0), comment
 
 
-def _distinct(names: Iterable[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for name in names:
-        word = words(name)
-        while word in found.values():
-            word += "Alt"
-        found[name] = word
-    return found
+def _float(value: Any) -> float:
+    return math.nan if value is None or pd.isna(value) else float(value)
+
+
+def _headline(study: Study) -> Iterator[Number]:
+    paper, price, shared = facts.paper(study), facts.price(study), facts.coarticulation(study)
+    if paper:
+        for verdict, count in paper.claims.items():
+            comment = f"claims that are {verdict}: table claims"
+            yield f"Claims{letters(verdict)}", str(count), comment
+        for verdict in ("equivalent", "undecided", "different"):
+            comment = f"learned rewards of the paper's cells, {verdict}: table published"
+            yield f"Rewards{letters(verdict)}", str(paper.rewards[verdict]), comment
+    if shared:
+        row = f"{shared.goal.tasks[0].name} {shared.goal.method} goal {shared.goal.goal} "
+        comment = f"postures at the shared goal: table contexts, row '{row}{shared.goal.hand}'"
+        yield "PosturesApart", plain(shared.goal.apart, 2), comment
+        yield "PosturesApartSD", plain(shared.goal.spreads, 1), comment
+    if price:
+        prices = tables.price(study)
+        labels = main_methods(map(str, prices.index))
+        learner = next((label for label in labels if is_learner(label)), "")
+        for label in filter(None, (learner, _labelled(prices, price.rival))):
+            of = "Learner" if label == learner else letters(price.rival)
+            comment = f"trials to half of the targets: table price, row '{label}'"
+            prices_of: Any = prices.loc[label]
+            yield from _with_interval(f"Half{of}", prices_of, "trials_to_half", 0, 1, comment)
+            comment = f"trials to a quarter of the targets: table price, row '{label}'"
+            yield from _with_interval(f"Quarter{of}", prices_of, "trials_to_quarter", 0, 1, comment)
+        for at in price.levels:
+            of = "Half" if at["level"] == 0.5 else "Quarter"
+            comment = f"ratio of trials, learner over {price.rival}: table price"
+            yield f"{of}Ratio", plain(at["times"], 1), comment
+
+
+def _labelled(prices: pd.DataFrame, name: str) -> str:
+    return next((str(label) for label in prices.index if name_of(str(label)) == name), "")

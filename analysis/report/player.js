@@ -1,5 +1,5 @@
 "use strict";
-/* Plays movements tick by tick. Data: analysis/report/player.py. */
+/* Plays movements tick by tick, over each other or side by side. Data: report/player.py. */
 
 /* ---- Movements: decoding, interpolation, kinematics ---- */
 
@@ -48,7 +48,7 @@ function arms(robot, q) {
   };
 }
 
-/* After `spent` ticks: the row shown, reward so far, goals hit, hand at work. */
+/* After `spent` ticks: the row shown, ticks so far, goals hit, hand at work. */
 function moment(movement, spent) {
   const ticks = Math.min(spent, movement.ticks);
   const seen = movement.rows.at(-1) + 1 - (movement.ticks - ticks);
@@ -56,6 +56,12 @@ function moment(movement, spent) {
   const hit = movement.hits.filter((at) => at < seen).length;
   const hand = { L: "left", R: "right" }[movement.hands[hit]];
   return { ticks, row, hit, hand };
+}
+
+/* Ticks spent when a goal is hit, counted from 1. */
+function ticksAtHit(movement, goal) {
+  const waited = movement.ticks - (movement.rows.at(-1) + 1);
+  return movement.hits[goal - 1] + 1 + waited;
 }
 
 function degrees(robot) {
@@ -90,42 +96,12 @@ function around(points, margin = 0) {
   return [least(x), least(y), most(x), most(y)];
 }
 
-/* One side: a choice of movement, its picture and what is to be said of it. */
-class Panel {
-  constructor(parent, choices, id, side, changed) {
-    this.side = side;
-    const choice = element("span", {}, choices);
-    element("label", { for: `${id}-${side}`, text: side === "left" ? "First " : "Second " }, choice);
-    this.select = element("select", { id: `${id}-${side}` }, choice);
-    this.select.addEventListener("change", changed);
-    const root = element("div", { class: "panel" }, parent);
-    this.svg = element("svg:svg", { role: "img" }, root);
-    this.facts = element("p", { class: "facts" }, root);
-  }
-
-  offer(task, wanted, first) {
-    this.select.replaceChildren();
-    const add = (parent, value, text) => element("option", { value, text }, parent);
-    const group = element("optgroup", { label: "Initial: corrective process alone" }, this.select);
-    task.initials.forEach((initial, k) => add(group, `i${k}`, `initial ${initial.hands} (−${initial.ticks})`));
-    if (!task.initials.length) group.remove();
-    const methods = element("optgroup", { label: "Methods" }, this.select);
-    task.movements.forEach((movement, k) => add(methods, `m${k}`, `${movement.name} (−${movement.ticks})`));
-    const same = task.movements.findIndex((movement) => movement.label === wanted);
-    if (same >= 0) this.select.value = `m${same}`;
-    else if (this.side === "left" && task.initials.length) this.select.value = "i0";
-    else this.select.value = `m${first}`;
-  }
-
-  get label() {
-    return this.movement && this.movement.label;
-  }
-
-  load(task) {
-    const list = this.select.value[0] === "i" ? task.initials : task.movements;
-    const dof = degrees(task.robot);
+/* One robot in a picture, with its trails and what is to be said of it. */
+class Mover {
+  constructor(task, movement, role) {
     this.task = task;
-    this.movement = decode(list[Number(this.select.value.slice(1))], task.unit, dof);
+    this.role = role;
+    this.movement = decode(movement, task.unit, degrees(task.robot));
     this.trails = Object.fromEntries(task.hands.map((hand) => [hand, []]));
     const seen = [...task.goals];
     for (let row = 0; row <= this.movement.rows.at(-1); row += 1) {
@@ -136,39 +112,33 @@ class Panel {
       });
     }
     this.seen = around(seen);
-    const { label, run, runs, hands, ticks } = this.movement;
-    this.svg.setAttribute("aria-label",
-      `Robot on ${task.label}: ${label || "initial movement"}, hands ${hands}, reward −${ticks}`);
-    const of = run ? `${runs > 1 ? `nearest the median of ${runs} runs: ` : "run "}${run}` : "corrective process alone, no learning";
-    this.facts.title = of;
-    this.head = label ? this.movement.name : `initial ${hands}`;
   }
 
-  draw([left, bottom, right, top]) {
+  get head() {
+    return `${this.movement.name}, ${this.task.label}`;
+  }
+
+  draw(svg, size) {
+    const group = element("svg:g", { class: this.role }, svg);
     const { goals, radius, below, hands } = this.task;
-    const size = Math.max(right - left, top - bottom);
-    this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
-    this.svg.style.setProperty("--stroke", size / 260);
-    this.svg.replaceChildren();
-    this.goals = goals.map(([x, y]) =>
-      element("svg:circle", { class: "goal", cx: x, cy: -y, r: radius }, this.svg));
+    this.goals = goals.map(([x, y]) => element("svg:circle", { class: "goal", cx: x, cy: -y, r: radius }, group));
+    this.half = size / 100;
     this.marks = {};
     hands.forEach((hand) => {
-      this.marks[hand] = { trail: element("svg:polyline", { class: `trail ${hand}` }, this.svg) };
+      this.marks[hand] = { trail: element("svg:polyline", { class: `trail ${hand}` }, group) };
     });
-    this.base = element("svg:rect", { class: "base" }, this.svg);
+    this.base = element("svg:rect", { class: "base" }, group);
     hands.forEach((hand) => {
       const joints = this.task.robot[hand].links.length + 1;
-      this.marks[hand].arm = element("svg:polyline", { class: `arm ${hand}` }, this.svg);
+      this.marks[hand].arm = element("svg:polyline", { class: `arm ${hand}` }, group);
       this.marks[hand].joints = Array.from({ length: joints }, () => hand === "left"
-        ? element("svg:rect", { class: "joint left", width: size / 46, height: size / 46 }, this.svg)
-        : element("svg:circle", { class: "joint right", r: size / 130 }, this.svg));
+        ? element("svg:rect", { class: "joint left", width: 2 * this.half, height: 2 * this.half }, group)
+        : element("svg:circle", { class: "joint right", r: size / 140 }, group));
     });
-    this.half = size / 92;
     goals.forEach(([x, y], k) => element("svg:text", {
       x, y: -y + (below[k] ? radius + size / 90 + size / 36 : -radius - size / 90),
       class: "number", "font-size": size / 26, text: k + 1,
-    }, this.svg));
+    }, group));
   }
 
   show(spent) {
@@ -185,30 +155,17 @@ class Panel {
       arm.setAttribute("points", polyline(points[hand]));
       arm.classList.toggle("chosen", now.hand === hand);
       points[hand].forEach(([x, y], k) => {
-        if (hand === "left") {
-          joints[k].setAttribute("x", x - this.half);
-          joints[k].setAttribute("y", -y - this.half);
-        } else {
-          joints[k].setAttribute("cx", x);
-          joints[k].setAttribute("cy", -y);
-        }
+        const where = hand === "left" ? { x: x - this.half, y: -y - this.half } : { cx: x, cy: -y };
+        Object.entries(where).forEach(([key, value]) => joints[k].setAttribute(key, value));
       });
     });
     this.goals.forEach((goal, k) => {
       goal.classList.toggle("hit", k < now.hit);
       goal.classList.toggle("current", k === now.hit);
     });
-    this.words = now.hit < goals.length
-      ? `reward ${reward(now.ticks)}, goal ${now.hit + 1} with the ${now.hand} hand`
-      : `reward ${reward(now.ticks)}, all goals hit`;
-    this.facts.replaceChildren();
-    element("strong", { text: this.head }, this.facts);
-    this.facts.append(`: ${this.words}`);
+    const goal = now.hit < goals.length ? `goal ${now.hit + 1} with the ${now.hand} hand` : "all goals hit";
+    this.words = `${now.ticks} ticks, ${goal}`;
   }
-}
-
-function reward(ticks) {
-  return ticks ? `−${ticks}` : "0";
 }
 
 /* ---- The player ---- */
@@ -220,7 +177,7 @@ class Player {
     this.playing = false;
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     this.build(root, root.id);
-    this.choose();
+    this.view(0);
     /* Played once when it is first seen, unless less motion is asked for. */
     if (!this.calm.matches && "IntersectionObserver" in window) {
       const seen = new IntersectionObserver((entries) => {
@@ -229,22 +186,33 @@ class Player {
         if (!this.spent) this.play();
       }, { threshold: 0.6 });
       seen.observe(root);
-    } else this.go(this.last);
+    } else this.go(this.pauseAt || this.last);
   }
 
   build(root, id) {
-    const both = element("div", { class: "panels" }, root);
-    const load = () => this.load();
-    const folded = element("details", { class: "choices" });
-    element("summary", { text: "Choose task, movements, speed" }, folded);
-    const choices = element("div", { class: "controls" }, folded);
-    const first = element("span", {}, choices);
-    element("label", { for: `${id}-task`, text: "Task " }, first);
-    this.task = element("select", { id: `${id}-task` }, first);
-    this.data.tasks.forEach((task, k) => element("option", { value: k, text: task.label }, this.task));
-    this.task.value = this.data.first ? this.data.first.task : 0;
-    this.task.addEventListener("change", () => this.choose());
-    this.panels = ["left", "right"].map((side) => new Panel(both, choices, id, side, load));
+    const choices = element("div", { class: "controls" }, root);
+    element("label", { for: `${id}-view`, text: "Show" }, choices);
+    this.views = element("select", { id: `${id}-view` }, choices);
+    this.data.views.forEach((view, k) => element("option", { value: k, text: view.name }, this.views));
+    element("option", { value: "own", text: "Two movements of your choice" }, this.views);
+    this.views.addEventListener("change", () => this.view(this.views.value));
+    this.selects = ["First", "Second"].map((name, k) => {
+      const own = element("span", { class: "own", hidden: "" }, choices);
+      element("label", { for: `${id}-${k}`, text: name }, own);
+      const select = element("select", { id: `${id}-${k}` }, own);
+      this.data.tasks.forEach((task, at) => {
+        const group = element("optgroup", { label: task.label }, select);
+        this.data.movements.forEach((movement, index) => {
+          if (movement.task === at) {
+            element("option", { value: index, text: `${movement.name} (${movement.ticks} ticks)` }, group);
+          }
+        });
+      });
+      select.addEventListener("change", () => this.load(this.selects.map((each) => Number(each.value))));
+      return select;
+    });
+    this.watch = element("p", { class: "watch" }, root);
+    this.pictures = element("div", { class: "pictures" }, root);
     const controls = element("div", { class: "controls" }, root);
     this.button = element("button", { type: "button", class: "play", text: "Play" }, controls);
     this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
@@ -254,47 +222,71 @@ class Player {
     };
     step("◂", "One tick back", -1);
     step("▸", "One tick on", 1);
-    const ticks = element("span", { class: "ticks" }, controls);
-    this.slider = element("input", { type: "range", "aria-label": "Tick", min: 0, step: 1, value: 0 }, ticks);
+    this.slider = element("input", { type: "range", "aria-label": "Tick", min: 0, step: 1, value: 0 }, controls);
     this.slider.addEventListener("input", () => { this.pause(); this.go(Number(this.slider.value)); });
-    this.count = element("span", { class: "count" }, ticks);
-    const speed = element("span", {}, choices);
-    element("label", { for: `${id}-speed`, text: "Speed " }, speed);
-    this.speed = element("select", { id: `${id}-speed` }, speed);
-    [15, 30, 60, 120, 240].forEach((rate) => element("option", { value: rate, text: `${rate} ticks/s` }, this.speed));
-    this.speed.value = "60";
-    root.append(folded);
+    this.count = element("span", { class: "count" }, controls);
     this.status = element("p", { class: "unseen", role: "status", "aria-live": "polite" }, root);
   }
 
-  choose() {
-    const at = Number(this.task.value);
-    const first = this.data.first && this.data.first.task === at ? this.data.first.movement : 0;
-    this.panels.forEach((panel) => panel.offer(this.data.tasks[at], panel.label, first));
-    this.load();
+  view(which) {
+    const own = which === "own";
+    this.selects.forEach((select) => { select.parentElement.hidden = !own; });
+    const view = own ? { watch: "", show: this.shown } : this.data.views[Number(which)];
+    this.watch.textContent = view.watch;
+    this.stopGoal = view.pause;
+    this.load(view.show);
   }
 
-  load() {
-    const task = this.data.tasks[Number(this.task.value)];
+  /* One-armed robots stand in one picture over each other, others side by side. */
+  load(show) {
     this.pause();
-    this.panels.forEach((panel) => panel.load(task));
-    const corners = this.panels.flatMap(({ seen }) => [seen.slice(0, 2), seen.slice(2)]);
-    const box = around(corners, 0.4);
-    this.panels.forEach((panel) => panel.draw(box));
-    this.last = Math.max(...this.panels.map((panel) => panel.movement.ticks));
+    this.shown = show.length > 1 ? show : [show[0], show[0]];
+    this.shown.forEach((index, k) => { this.selects[k].value = index; });
+    const distinct = [...new Set(show)];
+    this.movers = distinct.map((index, k) => {
+      const movement = this.data.movements[index];
+      return new Mover(this.data.tasks[movement.task], movement, k ? "second" : "first");
+    });
+    const together = this.movers.every((mover) => mover.task.hands.length === 1);
+    const box = around(this.movers.flatMap(({ seen }) => [seen.slice(0, 2), seen.slice(2)]), 0.6);
+    this.pictures.replaceChildren();
+    this.pictures.classList.toggle("together", together || this.movers.length === 1);
+    this.facts = [];
+    (together ? [this.movers] : this.movers.map((mover) => [mover])).forEach((movers) => this.picture(movers, box));
+    this.last = Math.max(...this.movers.map((mover) => mover.movement.ticks));
+    const hits = this.movers.map((mover) => (this.stopGoal ? ticksAtHit(mover.movement, this.stopGoal) : 0));
+    this.pauseAt = this.stopGoal ? Math.max(...hits) : 0;
     this.slider.max = this.last;
     this.go(0);
+  }
+
+  picture(movers, [left, bottom, right, top]) {
+    const root = element("div", { class: "picture" }, this.pictures);
+    const svg = element("svg:svg", { role: "img" }, root);
+    const size = Math.max(right - left, top - bottom);
+    svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
+    svg.setAttribute("aria-label", `Robot: ${movers.map((mover) => mover.head).join("; ")}`);
+    svg.style.setProperty("--stroke", size / 300);
+    movers.forEach((mover) => {
+      mover.draw(svg, size);
+      this.facts.push(element("p", { class: `facts ${mover.role}` }, root));
+    });
   }
 
   /* The state is spoken only while nothing moves. */
   go(spent) {
     this.spent = Math.max(0, Math.min(this.last, spent));
-    this.panels.forEach((panel) => panel.show(this.spent));
+    this.movers.forEach((mover, k) => {
+      mover.show(this.spent);
+      this.facts[k].replaceChildren();
+      element("strong", { text: mover.head }, this.facts[k]);
+      this.facts[k].append(`: ${mover.words}`);
+    });
     this.slider.value = this.spent;
-    this.count.textContent = `${this.spent} of ${this.last}`;
-    this.slider.setAttribute("aria-valuetext", `tick ${this.spent} of ${this.last}`);
+    this.count.textContent = `tick ${this.spent} of ${this.last}`;
+    this.slider.setAttribute("aria-valuetext", this.count.textContent);
     if (!this.playing) {
-      this.status.textContent = this.panels.map((panel) => `${panel.side}: ${panel.words}`).join("; ");
+      this.status.textContent = this.movers.map((mover) => `${mover.head}: ${mover.words}`).join("; ");
     }
   }
 
@@ -303,23 +295,22 @@ class Player {
     this.playing = true;
     this.button.textContent = "Pause";
     this.status.textContent = "";
-    const from = this.spent;
+    const pace = 60; // ticks a second
+    let from = this.spent;
     let start = null;
     let drawn = -Infinity;
-    const rate = () => Number(this.speed.value);
-    let pace = rate();
-    let base = from;
     const frame = (time) => {
       if (!this.playing) return;
-      if (start === null || pace !== rate()) {
-        base = this.spent;
-        pace = rate();
-        start = time;
-      }
+      if (start === null) start = time;
       // Where less motion is asked for, the picture changes twice a second.
       if (!this.calm.matches || time - drawn >= 500) {
         drawn = time;
-        this.go(Math.floor(base + ((time - start) / 1000) * pace));
+        const next = Math.floor(from + ((time - start) / 1000) * pace);
+        if (this.pauseAt && this.spent < this.pauseAt && next >= this.pauseAt) {
+          this.go(this.pauseAt);
+          from = this.pauseAt;
+          start = time + 2000; // the moment to look at
+        } else if (next > this.spent) this.go(next);
       }
       if (this.spent >= this.last) this.pause();
       else window.requestAnimationFrame(frame);
@@ -336,7 +327,7 @@ class Player {
 }
 
 if (typeof module !== "undefined") {
-  module.exports = { decode, configuration, chain, arms, moment, degrees };
+  module.exports = { decode, configuration, chain, arms, moment, ticksAtHit, degrees };
 } else {
   document.querySelectorAll(".player").forEach((root) => {
     const data = document.getElementById(`${root.id}-data`);

@@ -1,65 +1,114 @@
 """Movements for the report's player: key frames in joint space, as compact JSON.
 
-``player.js`` interpolates the key frames linearly and runs the forward kinematics of
-the robot's geometry, which is part of the data. Every joint is within ``TOLERANCE`` of
-where it was at every control tick; hits are kept by tick, exactly.
+``player.js`` interpolates the key frames linearly and runs the forward kinematics of the robot's
+geometry, which is part of the data. Every joint is within ``TOLERANCE`` of where it was at every
+control tick; hits are kept by tick, exactly.
 """
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic import (
-    MotionModel,
-    Robot,
-    Task,
-    Trajectory,
-    initial_hands,
-    trajectory,
-)
+from coartic import MotionModel, Robot, Task, Trajectory, initial_hands, trajectory
 from coartic.analysis.figures.robot import numbered_below
-from coartic.analysis.methods import CONDITIONS, spoken_name
-from coartic.analysis.report.document import CellKey
-from coartic.analysis.signatures.trajectories import Trajectories, corrective
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
+from coartic.analysis.report.facts import gain
+from coartic.analysis.signatures.shared_goal import shared_goal
 from coartic.analysis.study import Study
+from coartic.analysis.tables import best_condition
+from coartic.analysis.trajectories import Trajectories, corrective
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS
-from coartic.text import json_text
 
 TOLERANCE = 0.005
 """Length unit by which a joint may be off at any tick."""
 
 
-def player_json(study: Study, cells: Iterable[CellKey] | None = None) -> str:
-    """The movements of the cells, all by default, and the initial solutions they began with.
+def player_data(study: Study) -> dict[str, Any] | None:
+    """Tasks, movements and views of the player; None where no run has a solution.
 
-    Of each cell the run nearest its median reward, the first of several; cells with no
-    solved run are left out. Raises KeyError for cells that the study does not have.
+    Of each task the initial solution and, for each main method, the run nearest its median
+    reward. A view names one or two movements to begin with and says what to watch.
     """
-    chosen = list(study.trajectories if cells is None else cells)
-    tasks = [
-        _task(study.tasks[name], study, [cell for cell in chosen if cell[0] == name])
-        for name in dict.fromkeys(name for name, _ in chosen)
-    ]
-    shown = [task for task in tasks if task["movements"]]
-    return json_text({"tasks": shown, "first": _first(shown)}, allow_nan=False)
+    tasks: list[dict[str, Any]] = []
+    movements: list[dict[str, Any]] = []
+    for name in (name for name in study.tasks if name in one_by_one(study)):
+        task, unit = study.tasks[name], rounding_unit(study.tasks[name].robot)
+        labels = [label for own, label in study.cells if own == name]
+        shown = in_order({*main_methods(labels), *(c for c in CONDITIONS if c in labels)})
+        own = [
+            _movement(len(tasks), "", "initial solution", "", run, unit)
+            for run in _initial(task, study.model)
+        ]
+        for label in shown:
+            cell = study.trajectories(name, label)
+            if cell.runs:
+                index = nearest_to_median(cell)
+                run_id = str(study.cells[name, label].good.run_id.iloc[index])
+                run = cell.runs[index]
+                own.append(_movement(len(tasks), label, name_of(label), run_id, run, unit))
+        if own:
+            tasks.append(_task(task, unit))
+            movements += own
+    views = _views(study, movements)
+    return {"tasks": tasks, "movements": movements, "views": views} if movements else None
 
 
-def _first(tasks: list[dict[str, Any]]) -> dict[str, Any]:
-    """What is played first: the task and the learner's movement that gained most, as a share."""
-    gains = [
-        ((task["initials"][0]["ticks"] - movement["ticks"]) / task["initials"][0]["ticks"], at, k)
-        for at, task in enumerate(tasks)
-        for k, movement in enumerate(task["movements"])
-        if task["initials"] and movement["label"] in CONDITIONS
-    ]
-    _, task, movement = max(gains, default=(0.0, 0, 0), key=lambda found: found[0])
-    return {"task": task, "movement": movement}
+def player_json(study: Study) -> str:
+    """:func:`player_data` as JSON; empty where there is nothing to play."""
+    data = player_data(study)
+    return "" if data is None else json.dumps(data, allow_nan=False, separators=(",", ":"))
+
+
+def _views(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What the player offers first: the same goal before two successors, before and after."""
+
+    def place(task: str, label: str) -> int | None:
+        found = (k for k, m in enumerate(movements) if (m["on"], m["label"]) == (task, label))
+        return next(found, None)
+
+    views = []
+    shared, most = shared_goal(study), gain(study)
+    if shared is not None:
+        both = [place(task.name, shared.method) for task in shared.tasks]
+        if None not in both:
+            views.append(
+                {
+                    "name": "One goal, two successors",
+                    "watch": f"Both robots hit the same goal {shared.goal} first. Watch how their "
+                    "joints differ when it is hit, because the next goal lies elsewhere.",
+                    "show": both,
+                    "pause": shared.goal,
+                }
+            )
+    if most is not None:
+        name = next(name for name, task in study.tasks.items() if task.label == most.task)
+        both = [place(name, ""), place(name, best_condition(study, name) or "")]
+        if None not in both:
+            views.append(
+                {
+                    "name": "Before and after learning",
+                    "watch": "The same task before and after learning. Watch how the learner "
+                    "prepares for a goal while it moves to the one before.",
+                    "show": both,
+                }
+            )
+    return views or [{"name": "Movements", "watch": "", "show": [0]}]
+
+
+def _initial(task: Task, model: MotionModel) -> list[Trajectory]:
+    """The initial solution, or nothing where the corrective process completes no task."""
+    try:
+        execution = corrective(task, initial_hands(task, model=model), model)
+    except NotApplicableError:
+        return []
+    return [] if execution is None else [trajectory(task, execution.movements, model)]
 
 
 def nearest_to_median(cell: Trajectories) -> int:
@@ -105,68 +154,35 @@ def rounding_unit(robot: Robot) -> float:
     return float(10.0 ** math.floor(math.log10(TOLERANCE / max(levers))))
 
 
-def _task(task: Task, study: Study, cells: list[CellKey]) -> dict[str, Any]:
-    """A task with the initial solutions and the movements of the cells."""
-    initials: dict[str, Trajectory] = {}
-    chosen: list[tuple[dict[str, Any], Trajectory]] = []
-    for key in cells:
-        cell, good = study.trajectories[key], study.cells[key].good
-        if not cell.runs:
-            continue
-        index = nearest_to_median(cell)
-        row = good.iloc[index]
-        first = row.initial_hands
-        hands = (
-            str(first) if isinstance(first, str) and first else _initial_hands(task, study.model)
-        )
-        head = {
-            "label": key[1],
-            "name": spoken_name(key[1]),
-            "run": str(row.run_id),
-            "runs": len(cell.runs),
-        }
-        if hands and hands not in initials:
-            execution = corrective(task, hands, study.model)
-            if execution is not None:
-                initials[hands] = trajectory(task, execution.movements, study.model)
-        if hands in initials:
-            head["initial"] = hands
-        chosen.append((head, cell.runs[index]))
-    unit = rounding_unit(task.robot)
+def _task(task: Task, unit: float) -> dict[str, Any]:
+    """Goals and geometry."""
+    robot = task.robot
     return {
-        "name": task.name,
         "label": task.label,
         "goals": task.goal_array.tolist(),
         "radius": task.radius,
         "below": numbered_below(task),
         "hands": list(task.hands),
         "robot": {
-            "base": list(task.robot.base_size),
-            "left": _arm(task.robot.left_shoulder, task.robot.left_links),
-            "right": _arm(task.robot.right_shoulder, task.robot.right_links),
+            "base": list(robot.base_size),
+            "left": {"shoulder": list(robot.left_shoulder), "links": list(robot.left_links)},
+            "right": {"shoulder": list(robot.right_shoulder), "links": list(robot.right_links)},
         },
         "unit": unit,
-        "initials": [_movement({"hands": hands}, run, unit) for hands, run in initials.items()],
-        "movements": [_movement(head, run, unit) for head, run in chosen],
     }
 
 
-def _initial_hands(task: Task, model: MotionModel) -> str | None:
-    try:
-        return initial_hands(task, model=model)
-    except NotApplicableError:
-        return None
-
-
-def _arm(shoulder: tuple[float, float], links: tuple[float, ...]) -> dict[str, list[float]]:
-    return {"shoulder": list(shoulder), "links": list(links)}
-
-
-def _movement(head: dict[str, Any], run: Trajectory, unit: float) -> dict[str, Any]:
+def _movement(
+    task: int, label: str, name: str, run_id: str, run: Trajectory, unit: float
+) -> dict[str, Any]:
     """``rows`` and ``frames`` as differences to the frame before, the latter frame by frame."""
     rows, frames = key_frames(run, unit)
     return {
-        **head,
+        "task": task,
+        "on": run.task.name,
+        "label": label,
+        "name": name,
+        "run": run_id,
         "hands": run.execution.hands,
         "ticks": run.ticks,
         "hits": run.hits.tolist(),

@@ -121,9 +121,7 @@ def load_results(folder: Path) -> Results:
     folder, is not finished, or does not agree with itself.
     """
     if not folder.exists():
-        raise CoarticError(
-            f"{folder} does not exist; name a folder that `coartic run` has written"
-        )
+        raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
     if not folder.is_dir():
         raise CoarticError(f"{folder} is a file, not a results folder")
     check_tables(folder, read_manifest(folder))

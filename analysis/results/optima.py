@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict
@@ -27,9 +27,6 @@ from coartic.files import write_atomically
 from coartic.record import SEARCH
 from coartic.tables import label_of
 from coartic.text import one_line
-
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
 
 DATA = Path(__file__).with_name("optima.json")
 SHIPPED = f"shipped data (analysis/results/{DATA.name})"
@@ -102,7 +99,7 @@ class KnownOptimum:
         return f"{'proven' if self.proven else 'not proven'}; {self.source}"
 
 
-def optima(study: Study) -> dict[tuple[str, str], KnownOptimum]:
+def known_optima(results: Results) -> dict[tuple[str, str], KnownOptimum]:
     """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
 
     What the shipped data say where task and model are the same in all that matters, bettered by
@@ -110,14 +107,18 @@ def optima(study: Study) -> dict[tuple[str, str], KnownOptimum]:
     Searches of an instance of a family are short, and any run of the folder may better them.
     """
     found: dict[tuple[str, str], KnownOptimum] = {}
-    runs = study.runs
+    runs = results.runs
     solved = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
-    for name, task in study.tasks.items():
+    for name, task in results.tasks.items():
         own = solved[solved.task == name]
         for arm in ARMS:
             searches = dict(_searches(own, arm))
             candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
-            entry = _shipped().get((essence(task), arm)) if study.model == PAPER else None
+            entry = (
+                _shipped().get((essence(task), arm))
+                if results.manifest.specification.model == PAPER
+                else None
+            )
             if entry is not None and entry.reward is not None:
                 best = tuple(entry.searches.items())
                 candidates.append(KnownOptimum(entry.reward, entry.hands, entry.bound, best))

@@ -21,9 +21,9 @@ from coartic.analysis.signatures.context import (
 from coartic.analysis.signatures.locus import LEAST, ContextFamily, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
 from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
-from coartic.analysis.signatures.trajectories import Trajectories, last_ticks, postures
 from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.trajectories import Trajectories, last_ticks, postures
 from coartic.robot import HANDS, Array
 
 Runs = tuple[Trajectory, ...]

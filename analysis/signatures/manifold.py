@@ -86,7 +86,7 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
     inference (Verrel 2010); it equals ½ ln(V_ucm/V_ort) + ½ ln(d_ucm/d_ort). Its interval and
     test are the jackknife's, with Student's t and runs - 1 degrees of freedom (Miller 1974):
     they allow correlated joints and unequal variances within either space; with markedly
-    skewed scatter about 7 % of nulls are rejected at 5 % (analysis/calibration/signatures.py).
+    skewed scatter about 7 % of nulls are rejected at 5 %.
 
     All NaN below two runs, for a space of dimension 0 and where runs do not differ, or differ
     in one of the spaces only. No interval and no test where they differ along one line (as any

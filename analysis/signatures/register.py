@@ -2,18 +2,16 @@
 
 To add one: a function that computes it, in the file of its concept, a measure of it
 (:mod:`~.within` one method's runs on one task, :mod:`~.between` tasks), and a row of
-``register.toml``, which says how it is measured, what it says and where it is shown. Rows are
-in the order of ``signatures.csv``.
+``register.toml``, which says how it is measured and what it says. Rows are in its order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import fields, replace
 from functools import partial
 from itertools import groupby
 from operator import attrgetter
-from typing import TYPE_CHECKING
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict
@@ -23,15 +21,11 @@ from coartic.analysis.signatures.between import Members, TwoContexts
 from coartic.analysis.signatures.context import context_pairs
 from coartic.analysis.signatures.locus import LEAST, families, variants
 from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
-from coartic.analysis.signatures.trajectories import Trajectories, trajectories_of
-from coartic.analysis.words import stated
+from coartic.analysis.study import Study, cached
+from coartic.analysis.trajectories import Trajectories
+from coartic.analysis.words import read_beside
 from coartic.robot import HANDS
 
-if TYPE_CHECKING:
-    from coartic.analysis.study import Study
-
-PER_DIMENSION = ", per root of dimension"
-"""Of a unit."""
 NO_CONTEXT = "the method did no other task that shares the start and the first goals"
 IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
 NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
@@ -45,7 +39,7 @@ class _Kinds(BaseModel):
     families: tuple[Signature, ...]
 
 
-_KINDS = _Kinds.model_validate(stated(__file__))
+_KINDS = _Kinds.model_validate(read_beside(__file__))
 WITHIN = _KINDS.within
 """Of one method's runs on one task."""
 CONTEXTS = _KINDS.contexts
@@ -59,6 +53,7 @@ for _signature in (*WITHIN, *CONTEXTS, *FAMILIES):
         raise ValueError(f"register.toml has two signatures {_signature.name!r}")
 
 
+@cached
 def signature_rows(study: Study) -> list[SignatureRow]:
     """Every signature of every method and task of a study.
 
@@ -66,10 +61,7 @@ def signature_rows(study: Study) -> list[SignatureRow]:
     that locus families join are no pairs, their slopes say how each depends on the others.
     """
     alone = one_by_one(study)
-    if len(alone) == len(study.tasks):
-        trajectories = study.trajectories
-    else:  # many instances of families, which have fewer: coartic.analysis.generality.presence
-        trajectories = {key: trajectories_of(study, key) for key in study.cells if key[0] in alone}
+    trajectories = {key: study.trajectories(*key) for key in study.cells if key[0] in alone}
     groups = families(study.tasks)
     joined = variants(groups)
     pairs = context_pairs(study.tasks)
@@ -113,8 +105,9 @@ def _measured(signatures: Iterable[Signature], what: Trajectories | TwoContexts 
         yield from measure(what, *measured)
 
 
-def signatures_table(rows: Sequence[SignatureRow]) -> pd.DataFrame:
-    """The rows as ``signatures.csv`` has them, and ``label``.
+@cached
+def signatures(study: Study) -> pd.DataFrame:
+    """The rows of :func:`signature_rows` as a table, with ``label``.
 
     Columns are the fields of :class:`~.rows.SignatureRow`, with the place in words (``where``),
     then those of its :class:`~.rows.Place`. Signatures over runs are means with Student's
@@ -124,7 +117,7 @@ def signatures_table(rows: Sequence[SignatureRow]) -> pd.DataFrame:
     frame = pd.DataFrame(
         [
             {**vars(row), "place": str(row.place), **vars(row.place), "label": row.label}
-            for row in rows
+            for row in signature_rows(study)
         ],
         columns=[*own, "label"],
     ).rename(columns={"place": "where"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
@@ -96,12 +96,6 @@ Measure = Callable[..., Rows]
 of tasks), then the signatures that it measures, in the order of the register."""
 
 
-Shown = Literal[
-    "main-signatures", "hands", "other-arm", "travel", "synergy", "variance", "contexts", "slopes"
-]
-"""Tables that show signatures (:mod:`coartic.analysis.report.tables`)."""
-
-
 class Signature(BaseModel):
     """One signature, as a row of ``register.toml``, which says what the fields are."""
 
@@ -113,13 +107,8 @@ class Signature(BaseModel):
     range: str = "share of runs"
     by_goal: bool = False
     share: bool = False
-    simulated: bool = False
     meaning: str
     heading: str
-    table: Shown
-    digits: int | None = None
-    matrix: str = ""
-    macro: str = ""
     sources: tuple[Key, ...] = ()
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from coartic import Execution, Hand, Task, Trajectory, correct, move
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED
@@ -71,11 +71,6 @@ def served(path: Trajectory) -> Array:
 def postures_before(execution: Execution, task: Task) -> list[Array]:
     """The configuration from which each subtask starts: the hit before it, or the start."""
     return [np.array(task.q0), *execution.configurations[:-1]]
-
-
-def change_from(execution: Execution, reference: Execution) -> NDArray[np.int64]:
-    """Ticks of each subtask less those of another solution, shape ``(G,)``; negative: faster."""
-    return np.subtract(execution.ticks_by_goal(), reference.ticks_by_goal(), dtype=np.int64)
 
 
 def sacrifices(change: ArrayLike) -> bool:

@@ -38,8 +38,8 @@ from coartic.analysis.signatures.subtasks import (
     sacrifice_p,
     sacrifices,
 )
-from coartic.analysis.signatures.trajectories import Trajectories, entropy, postures
 from coartic.analysis.statistics import intervals
+from coartic.analysis.trajectories import Trajectories, entropy, postures
 from coartic.robot import Array
 
 

@@ -5,12 +5,9 @@ with a plain number, the number is taken as known without error: the reward of a
 deterministic method, say. Every function that resamples gives the same result for the same seed,
 :data:`SEED` by default; the seed belongs to the resampling, not to the runs.
 
-``coartic.analysis.calibration.error_rates`` measures how well the nominal rates hold for data
-like ours.
-
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14;
-N. Cliff (1993), Psychological Bulletin 114; R. Agarwal et al. (2021), NeurIPS 34 (interquartile
-mean, probability of improvement); R. G. Newcombe (2006), Statistics in Medicine 25.
+R. Agarwal et al. (2021), NeurIPS 34 (probability of improvement); R. G. Newcombe (2006),
+Statistics in Medicine 25.
 """
 
 from __future__ import annotations
@@ -73,9 +70,7 @@ def sample(values: ArrayLike) -> Array:
     """
     vector = np.asarray(values, dtype=np.float64)
     if vector.ndim != 1 or vector.size == 0:
-        raise ValueError(
-            f"a sample is a vector of at least one value, not of shape {vector.shape}"
-        )
+        raise ValueError(f"a sample is a vector of at least one value, not of shape {vector.shape}")
     if not np.isfinite(vector).all():
         raise ValueError("a sample has values that are not finite")
     return vector
@@ -159,20 +154,6 @@ def probability_of_improvement(
         high=max(far, found.estimate),
         seed=None,
         note="the samples do not overlap",
-    )
-
-
-def cliffs_delta(improvement: Inference) -> Inference:
-    """P(first higher) − P(second higher), from −1 to 1 (Cliff 1993).
-
-    Of a :func:`probability_of_improvement`: twice that, less one; so is its interval.
-    """
-    return replace(
-        improvement,
-        estimate=2 * improvement.estimate - 1,
-        low=2 * improvement.low - 1,
-        high=2 * improvement.high - 1,
-        method=improvement.method.replace("probability of improvement", "Cliff's delta"),
     )
 
 
@@ -264,20 +245,6 @@ def _of_large_samples(
 def _batches(resamples: int, size: int = 500) -> list[int]:
     """Numbers of resamples that are in memory at once."""
     return [min(size, resamples - start) for start in range(0, resamples, size)]
-
-
-def middle_mean(values: Array, weights: Array) -> Array:
-    """Interquartile mean over the last axis: the mean of the quantile function on [¼, ¾].
-
-    The values at the quartiles count by the part that lies within, so it equals scipy's
-    ``trim_mean(values, 0.25)`` where n is a multiple of 4 and ``weights`` (n,) are equal.
-    """
-    order = np.argsort(values, axis=-1, kind="stable")
-    ordered = np.take_along_axis(values, order, axis=-1)
-    ends = np.cumsum((weights / weights.sum())[order], axis=-1)
-    starts = np.concatenate([np.zeros_like(ends[..., :1]), ends[..., :-1]], axis=-1)
-    inside = np.clip(ends, 0.25, 0.75) - np.clip(starts, 0.25, 0.75)
-    return spread.within((inside * ordered).sum(axis=-1) / inside.sum(axis=-1), values, -1)
 
 
 def higher(first: Array, second: Array = _ZERO, axis: int = -1) -> Array:

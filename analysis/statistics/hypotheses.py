@@ -234,9 +234,7 @@ def standard_error(samples: tuple[Array, ...]) -> float:
     return math.sqrt(sum(float(spread.variance(values)) / len(values) for values in samples))
 
 
-def studentised_null(
-    samples: tuple[Array, ...], resamples: int, rng: np.random.Generator
-) -> Array:
+def studentised_null(samples: tuple[Array, ...], resamples: int, rng: np.random.Generator) -> Array:
     """Studentised mean (or difference of two) of resamples where the true one is 0.
 
     Shape ``(resamples,)``; ±infinity where a resample differs but has no spread.

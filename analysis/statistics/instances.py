@@ -20,7 +20,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from coartic.analysis.statistics import spread
@@ -203,46 +202,3 @@ def chance(difference: float, sd: float, count: int, level: float, *, tails: int
     bound = stats.t.isf(level / tails, count - 1)
     found = float(stats.nct.sf(bound, count - 1, shift))
     return 1.0 if math.isnan(found) and shift > bound else found
-
-
-def regression(
-    values: Array, properties: Array, groups: Sequence[str], *, seed: int = SEED
-) -> tuple[list[Inference], float]:
-    """Least squares of values (n,) on properties (n, k) within groups, and R² within them.
-
-    A slope is what one more of a property goes with, all others alike. Each group has an intercept
-    of its own, so that no slope is a difference between groups. Percentile intervals of instances
-    drawn with replacement within their group, which need no equal variances. A property that
-    varies in no group gets NaN. Raises ValueError for fewer
-    than three instances a coefficient.
-    """
-    members = np.asarray(groups) == np.array(list(dict.fromkeys(groups)))[:, None]
-    places = [np.flatnonzero(own) for own in members]
-    varies = np.any([np.ptp(properties[own], axis=0) > 0 for own in places], axis=0)
-    design = np.column_stack([*members, properties[:, varies]]).astype(np.float64)
-    if len(values) < 3 * design.shape[1]:
-        raise ValueError(f"{len(values)} instances are too few for {varies.sum()} properties")
-    slopes = np.linalg.lstsq(design, values, rcond=None)[0]
-    left = values - design @ slopes
-    spread_within = any(np.ptp(values[own]) > 0 for own in places)
-    about = values - np.array([values[own].mean() for own in places]) @ members
-    explained = 1 - float(left @ left) / float(about @ about) if spread_within else math.nan
-    rng = np.random.default_rng(seed)
-    counts = np.empty((RESAMPLES, len(values)))
-    for own in places:
-        counts[:, own] = rng.multinomial(len(own), np.full(len(own), 1 / len(own)), RESAMPLES)
-    # Normal equations of all draws; the pseudo-inverse is for draws in which nothing varies.
-    size = design.shape[1]
-    outer = (design[:, :, None] * design[:, None, :]).reshape(len(values), -1)
-    squares = (counts @ outer).reshape(-1, size, size)
-    products = (counts * values) @ design
-    drawn = np.einsum("rjk,rk->rj", np.linalg.pinv(squares, hermitian=True), products)
-    low, high = np.quantile(drawn, TAILS, axis=0)
-    known: NDArray[np.int64] = len(places) - 1 + np.cumsum(varies)
-    n, method = (len(values),), f"slope within groups, bootstrap, {RESAMPLES} resamples"
-    return [
-        Inference(float(slopes[k]), n, method, float(low[k]), float(high[k]), seed=seed)
-        if there
-        else Inference(math.nan, n, method, note="it varies in no group")
-        for k, there in zip(known.tolist(), varies.tolist(), strict=True)
-    ], explained

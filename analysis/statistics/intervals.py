@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special, stats
 
 from coartic.analysis.statistics import spread
-from coartic.analysis.statistics.estimates import CONFIDENCE, SEED, TAILS
+from coartic.analysis.statistics.estimates import CONFIDENCE, SEED
 from coartic.robot import Array
 
 RESAMPLES = 2_000
@@ -60,19 +59,6 @@ def wilson(count: int, total: int, confidence: float = CONFIDENCE) -> Interval:
     return Interval(count / total, float(low), float(high))
 
 
-def mean_interval(values: Array) -> tuple[Array, Array, Array]:
-    """Mean over n runs and the ends of its 95 % interval, each for itself, of values (n, k).
-
-    Percentile bootstrap intervals over runs (Efron & Tibshirani, 1993); NaN for a single run.
-    """
-    if len(values) < 2:
-        nothing = np.full(values.shape[1], math.nan)
-        return values.mean(axis=0), nothing, nothing
-    means = spread.within(_weights(len(values)) @ values, values)
-    low, high = np.quantile(means, TAILS, axis=0)
-    return spread.mean(values), low, high
-
-
 def resampled(values: Array) -> Array:
     """Bootstrap resamples of values (n,), shape ``(RESAMPLES, n)``.
 
@@ -94,49 +80,3 @@ def _weights(n: int) -> Array:
     counts = [np.bincount(draw, minlength=n) for draw in _draws(n)]
     shares: Array = np.array(counts) / n
     return shares
-
-
-def kaplan_meier_median(times: ArrayLike, reached: ArrayLike) -> Interval:
-    """Median of the product-limit estimate S(t) (Kaplan & Meier, 1958) of the times (n,).
-
-    ``reached`` is False for runs that are right-censored at their time, which is infinite
-    for those known never to reach it. The median is the first time at which S ≤ 0.5, infinite
-    where so few reached it that there is none. Its interval (Brookmeyer & Crowley, 1982) holds the
-    times at which the pointwise interval of S holds 0.5: by Greenwood's variance on the
-    complementary log-log scale. Where that variance is not defined, the exact binomial limits
-    (Clopper & Pearson, 1934) stand in: before the first event, for all of n; where S is 0, for
-    none of as many as reached it. ``low`` may thus be 0 and ``high`` infinite. Of 2000 simulated
-    samples (exponential, the last 30 % censored) the interval held the median in 96 to 98 %, for
-    6, 10 and 20 runs. Censoring has to be independent of the time to the event. Raises ValueError
-    without a time.
-    """
-    times = np.asarray(times, dtype=np.float64)
-    reached = np.asarray(reached, dtype=bool)
-    if not len(times):
-        raise ValueError("no times")
-    if not reached.any():
-        return Interval(math.inf, _none_before(len(times)), math.inf)
-    times = np.where(np.isinf(times), times[np.isfinite(times)].max(), times)
-    estimate = stats.ecdf(stats.CensoredData.right_censored(times, ~reached)).sf
-    at, survival = estimate.quantiles, estimate.probabilities
-    with warnings.catch_warnings():
-        # Where the interval is not defined it is NaN, and seen to below.
-        warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-        interval = estimate.confidence_interval(CONFIDENCE, method="log-log")
-    lower, upper = interval.low.probabilities, interval.high.probabilities
-    lower = np.where(survival <= 0, 0.0, np.where(survival >= 1, 1.0, lower))
-    none_left = 1 - TAILS[0] ** (1 / reached.sum())
-    upper = np.where(survival <= 0, none_left, np.where(survival >= 1, 1.0, upper))
-    low = min(_first(at, lower), _none_before(len(times)))
-    return Interval(_first(at, survival), low, _first(at, upper))
-
-
-def _first(times: Array, curve: ArrayLike) -> float:
-    """First time at which a curve is at most 0.5, up to rounding."""
-    below = np.flatnonzero(np.asarray(curve) <= 0.5 + 1e-12)
-    return float(times[below[0]]) if len(below) else math.inf
-
-
-def _none_before(n: int) -> float:
-    """0 where n runs, none of which reached it, do not show that the median is later."""
-    return 0.0 if TAILS[0] ** (1 / n) <= 0.5 else math.inf

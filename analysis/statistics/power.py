@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 
-from scipy import optimize, special, stats
+from scipy import special, stats
 
 from coartic.analysis.statistics.estimates import LEVEL
 
@@ -54,24 +54,3 @@ def runs_needed(difference: float, first_sd: float, second_sd: float) -> int:
     while not enough(most):
         most *= 2
     return bisect_left(range(most), True, lo=max(2, most // 2), key=enough)
-
-
-def smallest_difference(
-    first_sd: float, second_sd: float, runs: int, level: float = LEVEL
-) -> float:
-    """Smallest true difference of means that is found with a power of :data:`POWER`, > 0.
-
-    In the unit of the SDs; 0 without any spread, where every difference is found. Raises
-    ValueError as :func:`power` does.
-    """
-    scale = math.hypot(first_sd, second_sd)
-    if scale == 0:
-        return 0.0
-
-    def excess(difference: float) -> float:
-        return power(difference, first_sd, second_sd, runs, level) - POWER
-
-    most = scale
-    while excess(most) < 0:
-        most *= 2
-    return float(optimize.brentq(excess, 0.0, most, xtol=1e-9 * scale))

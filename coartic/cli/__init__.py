@@ -1,6 +1,6 @@
 """The command line. It sits on top of the four packages; nothing imports it.
 
-Each command is a function in one of five files by what it does; it imports what it needs when
+Each command is a function in a file by what it does; it imports what it needs when
 it is called, so that help and completion are there at once.
 """
 
@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import drawing, families, reading, reconstructing, running
+from coartic.cli import draw, paper, read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 
@@ -44,16 +44,11 @@ def _options(
     pass
 
 
-for group, commands in (
-    (running.GROUP, running.COMMANDS),
-    (reading.GROUP, reading.COMMANDS),
-    (drawing.GROUP, drawing.COMMANDS),
-    (families.GROUP, families.COMMANDS),
-    (reconstructing.GROUP, reconstructing.COMMANDS),
-):
-    for command in commands:
+for module in (run, read, draw):
+    for command in module.COMMANDS:
         name = command.__name__.removesuffix("_")
-        app.command(name=name, rich_help_panel=group)(command)
+        app.command(name=name, rich_help_panel=module.GROUP)(command)
+app.add_typer(paper.app, name="paper", rich_help_panel="The paper")
 
 
 def main() -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import textwrap
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -15,15 +16,15 @@ from typing import TYPE_CHECKING, Any, TextIO
 from coartic.text import counted, one_line
 
 if TYPE_CHECKING:
+    import pandas as pd
     from rich.console import Console
     from rich.progress import TaskID
 
-    from coartic.analysis.report.document import DataTable
     from coartic.benchmarks.harness import Progress
     from coartic.benchmarks.specification import RunSpec
 
-PLAIN_WIDTH = 200  # columns where the output is not a terminal, and COLUMNS is not set
 READABLE = 24  # characters that a column of text needs
+WIDTH = 80  # columns where the output is not a terminal, and COLUMNS is not set
 _AS_IT_IS: Any = {"markup": False, "emoji": False, "highlight": False}
 """Names in square brackets or between colons are no markup of rich."""
 
@@ -31,7 +32,7 @@ _AS_IT_IS: Any = {"markup": False, "emoji": False, "highlight": False}
 def say(*lines: str, stream: TextIO | None = None) -> None:
     """Print lines; whatever names are in them, each is one, and prints.
 
-    Text comes to a terminal here, in :func:`show_table` and in :class:`Display`.
+    Text comes to a terminal here, in :func:`show_frame` and in :class:`Display`.
     """
     print("\n".join(map(one_line, lines)), file=stream)
 
@@ -42,60 +43,39 @@ def complain(kind: str, text: str) -> None:
 
 
 def console() -> Console:
-    """Standard output, as wide as the terminal, as ``COLUMNS`` says or :data:`PLAIN_WIDTH`."""
+    """Standard output, as wide as the terminal, as ``COLUMNS`` says or :data:`WIDTH`."""
     from rich.console import Console
 
     found, asked = Console(**_AS_IT_IS), os.environ.get("COLUMNS", "")
     if found.is_terminal:
         return found
-    width = int(asked) if asked.isdecimal() and int(asked) else PLAIN_WIDTH
-    return Console(width=width, **_AS_IT_IS)
+    return Console(width=int(asked) if asked.isdecimal() and int(asked) else WIDTH, **_AS_IT_IS)
 
 
-def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table of text, its first column unbroken.
+def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
+    """Print words and what is to be said of each, below each other; long text is wrapped."""
+    kept = [(one_line(word), one_line(text)) for word, text in pairs]
+    indent = max((len(word) for word, _ in kept), default=0) + 2
+    width = max(console().width, indent + READABLE)
+    for word, text in kept:
+        lines = textwrap.wrap(text, width - indent, break_on_hyphens=False) or [""]
+        for number, line in enumerate(lines):
+            say(f"{'' if number else word:{indent}}{line}".rstrip())
 
-    Where the others would be too narrow to be read, each row is a list of what is in it.
-    """
+
+def show_frame(frame: pd.DataFrame) -> None:
+    """Print a table, or nothing where it has no rows."""
     from rich import box
-    from rich.padding import Padding
     from rich.table import Table
 
-    out = console()
-    heads, *texts = (tuple(map(one_line, row)) for row in (columns, *rows))
-    first, *others = (max(map(len, column)) for column in zip(heads, *texts, strict=True))
-    if first + sum(min(width, READABLE) for width in others) + 4 * len(heads) > out.width:
-        out.print(one_line(title))
-        for name, *values in texts:
-            out.print("", name, sep="\n")
-            for head, value in zip(heads[1:], values, strict=True):
-                out.print(Padding(f"{head}: {value}", (0, 0, 0, 4)))
-        out.print()
+    if not len(frame):
         return
-    table = Table(
-        title=one_line(title), title_justify="left", box=box.SIMPLE_HEAD, highlight=False
-    )
-    for index, column in enumerate(heads):
-        table.add_column(column, overflow="fold", no_wrap=index == 0)
-    for row in texts:
-        table.add_row(*row)
-    out.print(table)
-
-
-def show_data(tables: Iterable[DataTable], where: str) -> None:
-    """Print tables of values, as many columns of each as fit; ``where`` the others are."""
-    from coartic.analysis.report.formats.terminal import terminal_table
-
-    out = console()
-    for table in tables:
-        out.print(terminal_table(table, out.width, where), "")
-
-
-def show_lines(lines: Iterable[str]) -> None:
-    """Print sentences, wrapped at words to the terminal's width."""
-    out = console()
-    for line in lines:
-        out.print(one_line(line))
+    table = Table(box=box.SIMPLE_HEAD, highlight=False)
+    for name in frame.columns:
+        table.add_column(one_line(str(name)), overflow="fold")
+    for row in frame.astype(str).itertuples(index=False):
+        table.add_row(*map(one_line, row))
+    console().print(table)
 
 
 @contextmanager
@@ -109,11 +89,9 @@ def performing(suite: str, folder: Path) -> Iterator[Display]:
             if not (display.interrupted or isinstance(error, KeyboardInterrupt)):
                 raise
             display.close()
-            done = (
-                f"{counted(display.done, 'run')} done now {'is' if display.done == 1 else 'are'}"
-            )
+            done = f"{counted(display.done, 'finished run')} {'is' if display.done == 1 else 'are'}"
             say(
-                f"interrupted; {done} kept in {folder}, and the same command goes on from there",
+                f"Interrupted. {done} saved in {folder}; repeat the command to resume.",
                 stream=sys.stderr,
             )
             sys.exit(130)
@@ -134,7 +112,7 @@ def if_interrupted(sentence: str) -> None:
 
     def end(*_: object) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-        say(f"interrupted; {sentence}", stream=sys.stderr)
+        say(f"Interrupted. {sentence}", stream=sys.stderr)
         _end_workers()
         signal.raise_signal(signal.SIGINT)
 
@@ -144,7 +122,7 @@ def if_interrupted(sentence: str) -> None:
 
 def writing(folder: Path) -> None:
     """From here on files are replaced in a folder: what Ctrl-C says of it."""
-    if_interrupted(f"{folder} holds old files beside new ones until the same command has ended")
+    if_interrupted(f"{folder} may be incomplete; repeat the command to finish it.")
 
 
 _FROM_COMPILED = frozenset({"numba", "llvmlite", "pydantic"})
@@ -188,7 +166,7 @@ class Display:
     While the runs are performed, Ctrl-C is a KeyboardInterrupt.
     """
 
-    EVERY_S = 10.0  # between plain lines
+    EVERY_S = 30.0  # between plain lines
 
     def __init__(self, suite: str) -> None:
         from rich import progress
@@ -226,11 +204,6 @@ class Display:
         """Leave the terminal as it was."""
         self._bar.stop()
 
-    def end_runs(self) -> None:
-        """All runs are kept: from here on Ctrl-C ends the process."""
-        self._interrupts.check()
-        self._interrupts.end()
-
     def update(self, progress: Progress, spec: RunSpec | None) -> None:
         """Show how far the plan is."""
         self._show(progress, spec)
@@ -240,13 +213,13 @@ class Display:
         self.done = progress.done
         if spec is None:
             for damage in progress.damaged:
-                self.line(f"{damage.reason}; what is lost is performed again")
+                self.line(f"{damage.reason}; the affected runs will be repeated.")
             if progress.stale:
-                self.line(
-                    f"not used, made by other code: {counted(len(progress.stale), 'record')}"
-                )
+                count = counted(len(progress.stale), "record")
+                self.line(f"Ignoring {count} made by a different version of the code.")
             if progress.present:
-                self.line(f"already there: {progress.present} of {counted(progress.total, 'run')}")
+                total = counted(progress.total, "run")
+                self.line(f"{progress.present} of {total} are already there.")
         if self._console.is_terminal:
             self._live(progress, spec)
         else:

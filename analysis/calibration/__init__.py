@@ -1,1 +1,0 @@
-"""Do our own tests and intervals hold what they promise? Simulations, run as commands."""

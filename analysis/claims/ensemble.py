@@ -1,0 +1,51 @@
+"""In how many reconstructions of the two-armed tasks each claim holds.
+
+``ensemble.csv`` has a row for each claim and task whose goals were replaced by those of every
+member of its ensemble (docs/reconstruction.md): counts of verdicts, by p-values without
+correction. Members are no random sample, so these counts are no probabilities.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+DATA = Path(__file__).with_name("ensemble.csv")
+
+
+class Held(NamedTuple):
+    """Verdicts of a claim over the members of an ensemble."""
+
+    task: str
+    """Whose goals are the members'."""
+    supported: int
+    refuted: int
+    members: int
+
+
+@cache
+def _table() -> pd.DataFrame:
+    return pd.read_csv(DATA)
+
+
+def held_by(claim: str) -> tuple[Held, ...]:
+    """Of a claim's id, by task; none for a claim that does not rest on two-armed tasks."""
+    rows = _table()[_table().claim == claim].itertuples(index=False, name=None)
+    return tuple(Held(str(task), *map(int, counts)) for _, task, *counts in rows)
+
+
+def held_in_words(claim: str) -> str:
+    """``231 of 242 (two-armed-1, refuted in 3)``; empty where there is none."""
+    parts = []
+    for held in held_by(claim):
+        refuted = f", refuted in {held.refuted}" if held.refuted else ""
+        parts.append(f"{held.supported} of {held.members} ({held.task}{refuted})")
+    return "; ".join(parts)
+
+
+def mostly_refuted(claim: str) -> bool:
+    """Whether a claim is refuted with more than half of the admissible goals of some task."""
+    return any(2 * held.refuted > held.members for held in held_by(claim))

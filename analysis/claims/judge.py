@@ -1,0 +1,172 @@
+"""The claims judged on a results folder: tests corrected together, one verdict each.
+
+- *Supported*: what the claim says is seen, and the largest p-value of its tests, which must all
+  hold (intersection-union test), is below 5 % after Holm's correction.
+- *Not supported*: it is not seen, and the opposite of one of its tests is significant (smallest
+  p-value of the opposites times their number, below 5 % after Holm's correction); or the goals that
+  the paper's text admits refute it in most cases.
+- *Used to choose the goals*: it would be supported, but our goals were chosen by it or it follows
+  from what they were chosen by.
+- *Undecided*: none of these, or the folder lacks the runs.
+
+What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
+groups of claims: those on the paper's own seven cells, those that take other runs beside them, and
+those on families of random tasks. A claim that a folder cannot test counts in its group all the
+same, so that what is decided stays decided whatever else is run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+
+from coartic.analysis.claims import families, general, one_armed, rules, two_armed
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.ensemble import held_in_words, mostly_refuted
+from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Correction, Finding, Verdict
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
+from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.study import Study, cached
+
+_CORRECTIONS: tuple[Correction, ...] = ("paper", "beside", "families")
+_MODULES = {
+    module.__name__.rpartition(".")[2]: module
+    for module in (rules, one_armed, two_armed, general, families)
+}
+JUDGES: Mapping[str, Callable[[Data, Claim], Finding]] = {
+    name: getattr(_MODULES[module], function)
+    for name, claim in CLAIMS.items()
+    for module, _, function in [claim.judge.partition(".")]
+}
+"""Who judges each claim, by its id."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim with what was seen of it, and its verdict."""
+
+    claim: Claim
+    finding: Finding
+    run_ids: tuple[str, ...] = ()
+    adjusted_p: float = math.nan
+    """:func:`p_of` the claim, adjusted over its group (Holm)."""
+    adjusted_opposite_p: float = math.nan
+
+    @property
+    def verdict(self) -> Verdict:
+        """As the module says."""
+        if self.claim.fitted and mostly_refuted(self.claim.id) and self.finding.holds is not None:
+            return "not supported"
+        verdict = by_tests(self.finding, self.adjusted_p, self.adjusted_opposite_p)
+        chosen = self.claim.chosen and verdict == "supported"
+        return "used to choose the goals" if chosen else verdict
+
+    @property
+    def methods(self) -> str:
+        """Its tests, in words, each once."""
+        every = (*self.finding.tests, *(self.finding.against or ()))
+        return "; ".join(dict.fromkeys(test.method for test in every))
+
+
+def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
+    """The verdict of the tests alone, by their p-values and those of the opposite."""
+    if finding.holds is None:
+        return "undecided"
+    if finding.holds:
+        # NaN: counted exactly, or no spread in any sample.
+        return "undecided" if p >= LEVEL else "supported"
+    certain = not finding.tests or any(
+        test.estimate <= 0 and math.isnan(test.p) and min(test.n) > 1 for test in finding.tests
+    )
+    return "not supported" if certain or opposite < LEVEL else "undecided"
+
+
+def test_in_words(claim: Claim) -> str:
+    """How a claim is judged, with its margins; a rule's own words are its docstring."""
+    return " ".join((claim.test or str(JUDGES[claim.id].__doc__)).split()).format(**MARGINS)
+
+
+def p_of(claim: Claim, finding: Finding) -> float:
+    """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
+    known = [test.p for test in finding.tests if not math.isnan(test.p)]
+    return max(known) if known and claim.correction else math.nan
+
+
+def opposite_p(claim: Claim, finding: Finding) -> float:
+    """Smallest p-value of the opposites times their number (Bonferroni); NaN without any."""
+    if finding.against is not None:
+        p = [test.p for test in finding.against]
+    else:
+        p = [min(1.0, 1 - test.p + 1 / (RESAMPLES + 1)) for test in finding.tests]
+    known = [value for value in p if not math.isnan(value)]
+    return min(1.0, min(known) * len(known)) if known and claim.correction else math.nan
+
+
+@cached
+def judged(study: Study) -> list[Judged]:
+    """Every claim about such tasks as the folder has, judged and corrected."""
+    drawn = {task.family is not None for task in study.tasks.values()} or {False}
+    return judge(study, [c for c in CLAIMS.values() if bool(c.families) in drawn])
+
+
+def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
+    """The claims judged; those with a test are corrected over their groups among ``claims``."""
+    seen = [_seen(claim, Data(study)) for claim in claims]
+    adjusted: dict[str, tuple[float, float]] = {}
+    for correction in _CORRECTIONS:
+        group = [(claim, finding) for claim, finding, _ in seen if claim.correction == correction]
+        both = [holm([of(*own) for own in group], len(group)) for of in (p_of, opposite_p)]
+        adjusted |= {own[0].id: p for own, p in zip(group, zip(*both, strict=True), strict=True)}
+    return [
+        Judged(claim, finding, runs, *adjusted.get(claim.id, (math.nan, math.nan)))
+        for claim, finding, runs in seen
+    ]
+
+
+def _seen(claim: Claim, data: Data) -> tuple[Claim, Finding, tuple[str, ...]]:
+    try:
+        finding = JUDGES[claim.id](data, claim)
+    except MissingError as missing:
+        return claim, Finding(None, f"Not judged: {missing}."), ()
+    return claim, finding, tuple(dict.fromkeys(data.run_ids))
+
+
+def counts(entries: Iterable[Judged]) -> Mapping[Verdict, int]:
+    """How many claims have each verdict; 0 for those that none has."""
+    found: dict[Verdict, int] = {
+        "supported": 0, "used to choose the goals": 0, "not supported": 0, "undecided": 0
+    }  # fmt: skip
+    for entry in entries:
+        found[entry.verdict] += 1
+    return found
+
+
+@cached
+def claims_table(study: Study) -> pd.DataFrame:
+    """One row a claim: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence``,
+    ``test``, ``p`` and ``p_holm`` of the claim, ``opposite_p_holm``, ``ensemble`` (in how many
+    admissible reconstructions it holds), ``place``, ``quote``, ``runs``."""
+    return pd.DataFrame(
+        [
+            {
+                "id": entry.claim.id,
+                "section": entry.claim.section,
+                "statement": entry.claim.statement,
+                "verdict": entry.verdict,
+                "fitted": entry.claim.fitted,
+                "evidence": entry.finding.evidence,
+                "test": test_in_words(entry.claim),
+                "p": p_of(entry.claim, entry.finding),
+                "p_holm": entry.adjusted_p,
+                "opposite_p_holm": entry.adjusted_opposite_p,
+                "ensemble": held_in_words(entry.claim.id) if entry.claim.fitted else "",
+                "place": entry.claim.place,
+                "quote": entry.claim.quote,
+                "runs": " ".join(entry.run_ids),
+            }
+            for entry in judged(study)
+        ]
+    )

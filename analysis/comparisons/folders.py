@@ -1,0 +1,170 @@
+"""Two results folders beside each other: what differs between them, and in which results."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from coartic import CoarticError
+from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
+from coartic.analysis.statistics.estimates import FEWEST, difference_of_means, paired_by_seed
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.study import Study, load
+from coartic.robot import Array
+
+_WORDS = {"title", "description", "provenance"}
+"""Keys of a task that change no result."""
+
+
+def load_pair(first: Path, second: Path) -> tuple[Study, Study]:
+    """Two results folders that can be compared.
+
+    Raises CoarticError for one folder given twice, and as :func:`coartic.analysis.load` does.
+    """
+    if first.exists() and second.exists() and first.samefile(second):
+        raise CoarticError(
+            f"{first} and {second} are the same folder. Name two, such as results/old results/new."
+        )
+    return load(first), load(second)
+
+
+def differences(first: Study, second: Study) -> pd.DataFrame:
+    """What was asked for and where it was run, as far as it differs.
+
+    Columns ``what``, ``a``, ``b``.
+    """
+    a, b = _facts(first), _facts(second)
+    rows = [(name, a[name], b[name]) for name in a if a[name] != b[name]]
+    for what, ours, theirs in (
+        ("task", _tasks(first), _tasks(second)),
+        ("code of", _codes(first), _codes(second)),
+        ("library", _libraries(first), _libraries(second)),
+    ):
+        rows += [
+            (f"{what} {name}", ours.get(name, "–"), theirs.get(name, "–"))
+            for name in dict.fromkeys([*ours, *theirs])
+            if ours.get(name) != theirs.get(name)
+        ]
+    return pd.DataFrame(rows, columns=["what", "a", "b"])
+
+
+def compared_cells(first: Study, second: Study) -> pd.DataFrame:
+    """Every cell that both folders have, in the order of A's plan.
+
+    ``runs_a`` and ``runs_b``; ``identical``: runs with the same seed and the same status, joints,
+    ticks and rewards of all trials, of those ``shared``; mean rewards ``reward_a`` and
+    ``reward_b``; ``difference`` of B less A with its 95 % BCa interval, paired by seed where at
+    least three are shared; ``p`` of a two-tailed bootstrap test after Holm's correction over all
+    cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few runs, or
+    not compared; ``remarks``.
+    """
+    ours, theirs = _tasks(first), _tasks(second)
+    rows = [
+        {
+            "task": task,
+            "method": label,
+            **_compared(cell, second.cells[task, label], ours[task] == theirs[task]),
+        }
+        for (task, label), cell in first.cells.items()
+        if (task, label) in second.cells
+    ]
+    columns = ["task", "method", "runs_a", "runs_b", "shared", "identical", "reward_a", "reward_b"]
+    columns += ["difference", "difference_low", "difference_high", "p", "verdict", "remarks"]
+    frame = pd.DataFrame(rows, columns=columns)
+    return frame.assign(p=holm(frame.p.astype(float).tolist()))
+
+
+def _compared(a: CellRuns, b: CellRuns, same_task: bool) -> dict[str, Any]:
+    results = [dict(zip(cell.runs.seed, cell.runs.result, strict=True)) for cell in (a, b)]
+    shared = results[0].keys() & results[1].keys()
+    row: dict[str, Any] = {
+        "runs_a": len(a.runs),
+        "runs_b": len(b.runs),
+        "shared": len(shared),
+        "identical": sum(results[0][seed] == results[1][seed] for seed in shared),
+        "p": math.nan,
+        "verdict": "not compared",
+        "remarks": _remarks(a, b),
+    }
+    if not same_task:
+        return row | {"identical": 0, "remarks": "the tasks of this name differ"}
+    if len(a.good) < len(a.runs) or len(b.good) < len(b.runs) or not len(a.good):
+        return row
+    row |= {"reward_a": a.rewards.mean(), "reward_b": b.rewards.mean(), "difference": 0.0}
+    # A method that draws nothing has one result, whatever the seed.
+    alike = not shared and len({*a.good.result, *b.good.result}) == 1
+    if alike or row["identical"] == len(a.good) == len(b.good):
+        return row | {"verdict": "identical"}
+    x, y = paired_by_seed(a.good, b.good)
+    samples: tuple[Array, Array | float] = (b.rewards, a.rewards)
+    if len(x) >= FEWEST:
+        samples = y - x, 0.0
+    found = difference_of_means(*samples)
+    row |= {"difference": found.estimate, "p": bootstrap_test(*samples, "two-sided").p}
+    row |= {"difference_low": found.low, "difference_high": found.high}
+    if min(len(a.good), len(b.good)) < FEWEST:
+        return row | {"verdict": "too few runs"}
+    return row | {
+        "verdict": bootstrap_equivalence(*samples, MARGIN * abs(a.rewards.mean())).verdict
+    }
+
+
+def _remarks(a: CellRuns, b: CellRuns) -> str:
+    parts = [
+        f"{side} solved {len(cell.good)} of {len(cell.runs)}"
+        for side, cell in (("A", a), ("B", b))
+        if len(cell.good) < len(cell.runs)
+    ]
+    if len(a.runs) and len(b.runs):
+        ours, theirs = (json.loads(cell.runs.parameters.iloc[0]) for cell in (a, b))
+        parts += [
+            f"{name} {ours.get(name, 'absent')} in A, {theirs.get(name, 'absent')} in B"
+            for name in sorted(ours.keys() | theirs.keys())
+            if ours.get(name) != theirs.get(name)
+        ]
+    return "; ".join(parts)
+
+
+def _facts(study: Study) -> dict[str, str]:
+    manifest = study.results.manifest
+    plan, limits, environment = manifest.specification, manifest.limits, manifest.environment
+    commit = environment.commit
+    facts = {
+        "suite": plan.suite,
+        "seed": plan.seed,
+        "runs a cell": plan.runs,
+        "trials": plan.trials,
+        "time limit (s)": limits.time_s,
+        "trial budget": limits.trials,
+        "runs": len(study.runs),
+        "coartic": environment.coartic,
+        "commit": commit and commit.id[:12] + " with changes" * commit.dirty,
+        "code of the model": environment.model_code,
+        "Python": environment.python,
+        "platform": environment.platform,
+        "processor": environment.processor,
+        "cores": environment.cores,
+    }
+    return {name: "–" if value is None else str(value) for name, value in facts.items()}
+
+
+def _tasks(study: Study) -> dict[str, str]:
+    tasks = study.results.manifest.specification.tasks
+    return {
+        name: json.dumps({key: task[key] for key in task if key not in _WORDS}, sort_keys=True)
+        for name, task in tasks.items()
+    }
+
+
+def _codes(study: Study) -> dict[str, str]:
+    methods = study.results.manifest.specification.methods
+    return {name: method.code for name, method in methods.items()}
+
+
+def _libraries(study: Study) -> dict[str, str]:
+    return dict(study.results.manifest.environment.packages)

@@ -1,0 +1,70 @@
+"use strict";
+/* Sorts tables by a click on a header, and shows the rows that are searched or filtered for. */
+(() => {
+  /* The number that a cell begins with; NaN where it begins with none. */
+  const number = (text) => {
+    const found = text.replace(/[\u202f,](?=\d{3})/g, "").replace("−", "-").match(/^[<> ]*(-?)(∞|\d+(?:\.\d+)?(?:e-?\d+)?)/);
+    if (!found) return NaN;
+    return (found[1] ? -1 : 1) * (found[2] === "∞" ? Infinity : Number(found[2]));
+  };
+  const key = (row, column) => row.cells[column].textContent.trim();
+  const compare = (a, b) => {
+    const [x, y] = [number(a), number(b)];
+    if (!Number.isNaN(x) && !Number.isNaN(y)) return x - y;
+    return a.localeCompare(b, "en", { numeric: true });
+  };
+
+  document.querySelectorAll("table").forEach((table) => {
+    const body = table.tBodies[0];
+    const rows = [...body.rows];
+    [...table.tHead.rows[0].cells].forEach((head, column) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.append(...head.childNodes);
+      head.append(button);
+      button.addEventListener("click", () => {
+        const next = { ascending: "descending", descending: "none" }[head.ariaSort] || "ascending";
+        [...table.tHead.rows[0].cells].forEach((other) => other.removeAttribute("aria-sort"));
+        let ordered = rows;
+        if (next !== "none") {
+          head.setAttribute("aria-sort", next);
+          const missing = (row) => key(row, column) === "–";
+          const sign = next === "ascending" ? 1 : -1;
+          ordered = [...rows].sort((a, b) => missing(a) - missing(b) || sign * compare(key(a, column), key(b, column)));
+        }
+        body.append(...ordered);
+      });
+    });
+  });
+
+  document.querySelectorAll(".tools").forEach((tools) => {
+    const table = document.getElementById(tools.dataset.table);
+    const search = tools.querySelector("input");
+    const filter = tools.querySelector("select");
+    const count = tools.querySelector("output");
+    const show = () => {
+      const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+      let shown = 0;
+      [...table.tBodies[0].rows].forEach((row) => {
+        const text = row.textContent.toLowerCase();
+        const wanted = !filter || !filter.value || row.dataset.verdict === filter.value;
+        row.hidden = !(wanted && words.every((word) => text.includes(word)));
+        shown += !row.hidden;
+      });
+      count.textContent = `${shown} of ${table.tBodies[0].rows.length} rows`;
+    };
+    search.addEventListener("input", show);
+    if (filter) filter.addEventListener("change", show);
+    tools.hidden = false;
+    show();
+  });
+
+  /* A link to a claim unfolds it. */
+  const reveal = () => {
+    const target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
+    const details = target && target.querySelector("details");
+    if (details) details.open = true;
+  };
+  window.addEventListener("hashchange", reveal);
+  reveal();
+})();

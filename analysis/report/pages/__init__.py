@@ -1,1 +1,0 @@
-"""The pages of ``coartic analyse``: their tables, with what explains them."""

@@ -1,0 +1,153 @@
+"""Solutions of one method on one task, tick by tick, and what they are compared with."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from coartic import (
+    PAPER,
+    Execution,
+    Hand,
+    MotionModel,
+    Task,
+    Trajectory,
+    corrective_trial,
+    initial_hands,
+    trajectory,
+)
+from coartic.analysis.results.folder import CellRuns
+from coartic.errors import NotApplicableError
+from coartic.robot import Array
+from coartic.rows import movements_from
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """The solved runs of one method with parameters on one task."""
+
+    task: Task
+    method: str
+    variant: str
+    runs: tuple[Trajectory, ...]
+    best_hands: tuple[str, ...] = ()
+    """Hand sequences that are best by the corrective process alone, as far as the folder
+    knows."""
+    model: MotionModel = PAPER
+
+    @cached_property
+    def initial(self) -> Execution | None:
+        """The initial solution: the corrective process alone with the task's hands.
+
+        None where it completes the task with none.
+        """
+        return initial_solution(self.task, self.model)
+
+    @cached_property
+    def sequences(self) -> list[str]:
+        """Hand sequence of each run."""
+        return [run.execution.hands for run in self.runs]
+
+    @cached_property
+    def typical(self) -> tuple[Trajectory, ...]:
+        """Runs with the most frequent hand sequence, so that postures compare."""
+        commonest = dict(Counter(self.sequences).most_common(1))
+        return tuple(run for run in self.runs if run.execution.hands in commonest)
+
+    def with_hand(self, hand: Hand, goal: int) -> tuple[Trajectory, ...]:
+        """Runs that hit a goal with ``hand``; ``goal`` counts from 1."""
+        return tuple(run for run in self.runs if run.hands[goal - 1] == hand)
+
+    @cached_property
+    def against_initial(self) -> NDArray[np.int64]:
+        """Ticks of subtasks less the initial solution's, ``(runs, G)``; no row without one."""
+        return self._changes(dict.fromkeys(self.sequences, self.initial))
+
+    @cached_property
+    def against_same_hands(self) -> NDArray[np.int64]:
+        """Ticks of subtasks less the corrective process's with each run's own hands.
+
+        Shape ``(n, G)``: runs whose hands it completes the task with.
+        """
+        hands = set(self.sequences)
+        return self._changes({own: corrective(self.task, own, self.model) for own in hands})
+
+    def _changes(self, references: Mapping[str, Execution | None]) -> NDArray[np.int64]:
+        """From the solution that each hand sequence is compared with."""
+        rows = [
+            change_from(run.execution, reference)
+            for run in self.runs
+            if (reference := references[run.execution.hands]) is not None
+        ]
+        return np.array(rows, dtype=np.int64).reshape(-1, len(self.task.goals))
+
+
+def change_from(execution: Execution, reference: Execution) -> NDArray[np.int64]:
+    """Ticks of each subtask less those of another solution, shape ``(G,)``; negative: faster."""
+    return np.subtract(execution.ticks_by_goal(), reference.ticks_by_goal(), dtype=np.int64)
+
+
+def corrective(task: Task, hands: str, model: MotionModel) -> Execution | None:
+    """The corrective process alone with these hands; None where it fails the task."""
+    execution = corrective_trial(task, hands, model=model)
+    return execution if execution.completed else None
+
+
+def initial_solution(task: Task, model: MotionModel) -> Execution | None:
+    """The corrective process alone with the task's hands; None where it completes it with none."""
+    try:
+        return corrective(task, initial_hands(task, model=model), model)
+    except NotApplicableError:
+        return None
+
+
+def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:
+    """Configuration of each run when it hit a goal, shape ``(runs, dof)``."""
+    return np.array([run.execution.configurations[goal - 1] for run in runs])
+
+
+def last_ticks(runs: tuple[Trajectory, ...], goal: int, count: int) -> Array:
+    """The last control ticks of each run up to a hit, shape ``(runs, count, dof)``."""
+    return np.array([run.configurations[: run.hits[goal - 1] + 1][-count:] for run in runs])
+
+
+def entropy(sequences: Iterable[str]) -> float:
+    """Shannon entropy of hand sequences over runs, bits.
+
+    The plug-in estimate, biased downwards for few runs. 0 (always the same sequence) to
+    log₂ of the number of runs, or G bits for G goals and two hands, whichever is less.
+    """
+    return float(stats.entropy(list(Counter(sequences).values()), base=2)) + 0.0
+
+
+def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
+    """The hand sequences that are best by the corrective process alone, ties included.
+
+    ``sequences`` is a results folder's table of that name. Empty where none has a reward.
+    """
+    own = sequences[(sequences.task == task) & sequences.reward.notna()]
+    return [str(hands) for hands in own.hands[own.reward == own.reward.max()]]
+
+
+def trajectories_of(
+    cell: CellRuns,
+    task: Task,
+    model: MotionModel,
+    movements: tuple[Mapping[str, pd.DataFrame], Mapping[str, pd.DataFrame]],
+    sequences: pd.DataFrame,
+) -> Trajectories:
+    """The solved runs of a cell, executed; ``movements`` are solutions and paths by run id."""
+    solutions, paths = movements
+    runs = tuple(
+        trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)), model)
+        for run_id in cell.good.run_id
+    )
+    best = best_sequences(sequences, cell.task)
+    return Trajectories(task, cell.method, cell.variant, runs, tuple(best), model)

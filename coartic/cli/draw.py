@@ -1,0 +1,103 @@
+"""Commands that draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coartic.cli import arguments as given
+from coartic.cli.terminal import say
+from coartic.errors import CoarticError
+from coartic.text import counted, one_line
+
+if TYPE_CHECKING:
+    from coartic import MotionModel, Task
+    from coartic.analysis.figures.animation import Panel
+
+GROUP = "Draw"
+_PICTURED = 12
+"""Tasks of a picture, at most."""
+
+
+def draw(
+    tasks: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[TASK]...", help="Tasks, task files, or long/v1/i000..i003."),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="Picture (.png, .svg, .pdf), or a folder.")
+    ] = Path("tasks.svg"),
+    replace: given.Replace = False,
+) -> None:
+    """Draw tasks; into a folder, write them as task files as well."""
+    from coartic import builtin_tasks, load_task
+    from coartic.families import named_by, task_text
+    from coartic.files import check_outputs, publish, write_outputs
+
+    names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
+    chosen = [load_task(name) for name in dict.fromkeys(names)]
+    from coartic.analysis.figures.plot import FORMATS, picture  # after what is soon said
+    from coartic.analysis.figures.tasks import tasks_plot
+
+    plot = tasks_plot(chosen[:_PICTURED])
+    if out.suffix:
+        if out.suffix.lower() not in FORMATS:
+            raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
+        check_outputs([out], replace=replace)
+        write_outputs({out: picture(plot, out.suffix.lower())}, replace=replace)
+    else:
+        files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
+        files |= {"tasks.svg": picture(plot, ".svg")}
+        publish(out, files, owner="draw", alone=False)
+    say(f"{out}: {counted(len(chosen), 'task')}.")
+
+
+def animate(
+    run_id: given.RunId,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Film to write: .gif or .mp4.")],
+    other: Annotated[
+        str | None, typer.Argument(metavar="[OTHER_RUN]", help="A run to show beside it.")
+    ] = None,
+    folder: given.In = Path("results"),
+    initial: Annotated[
+        bool, typer.Option("--initial", help="Show the initial solution beside it.")
+    ] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(min=0.1, max=10_000, metavar="N", help="Ticks per second."),
+    ] = None,
+    width: Annotated[
+        int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
+    ] = 800,
+    replace: given.Replace = False,
+) -> None:
+    """Make a film of a run's solution, alone or beside another one."""
+    from coartic.analysis.figures.animation import Panel, animate, check_output
+    from coartic.benchmarks.reproduce import find_record, trajectory_of
+
+    check_output(out, replace=replace)
+    if initial and other is not None:
+        raise CoarticError("--initial shows one run beside its initial solution: give one run.")
+    panels = []
+    for name in (run_id,) if other is None else (run_id, other):
+        _, record = find_record(name, folder)
+        found = trajectory_of(record)
+        title = one_line(f"{found.task.name}: {record.method}, run {record.run}")
+        panels.append(Panel(title, found))
+    if initial:
+        panels.insert(0, _initial_panel(panels[0].trajectory.task, record.model))
+    timed = animate(panels, out, speed=speed, width=width, replace=replace)
+    say(f"{out}: {len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second.")
+
+
+def _initial_panel(task: Task, model: MotionModel) -> Panel:
+    from coartic import corrective_trial, initial_hands, trajectory
+    from coartic.analysis.figures.animation import Panel
+
+    movements = corrective_trial(task, initial_hands(task, model=model), model=model).movements
+    return Panel(f"{task.name}: initial solution", trajectory(task, movements, model=model))
+
+
+COMMANDS = (draw, animate)

@@ -1,0 +1,166 @@
+"""Commands that read what stored runs say."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coartic.cli import arguments as given
+from coartic.cli.terminal import if_interrupted, say, say_pairs, show_frame, writing
+from coartic.errors import CoarticError
+from coartic.files import folder_named
+from coartic.text import counted, did_you_mean
+
+GROUP = "Read"
+_ReportFolder = Annotated[
+    Path | None,
+    typer.Option(
+        parser=folder_named, metavar="FOLDER", help="Where to write; FOLDER/report if not given."
+    ),
+]
+_ForPaper = Annotated[
+    bool,
+    typer.Option("--for-paper", help="Also figures as PDF and tables as LaTeX."),
+]
+
+
+def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPaper = False) -> None:
+    """Write the report of a results folder: a page with its tables and figures."""
+    out = folder / "report" if out is None else out
+    if_interrupted(f"Nothing was written to {out}.")
+    from coartic.analysis.report.build import write_report
+    from coartic.analysis.report.text import answers
+    from coartic.analysis.study import load
+
+    started = time.monotonic()
+    study = load(folder)
+    files = write_report(study, out, for_paper=for_paper, begin=lambda: writing(out))
+    if_interrupted(f"The report is written to {out}.")
+    tables = len({Path(name).stem for name in files if name.startswith("tables/")})
+    figures = len({Path(name).stem for name in files if name.startswith("figures/")})
+    what = "CSV and LaTeX" if for_paper else "CSV"
+    say(
+        f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
+        f"{counted(tables, 'table')} ({what}) and {counted(figures, 'figure')}."
+    )
+    say_pairs([(answer["word"], answer["text"]) for answer in answers(study)])
+    if not for_paper:
+        say_pairs([("Paper", "coartic report --for-paper adds figures as PDF and tables as LaTeX")])
+
+
+def trace(
+    table: Annotated[str | None, typer.Argument(metavar="[TABLE]", help="Id of a table.")] = None,
+    row: Annotated[str | None, typer.Argument(metavar="[ROW]", help="Name of a row.")] = None,
+    folder: Annotated[
+        Path,
+        typer.Option(
+            "--in", parser=folder_named, metavar="FOLDER", help="A report or its results."
+        ),
+    ] = Path("results"),
+) -> None:
+    """Name the runs behind a row of a report's table, with the command that repeats each."""
+    from coartic.analysis.report.trace import runs_of, tables_of
+
+    tables = tables_of(folder)
+    if table is None:
+        say_pairs([("Tables", ", ".join(tables))])
+        return
+    if table not in tables:
+        raise CoarticError(f"there is no table {table!r}{did_you_mean(table, tables)}")
+    values, runs = runs_of(tables[table], row)
+    if row is None:
+        say(*values)
+        return
+    say_pairs([(name, text) for name, _, text in (line.partition(": ") for line in values)])
+    results = tables[table].parents[2]
+    say(
+        f"{counted(len(runs), 'run')}:",
+        *(f"coartic reproduce {run} --in {results}" for run in runs),
+    )
+
+
+def compare(
+    first: Annotated[
+        Path, typer.Argument(parser=folder_named, metavar="FOLDER_A", help="Results folder A.")
+    ],
+    second: Annotated[
+        Path, typer.Argument(parser=folder_named, metavar="FOLDER_B", help="Results folder B.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Table of all cells to write (.csv).")
+    ] = None,
+    replace: given.Replace = False,
+) -> None:
+    """Compare two results folders: what differs between them, and in which results."""
+    from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
+    from coartic.files import check_outputs, write_outputs
+
+    if out is not None:
+        if out.suffix.lower() != ".csv":
+            raise CoarticError(f"--out {out}: the name must end in .csv.")
+        check_outputs([out], replace=replace)
+    studies = load_pair(first, second)
+    show_frame(differences(*studies))
+    cells = compared_cells(*studies)
+    unlike = cells[cells.verdict != "identical"]
+    columns = ["task", "method", "reward_a", "reward_b", "difference", "verdict"]
+    show_frame(unlike[columns].head(20).round(1))
+    tally = ", ".join(
+        f"{count} {verdict}" for verdict, count in cells.verdict.value_counts().items()
+    )
+    say(f"{counted(len(cells), 'cell')} in both: {tally or 'nothing to compare'}.")
+    if out is not None:
+        write_outputs({out: cells.to_csv(index=False).encode()}, replace=replace)
+        say(f"All cells: {out}")
+    elif len(unlike) > 20:
+        say("--out FILE.csv writes all cells.")
+
+
+def verify(folder: given.Results) -> None:
+    """Execute every stored solution again and compare rewards, ticks and hands."""
+    from coartic.analysis.results.folder import load_results
+
+    results = load_results(folder)
+    runs, cells = counted(len(results.runs), "run"), counted(len(results.cells), "cell")
+    say(f"{folder} is sound: {runs} in {cells}. Executed again, every solution gets its reward.")
+    say("Whether a run was made as it says, only `coartic reproduce RUN` shows.")
+
+
+def cite(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            parser=folder_named, metavar="[FOLDER]", help="Results folder; without, all methods."
+        ),
+    ] = None,
+    analysis: Annotated[
+        bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
+    ] = False,
+) -> None:
+    """Print what to cite as BibTeX: software, paper, and the methods of a folder."""
+    from coartic.analysis.citations import MethodSource, bibliography
+    from coartic.benchmarks.registry import CLASSES
+    from coartic.record import BUILT_IN
+
+    environment = None
+    if folder is None:
+        methods = [
+            MethodSource(item.name, item.title, item.citation, True) for item in CLASSES.values()
+        ]
+    else:
+        from coartic.analysis.results.folder import load_results  # and pandas
+
+        manifest = load_results(folder).manifest
+        environment = manifest.environment.model_dump(mode="json")
+        methods = [
+            MethodSource(name, item.title, item.citation, item.origin == BUILT_IN)
+            for name, item in manifest.specification.methods.items()
+        ]
+    text = bibliography(methods, analysis=analysis, environment=environment)
+    say(*text.rstrip("\n").split("\n"))
+
+
+COMMANDS = (report, trace, compare, verify, cite)

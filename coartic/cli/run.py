@@ -1,0 +1,257 @@
+"""Commands that run suites and single runs, and show what there is to run."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coartic.cli import arguments as given
+from coartic.cli.arguments import check_numbers, names_in
+from coartic.cli.terminal import performing, say, say_pairs
+from coartic.errors import CoarticError
+from coartic.files import folder_named
+from coartic.text import counted, did_you_mean
+
+if TYPE_CHECKING:
+    from coartic.benchmarks.conformance import Law
+    from coartic.benchmarks.executors import Executor
+    from coartic.benchmarks.registry import Entry, Registry
+    from coartic.benchmarks.run import RunReport
+    from coartic.cli.terminal import Display
+    from coartic.record import Record
+
+GROUP = "Run"
+
+
+def run(
+    suite: given.SuiteName,
+    folder: given.Out = None,
+    runs: given.Runs = None,
+    trials: given.Trials = None,
+    jobs: given.Jobs = -1,
+    tasks: given.Tasks = None,
+    methods: given.Methods = None,
+    task_file: given.TaskFiles = None,
+    method_file: given.MethodFiles = None,
+    seed: given.Seed = 0,
+    time_limit: given.TimeLimit = None,
+    trial_budget: given.TrialBudget = None,
+    reading: given.Readings = None,
+    scheduler: given.Scheduler = None,
+    retry_failed: given.RetryFailed = False,
+    redo: given.Redo = False,
+) -> None:
+    """Run the part of a suite that its folder lacks, and say what came out.
+
+    If it is interrupted, repeat the command; it resumes where it stopped.
+    """
+    from coartic.benchmarks.run import Selection, plan_suite
+    from coartic.benchmarks.specification import Limits
+    from coartic.benchmarks.suites import load_suite
+
+    check_numbers(jobs, time_limit)
+    chosen = load_suite(suite)
+    out = folder_named(folder or f"results/{chosen.name}", "--out")
+    wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
+    select = Selection(*wanted, task_file or (), method_file or ())
+    limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
+    planned = partial(plan_suite, runs=runs, trials=trials, seed=seed, readings=reading or ())
+    plan = planned(chosen, select=select, limits=limits)
+    started = time.monotonic()
+    with performing(chosen.name, out) as display:
+        executor = _executor(jobs, scheduler, display)
+        report = plan.perform(
+            out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
+        )
+    _conclude(report, time.monotonic() - started)
+    if report.crashed:
+        sys.exit(1)
+
+
+def _executor(jobs: int, scheduler: str | None, display: Display) -> Executor:
+    from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.executors import Local
+
+    return Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
+
+
+def _conclude(report: RunReport, seconds: float) -> None:
+    """What ran, the four answers, and the next command."""
+    from coartic.analysis.report.text import answers
+    from coartic.analysis.results.folder import made_here
+    from coartic.analysis.study import Study
+
+    say(report.sentence(seconds))
+    pairs = [
+        (answer["word"], answer["text"]) for answer in answers(Study(made_here(report.folder)))
+    ]
+    say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
+
+
+def list_(name: given.Something = None, method_file: given.MethodFiles = None) -> None:
+    """List tasks, suites and methods, or say more about one of them."""
+    from coartic.benchmarks.registry import registry
+
+    known = registry(method_file or [])
+    if name is None:
+        say_pairs(_everything(known))
+    else:
+        say_pairs(_details(name, known))
+
+
+def _everything(known: Registry) -> Iterator[tuple[str, str]]:
+    """One screen: names of tasks and methods, suites with what they are for."""
+    from coartic import builtin_tasks
+    from coartic.benchmarks.suites import suites
+    from coartic.families import families
+
+    yield "Tasks", ", ".join(builtin_tasks())
+    yield "Families", ", ".join(families())
+    yield "Suites", ""
+    for name, suite in suites().items():
+        yield f"  {name}", suite.title
+    yield "Methods", ""
+    groups: dict[str, list[str]] = {}
+    for name in known:
+        family, _, form = name.partition("/")
+        groups.setdefault(family, []).append(form or name)
+    for family, forms in groups.items():
+        yield f"  {family}/" if forms != [family] else f"  {family}", ", ".join(forms)
+    yield "More", "coartic list NAME, such as two-armed-1, comparison or cma-es/bandit"
+
+
+def _details(name: str, known: Registry) -> Iterator[tuple[str, str]]:
+    """What is known of a task, a suite, a family or a method.
+
+    Raises CoarticError for another name.
+    """
+    from coartic import builtin_tasks, load_task
+    from coartic.benchmarks.suites import methods_named, suites
+    from coartic.families import families
+
+    if name in suites():
+        suite = suites()[name]
+        yield "Suite", f"{name}: {suite.title}"
+        yield "", suite.description
+        yield "Runs", f"{suite.runs} of each cell, {suite.trials or 'no'} trials a run"
+        yield "Run it", f"coartic run {name}"
+    elif name in builtin_tasks():
+        task = load_task(name)
+        yield "Task", f"{name}: {task.description}"
+        yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
+        yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
+        yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
+        yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
+    elif name in families() or name in {known.partition("/")[0] for known in families()}:
+        family = next(
+            own for key, own in families().items() if name in (key, key.partition("/")[0])
+        )
+        yield "Family", f"{family.name}: {family.description}"
+        yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
+        yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
+    else:
+        try:
+            methods = methods_named(name, known)
+        except CoarticError as error:
+            names = [*suites(), *builtin_tasks(), *families(), *known]
+            hint = did_you_mean(name, names)
+            raise CoarticError(
+                f"there is nothing called {name!r}{hint}" if hint else str(error)
+            ) from None
+        for method in methods:
+            yield from _method_details(known[method])
+
+
+def _method_details(entry: Entry) -> Iterator[tuple[str, str]]:
+    from coartic import builtin_tasks, load_task
+    from coartic.readings import readings
+
+    declared = entry.declared
+    read = {each.field for each in readings()}
+    parameters = [f"{k}={v}" for k, v in declared.defaults.items() if k not in read]
+    tasks = [name for name in builtin_tasks() if entry.why_not(load_task(name)) is None]
+    yield "Method", f"{declared.name}: {declared.title}"
+    yield "Told", ", ".join(sorted(declared.told))
+    yield "Parameters", ", ".join(parameters) or "none"
+    yield "Tasks", ", ".join(tasks) or "none of the four"
+    yield "Runs", "differ by seed" if declared.stochastic else "are all the same"
+    yield "Cites", declared.citation or "nothing"
+
+
+def reproduce(
+    run_id: given.RunId,
+    folder: given.In = Path("results"),
+    method_file: given.MethodFiles = None,
+) -> None:
+    """Show a run, perform it again, and say whether the result is identical."""
+    from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.reproduce import differences, find_record, perform_once, spec_of
+    from coartic.benchmarks.specification import Limits
+
+    _, record = find_record(run_id, folder)
+    limits = Limits(record.timing.time_limit_s, None)
+    spec = spec_of(record, registry(method_file or []), limits)
+    say_pairs(
+        [
+            ("Run", f"{record.run_id}: {spec.method} on {spec.task.name}, run {spec.run}"),
+            ("Seed", str(record.specification.seed)),
+            (
+                "Parameters",
+                ", ".join(f"{k}={v}" for k, v in record.specification.parameters.items()),
+            ),
+            ("Result", _result(record)),
+        ]
+    )
+    again = perform_once(spec)
+    if record.code != again.code:
+        say(f"The run was made by code {record.code[:12]}; this is {again.code[:12]}.")
+    found = differences(record, again)
+    if found:
+        say("Performed again, it is different:", *(f"- {difference}" for difference in found))
+        sys.exit(1)
+    say("Performed again: identical.")
+
+
+def _result(record: Record) -> str:
+    if record.solution is None:
+        return f"{record.status}: {record.reason}"
+    return f"reward {record.solution.reward}, hands {record.solution.hands}"
+
+
+def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None:
+    """Check a method or a task file against the rules of the benchmark."""
+    from coartic.benchmarks.registry import registry
+
+    broken = 0
+    for name, checked in _checks(subject, registry(method_file or [])):
+        laws = checked()
+        for law in laws:
+            say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
+        passed = sum(law.passed for law in laws)
+        say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
+        broken += len(laws) - passed
+    if broken:
+        sys.exit(1)
+
+
+def _checks(subject: str, known: Registry) -> Iterable[tuple[str, Callable[[], list[Law]]]]:
+    """What is checked: a task, or all methods that a name stands for."""
+    from coartic.benchmarks.conformance import check_method, check_task_file
+    from coartic.benchmarks.suites import methods_named
+
+    if subject.endswith(".toml"):
+        if not Path(subject).is_file():
+            raise CoarticError(f"{subject}: there is no such file.")
+        return [(subject, partial(check_task_file, Path(subject), known))]
+    try:
+        names = methods_named(subject, known)
+    except CoarticError as error:
+        raise CoarticError(f"{error} A task is checked by its file.") from None
+    return [(name, partial(check_method, known[name])) for name in names]
+
+
+COMMANDS = (run, list_, check, reproduce)
