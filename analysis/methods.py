@@ -124,10 +124,12 @@ def look_alike(label: str) -> str:
 def main_methods(labels: Iterable[str]) -> list[str]:
     """Those of ``labels`` that stand for their algorithms, in the order of figures; else all.
 
-    The learner over all tasks takes the place of its single conditions.
+    The learner over all tasks, with the condition that explores most, takes the place of its
+    single conditions.
     """
     labels = list(dict.fromkeys(labels))
-    together = [label for label in labels if label.startswith(TOGETHER)][:1]
+    over_all = [name for name in labels if name.startswith(TOGETHER) and not is_variant(name)]
+    together = [max(over_all)] if over_all else []
     single = [
         label
         for label in HEADLINES

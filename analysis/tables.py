@@ -37,6 +37,7 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.published import published_cell, published_initial
 from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.estimates import Inference, mean
 from coartic.analysis.statistics.hypotheses import holm
@@ -53,7 +54,8 @@ BUDGETS = (100, 1_000, 10_000)
 def _table(rows: Iterable[tuple[str, Row]]) -> pd.DataFrame:
     """A table of named rows."""
     kept = list(rows)
-    frame = pd.DataFrame([row for _, row in kept], index=[name for name, _ in kept])
+    columns = None if kept else ["run_ids"]
+    frame = pd.DataFrame([row for _, row in kept], [name for name, _ in kept], columns)
     return frame.rename_axis("row")
 
 
@@ -422,7 +424,17 @@ def all_signatures(study: Study) -> pd.DataFrame:
     frame = signature_values(study)
     names = frame.task + " " + frame.label + ", " + frame.signature + " " + frame["where"]
     columns = ["task", "label", "signature", "where", "value", "low", "high", "p", "n", "unit"]
-    frame = frame[[*columns, "why_not"]].rename(columns={"low": "value_low", "high": "value_high"})
+    joined = variants(families(study.tasks))
+
+    def run_ids(task: str, label: str, against: str, moving: float) -> str:
+        beside = {against} if math.isnan(moving) else set().union(*(g for g in joined if task in g))
+        names = [task, *sorted(beside - {task, ""})]
+        return _runs(*(study.cells[name, label] for name in names if (name, label) in study.cells))
+
+    behind = frame[["task", "label", "against", "moving"]].astype({"moving": float})
+    ids = [run_ids(*row) for row in behind.itertuples(index=False)]
+    frame = frame[[*columns, "why_not"]].assign(run_ids=ids)
+    frame = frame.rename(columns={"low": "value_low", "high": "value_high"})
     return frame.set_index(names.str.strip()).rename_axis("row")
 
 

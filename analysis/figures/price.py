@@ -36,6 +36,8 @@ def price(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     labels = [label for label in methods if label in labels] if methods else main_methods(labels)
     data = _curves(study, over, in_order(labels))
     spends = [spend for spend in PANELS if (data.spend == spend).any()]
+    if not spends:
+        raise missing(study, "no method that reaches one of the targets")
     figure, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
         _panel(axes, data[data.spend == spend])

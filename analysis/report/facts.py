@@ -48,11 +48,18 @@ class Coarticulation:
     goal: SharedGoal
     method: str
     runs: int
+    tested: bool
+    """Whether it takes a test: the method's runs differ by chance."""
 
     @property
     def seen(self) -> bool:
-        """Whether postures differ, by a test where there is one."""
-        return self.goal.apart > 0 and not self.goal.p >= LEVEL
+        """Whether postures differ by more than chance."""
+        return self.goal.p < LEVEL if self.tested else self.goal.apart > 0
+
+    @property
+    def too_few(self) -> bool:
+        """Whether there are too few runs for the test."""
+        return self.tested and math.isnan(self.goal.p)
 
 
 @cached
@@ -61,7 +68,9 @@ def coarticulation(study: Study) -> Coarticulation | None:
     goal = shared_goal(study)
     if goal is None:
         return None
-    return Coarticulation(goal, name_of(goal.method), sum(map(len, goal.postures)))
+    method = study.cells[goal.tasks[0].name, goal.method].method
+    tested = study.results.manifest.specification.methods[method].stochastic
+    return Coarticulation(goal, name_of(goal.method), sum(map(len, goal.postures)), tested)
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
     )
     say_pairs([(answer["word"], answer["text"]) for answer in answers(study)])
     if not for_paper:
-        say_pairs([("Paper", "coartic report --for-paper adds figures as PDF and tables as LaTeX")])
+        say_pairs([("More", "coartic report --for-paper adds figures as PDF and tables as LaTeX")])
 
 
 def trace(

@@ -1,0 +1,217 @@
+"""The page in a real browser: Chromium, driven by Playwright."""
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import sync_playwright
+
+from coartic import load_task
+from coartic.analysis.report.build import report_files
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+BROWSER = os.environ.get("COARTIC_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
+pytestmark = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium is installed; set COARTIC_BROWSER to the one to use"
+)
+WIDTHS = (1280, 390)
+
+
+@pytest.fixture(scope="module")
+def report(traced, tmp_path_factory):
+    """A report as a user gets it."""
+    folder = tmp_path_factory.mktemp("report")
+    for name, content in report_files(traced, for_paper=False).items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def opened(browser, report):
+    """Opens the page; what it logs, throws or asks the network for fails the test."""
+    problems, contexts = [], []
+
+    def open_page(width=1280, **options):
+        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: problems.append(message.text))
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.on(
+            "request",
+            lambda asked: (
+                None if asked.url.startswith(("file:", "data:")) else problems.append(asked.url)
+            ),
+        )
+        page.goto(Path(report).as_uri())
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert problems == []
+
+
+def rows_in_sight(page, table):
+    return [row for row in page.locator(f"#{table} tbody tr").all() if row.is_visible()]
+
+
+def test_search_and_filter_change_the_rows_in_sight(opened):
+    page = opened()
+    before = rows_in_sight(page, "table-claims")
+    page.fill("#claims-search", "first movement")
+    after = rows_in_sight(page, "table-claims")
+    assert 0 < len(after) < len(before)
+    for row in after:
+        assert all(word in row.text_content().lower() for word in ("first", "movement"))
+    page.fill("#claims-search", "")
+    page.select_option("#claims-verdict", "undecided")
+    chosen = rows_in_sight(page, "table-claims")
+    assert 0 < len(chosen) < len(before)
+    assert {row.locator("td").nth(1).inner_text() for row in chosen} == {"undecided"}
+    page.select_option("#claims-verdict", "")
+    assert len(rows_in_sight(page, "table-claims")) == len(before)
+
+
+def test_tables_are_sorted_by_their_headers(opened):
+    page = opened()
+    head = page.locator("#table-methods thead button", has_text="reward").first
+    column = page.locator("#table-methods thead th").all_inner_texts()
+    place = next(k for k, text in enumerate(column) if text.startswith("reward"))
+
+    def values():
+        cells = page.locator(f"#table-methods tbody tr td:nth-child({place + 1})")
+        return [float(text.split()[0].replace("−", "-")) for text in cells.all_inner_texts()]
+
+    for ordered in (sorted(values()), sorted(values(), reverse=True)):
+        head.click()
+        assert values() == ordered
+
+
+@pytest.mark.parametrize("by", ["mouse", "keyboard"])
+def test_verdicts_unfold(opened, by):
+    page = opened()
+    summary = page.locator("#table-claims summary").first
+    evidence = page.locator("#table-claims dl").first
+    assert not evidence.is_visible()
+    if by == "mouse":
+        summary.click()
+    else:
+        summary.focus()
+        page.keyboard.press("Enter")
+    assert evidence.is_visible()
+
+
+def test_a_link_to_a_claim_unfolds_it(opened, report):
+    page = opened()
+    claim = page.locator("#table-claims tbody tr").nth(3).get_attribute("id")
+    page.goto(f"{Path(report).as_uri()}#{claim}")
+    assert page.locator(f"#{claim} dl").is_visible()
+
+
+def tick(page):
+    return int(page.locator(".player input[type=range]").input_value())
+
+
+def test_the_player_plays_pauses_and_steps_by_keyboard(opened):
+    page = opened(reduced_motion="reduce")
+    play = page.locator(".player .play")
+    slider = page.locator(".player input[type=range]")
+    slider.fill("0")
+    play.focus()
+    page.keyboard.press("Space")
+    assert play.inner_text() == "Pause"
+    page.wait_for_function("document.querySelector('.player input[type=range]').value > 20")
+    page.keyboard.press("Space")
+    assert play.inner_text() == "Play"
+    stopped = tick(page)
+    page.wait_for_timeout(300)
+    assert tick(page) == stopped
+    page.keyboard.press("Tab")  # one tick back
+    page.keyboard.press("Enter")
+    assert tick(page) == stopped - 1
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Enter")
+    assert tick(page) == stopped + 1
+    page.keyboard.press("Tab")  # the slider
+    page.keyboard.press("ArrowLeft")
+    assert tick(page) == stopped
+    page.keyboard.press("End")
+    assert "all goals hit" in page.locator(".player .facts").first.inner_text()
+
+
+def test_the_player_shows_the_robot_where_the_run_ended(opened, traced):
+    """The hand that is drawn is the robot module's, by the stored configuration."""
+    page = opened(reduced_motion="reduce")
+    page.locator(".player input[type=range]").press("End")
+    arms = page.locator(".player .arm.right").all()
+    goals = page.locator(".player .goal").all()
+    task = load_task("ascending")
+    ends = []
+    for task_name in ("ascending", "descending"):
+        cell = traced.trajectories(task_name, "dual-process/EC1")
+        ends += [
+            task.robot.forward_kinematics(run.execution.configurations[-1], "right")
+            for run in cell.runs
+        ]
+    assert arms
+    for arm in arms:
+        x, y = map(float, arm.get_attribute("points").split()[-1].split(","))
+        drawn = np.array([x, -y])
+        assert min(np.linalg.norm(drawn - end) for end in ends) < 2e-3  # the page rounds
+        centres = [
+            [float(goal.get_attribute("cx")), -float(goal.get_attribute("cy"))] for goal in goals
+        ]
+        assert min(np.linalg.norm(drawn - centre) for centre in centres) < task.radius + 2e-3
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme):
+    page = opened(width, color_scheme=scheme, reduced_motion="reduce")
+    page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
+    page.locator(".player select").first.select_option("own")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    found = Axe().run(page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]})
+    assert found.violations_count == 0, found.generate_report()
+
+
+def test_printing_shows_every_picture_once(opened, report):
+    page = opened(color_scheme="dark")
+    page.emulate_media(media="print")
+    figures = page.locator("figure").all()
+    assert figures
+    for figure in figures:
+        assert [svg.is_visible() for svg in figure.locator("svg").all()] == [True]
+    ids = [figure.get_attribute("id") for figure in figures]
+    assert len(ids) == len(set(ids))
+    ink = page.evaluate("getComputedStyle(document.body).color")
+    assert max(map(int, re.findall(r"\d+", ink))) < 80  # dark on white
+    printed = page.pdf(format="A4")
+    assert printed.startswith(b"%PDF")
+    assert 3 <= printed.count(b"/Type /Page\n") + printed.count(b"/Type /Page ") <= 40
+
+
+def test_without_scripts_all_is_there(browser, report):
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(Path(report).as_uri())
+    assert page.locator(".without").is_visible()
+    assert page.locator("#table-claims tbody tr").count() > 10
+    assert not page.locator("#claims-search").is_visible()
+    context.close()

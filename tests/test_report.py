@@ -1,0 +1,178 @@
+"""Reports: their numbers are those of the runs, their text is escaped, their rows name runs."""
+
+import html.parser
+import random
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import load_task
+from coartic.analysis.report import numbers, render, sections
+from coartic.analysis.report.build import page, report_files, summary
+from coartic.analysis.report.text import answers
+from coartic.analysis.report.trace import runs_of, tables_of
+from coartic.analysis.study import Study
+from coartic.analysis.tables import TABLES
+from coartic.benchmarks.suites import load_suite, select_cells
+from tests.support.commands import call
+from tests.support.suites import KNOWN, run_and_write
+
+
+@pytest.fixture(scope="module")
+def made(traced):
+    return {name: table(traced) for name, table in TABLES.items()}
+
+
+def test_every_row_names_runs_of_the_folder(traced, made):
+    known = set(traced.runs.run_id)
+    for name, table in made.items():
+        assert table.index.is_unique, name
+        for row, run_ids in table.run_ids.items():
+            assert set(run_ids.split()) <= known, (name, row)
+    assert sum(len(table) > 0 for table in made.values()) >= 8
+
+
+def best_so_far(rewards, trials):
+    """Slow and obvious: the best of the first trials."""
+    best = None
+    for reward in rewards[:trials]:
+        if not np.isnan(reward) and (best is None or reward > best):
+            best = reward
+    return best
+
+
+def recomputed(study, name, row, values):
+    """Numbers of a row made again from its runs, by column."""
+    runs = study.runs[study.runs.run_id.isin(values.run_ids.split())]
+    rewards = [float(reward) for reward in runs.reward]
+    mean = sum(rewards) / len(rewards)
+    sd = np.sqrt(sum((reward - mean) ** 2 for reward in rewards) / max(len(rewards) - 1, 1))
+    if name == "methods":
+        top = study.optima[row.split()[0], "free"].reward
+        return {"reward": mean, "reward_sd": sd, "gap": (top - mean) / -top, "runs": len(runs)}
+    if name == "published":
+        return {"ours": mean, "ours_sd": sd, "difference": mean - values.published}
+    if name == "hands":
+        return {"runs": len(runs), "ours": mean, "ours_sd": sd}
+    if name == "learning":
+        curves = dict(study.results.rewards())
+        best = [best_so_far(curves[run], 100) for run in runs.run_id]
+        return {"after_100": sum(best) / len(best)}
+    if name == "tasks":
+        learner = runs[runs.method == f"dual-process/{values.condition}"].reward
+        return {"learned": learner.astype(float).mean()}
+    return {}
+
+
+def test_ten_random_numbers_are_made_again_from_the_runs(traced, made):
+    chosen = random.Random(5)
+    checked = 0
+    names = ["methods", "published", "hands", "learning", "tasks"]
+    while checked < 10:
+        table = made[names[checked % len(names)]]
+        table = table[table.run_ids.str.len() > 0]
+        row = chosen.choice(list(table.index))
+        values = table.loc[row]
+        again = recomputed(traced, names[checked % len(names)], row, values)
+        column = chosen.choice([name for name in again if pd.notna(values[name])])
+        assert values[column] == pytest.approx(again[column], abs=1e-9), (row, column)
+        checked += 1
+
+
+def test_trace_goes_from_a_row_to_its_runs(traced, tmp_path, monkeypatch, capsys):
+    for name, content in report_files(traced, for_paper=False).items():
+        path = tmp_path / "report" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    tables = tables_of(tmp_path)
+    assert set(tables) == {name for name, table in TABLES.items() if len(table(traced))}
+    names, _ = runs_of(tables["methods"], None)
+    _, runs = runs_of(tables["methods"], names[0])
+    method = TABLES["methods"](traced).method[names[0]]
+    assert set(traced.runs.set_index("run_id").method[runs]) == {method}
+    code, text, _ = call(monkeypatch, capsys, "trace", "methods", names[0], "--in", tmp_path)
+    assert code == 0
+    assert all(f"coartic reproduce {run} --in " in text for run in runs)
+    code, _, error = call(monkeypatch, capsys, "trace", "methods", "nothing", "--in", tmp_path)
+    assert code == 2
+    assert "no row 'nothing'" in error
+
+
+HOSTILE = '<script>alert("&")</script> \\input{x} 5 % of $x_1^2$ #~'
+
+
+class Texts(html.parser.HTMLParser):
+    """What a browser would show of a table, and the elements in it."""
+
+    def __init__(self):
+        super().__init__()
+        self.elements, self.text = set(), ""
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.add(tag)
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_text_from_files_is_escaped():
+    frame = pd.DataFrame(
+        {"method": [HOSTILE], "task": [HOSTILE], "reward": [-1.5], "run_ids": [""]},
+        index=pd.Index([HOSTILE], name="row"),
+    )
+    seen = Texts()
+    seen.feed(render.html_table(frame, "name", HOSTILE))
+    assert "script" not in seen.elements
+    assert HOSTILE in seen.text
+    made = render.latex_table(frame, "name", HOSTILE)
+    assert "\\input{x}" not in made
+    assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in made
+    assert r"\textbackslash{}input\{x\}" in made
+
+
+def test_a_page_stands_alone(traced):
+    text = page(traced, list(sections.filled(traced)))
+    assert not re.search(r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/|numbers)', text)
+    ids = re.findall(r'\bid="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]+)"', text)) <= set(ids)
+    assert len(re.findall(r"<section\b", text)) <= 12
+    assert len(text) < 1_500_000
+
+
+def test_macros_are_few_and_each_names_its_runs(traced):
+    lines = numbers.numbers_tex(traced).splitlines()
+    macros = [line for line in lines if line.startswith("\\newcommand")]
+    assert 5 < len(macros) <= numbers.MOST
+    for line in macros:
+        found = re.fullmatch(r"\\newcommand\{\\coartic[A-Za-z]+\}\{-?[\d.]+\} % (.*)", line)
+        assert found, line
+        table, row = re.search(r"table ([\w-]+)(?:, row '(.*)')?$", found[1]).groups()
+        frame = TABLES[table](traced)
+        assert row is None or row in frame.index
+
+
+def test_summary_is_the_first_screen(traced):
+    text = summary(traced)
+    for answer in answers(traced):
+        assert answer["text"] in text
+    assert len(text.split()) <= 250
+
+
+def test_few_runs_say_so(tmp_path):
+    """One run a cell, and no learner: every answer is true, none is invented."""
+    one = select_cells(load_suite("paper"), KNOWN, tasks=["ascending", "descending"])
+    few = Study(run_and_write(tmp_path / "few", cells=one, runs=1, trials=30))
+    texts = {answer["word"]: answer["text"] for answer in answers(few)}
+    assert texts["Coarticulation"].startswith("Too few runs to say")
+    assert texts["Paper"].startswith("Too few runs to say")
+    alone = select_cells(
+        load_suite("comparison"), KNOWN, tasks=["ascending"], methods=["corrective-alone/given"]
+    )
+    without = Study(run_and_write(tmp_path / "without", cells=alone, runs=1))
+    for study in (few, without):
+        files = report_files(study)
+        assert {"report.html", "summary.md", "numbers.tex"} <= set(files)
+        assert load_task("ascending").label in files["report.html"].decode()
