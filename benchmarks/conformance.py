@@ -148,7 +148,9 @@ class _MethodChecks:
         parameters = self.entry.complete({})
         again = self.entry.complete(parameters)
         if again != parameters:
-            raise _BrokenError(f"they do not survive JSON: {parameters} became {again}")
+            raise _BrokenError(
+                f"written as JSON and read back, they change: {parameters} became {again}"
+            )
         try:
             self.entry.complete({"no_such_parameter": 1})
         except CoarticError:
@@ -230,8 +232,8 @@ class _MethodChecks:
         record = self.perform(spec, {**spec.job(), "reach": False})
         if record.status not in ("infeasible", "solver-failed"):
             raise _BrokenError(
-                f"a task that nobody can complete gives {record.status} {record.reason}, "
-                "where infeasible with a reason is right"
+                f"on a task that nobody can complete it gives {record.status} {record.reason}; "
+                "it should give infeasible, with a reason"
             )
         return f"a task that nobody can complete gives {record.status}: {record.reason}"
 
@@ -285,7 +287,7 @@ class _TaskChecks:
     def serialisable(self) -> str:
         content = json.loads(json.dumps(self.task.model_dump(mode="json")))
         if parse_task(content, str(self.path)) != self.task:
-            raise _BrokenError("it does not survive being written as JSON")
+            raise _BrokenError("it changes when it is written as JSON and read back")
         return "survives being written as JSON"
 
     def own_name(self) -> str:

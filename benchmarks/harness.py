@@ -103,8 +103,8 @@ def perform_missing(
                 watch(progress, missing.pop(record.run_id))
     if missing:
         raise CoarticError(
-            f"{len(missing)} runs were lost again and again (workers die before they answer); "
-            "what is done is kept, and the same command goes on from there"
+            f"{len(missing)} runs were lost again and again because their workers died. "
+            "Finished runs are kept; repeat the command to resume."
         )
     return progress
 

@@ -29,7 +29,7 @@ def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
     found = [(store, run_id) for store, own in packs for run_id in own if run_id.startswith(wanted)]
     ids = sorted({run_id for _, run_id in found})
     if not ids:
-        raise RecordError(f"no run {prefix!r} below {folder}; name another folder with --in")
+        raise RecordError(f"there is no run {prefix!r} in {folder}. Name another folder with --in.")
     if len(ids) > 1:
         shown = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
         raise RecordError(f"{prefix!r} is the beginning of {len(ids)} runs: {shown}")
@@ -116,8 +116,5 @@ def _first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
 
 def _safe(prefix: str) -> str:
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
-        raise RecordError(
-            f"{prefix!r} is no run id: hexadecimal digits with one '-', of which the beginning "
-            "is enough"
-        )
+        raise RecordError(f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c.")
     return prefix

@@ -95,12 +95,12 @@ class ExplorationCondition:
             if getattr(self, name) not in options:
                 *others, last = map(repr, options)
                 raise ValueError(
-                    f"{name} {getattr(self, name)!r}: it is {', '.join(others)} or {last}"
+                    f"{name} is {getattr(self, name)!r}; it must be {', '.join(others)} or {last}"
                 )
         if self.discount and self.credit == "overall":
             raise ValueError(
-                f"discount {self.discount}: the overall reward is not discounted; it takes "
-                "credit 'subtask'"
+                f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "
+                "credit to 'subtask'"
             )
 
     def why_not(self, task: Task) -> str | None:

@@ -441,8 +441,8 @@ def instance(name: str) -> Task:
     address = address_of(name)
     if address is None:
         raise TaskError(
-            f"{name!r} is no instance of a family; one is written two-armed/v1/i017 (test), "
-            "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of a year)"
+            f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
+            "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
     return drawn(address).task
 
@@ -451,8 +451,9 @@ def check_instance(task: Task, source: str) -> None:
     """Raises TaskError for a task with an instance's name that is not that instance."""
     if task != instance(task.name):
         raise TaskError(
-            f"{source}: name is {task.name!r}, but this is not what the family draws by that "
-            "name; give it another name, or write the instance out anew (`coartic families`)"
+            f"{source}: the task is called {task.name!r}, but it is not the instance of that name. "
+            "Give it another name, or write the instance anew: "
+            f"coartic draw {task.name} --out FOLDER"
         )
 
 
@@ -466,11 +467,11 @@ def names_in(text: str) -> list[str]:
     first, last = ends[0], ends[-1]
     if first is None or last is None or first.stream != last.stream:
         raise TaskError(
-            f"{text!r} is no range of instances; write two-armed/v1/i000..i039, or, for a task of "
-            "your own, the path of a file that ends in .toml"
+            f"{text!r} is not a range of instances. Write for example two-armed/v1/i000..i039, "
+            "or the path of a task file of your own, which ends in .toml."
         )
     if last.number < first.number:
-        raise TaskError(f"{text!r} goes backwards; the lower number stands first")
+        raise TaskError(f"{text!r} goes backwards; put the lower number first")
     if last.number - first.number >= MOST_CELLS:
         raise TaskError(f"{text!r} names more than {MOST_CELLS:_} instances")
     numbers = range(first.number, last.number + 1)
@@ -535,7 +536,7 @@ def load_family(name: str) -> Family:
     full = newest.get(name, name)
     if full not in known:
         hint = did_you_mean(full, known) or ";"
-        raise TaskError(f"unknown family {name!r}{hint} families are {', '.join(known)}")
+        raise TaskError(f"unknown family {name!r}{hint} the families are {', '.join(known)}")
     return _shipped(full)
 
 

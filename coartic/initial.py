@@ -135,7 +135,7 @@ def _by_policy(content: _Content, hands: tuple[Hand, ...], model: MotionModel) -
     if not execution.completed:
         raise NotApplicableError(
             f"task {task.name!r}: the corrective process completes it with none of the "
-            f"{len(candidates)} hand sequences that {task.initial_hands!r} tries"
+            f"{len(candidates)} hand sequences of initial_hands = {task.initial_hands!r}"
         )
     made = [trial for _, trial in ranked]
     return InitialSearch(

@@ -347,7 +347,7 @@ class Session:
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
             if name not in allowed:
-                raise ValueError(f"counter {name!r} cannot be stated; {', '.join(allowed)} can")
+                raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
             if count < 0:
                 raise ValueError(f"counter {name!r}: {count} is negative")
             setattr(self._meter, name, getattr(self._meter, name) + int(count))

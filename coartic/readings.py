@@ -127,7 +127,7 @@ def load_reading(text: str) -> ChosenReading:
     known = {reading.id: reading for reading in readings()}
     if not sign:
         raise CoarticError(
-            f"reading {brief_value(text)}: a reading is written id=value, such as ties=right"
+            f"reading {brief_value(text)}: write it as NAME=VALUE, such as ties=right"
         )
     if name not in known:
         raise CoarticError(
@@ -140,8 +140,8 @@ def load_reading(text: str) -> ChosenReading:
             return ChosenReading(reading, choice)
     values = [choice.written for choice in reading.choices]
     raise CoarticError(
-        f"reading {name}: {brief_value(value)} is none of its choices, which are "
-        f"{', '.join(values)}{did_you_mean(value, values)}"
+        f"reading {name}: {brief_value(value)} is not one of its choices "
+        f"({', '.join(values)}){did_you_mean(value, values)}"
     )
 
 
@@ -152,7 +152,7 @@ def load_readings(texts: Iterable[str]) -> tuple[ChosenReading, ...]:
     is no list.
     """
     if isinstance(texts, str) or not isinstance(texts, Iterable):
-        raise CoarticError(f"readings {brief_value(texts)}: they are given as a list of texts")
+        raise CoarticError(f"readings must be a list of texts, not {brief_value(texts)}")
     chosen: dict[str, ChosenReading] = {}
     for text in texts:
         new = load_reading(text)

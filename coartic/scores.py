@@ -95,7 +95,7 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
     hit every goal, and what :func:`coartic.solution.execute` raises.
     """
     if len(solution) > MOST_MOVEMENTS:
-        raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are kept")
+        raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
     corners = [task.q0]
     for movement in solution:
         path = () if movement.waypoints is None else movement.waypoints
@@ -104,7 +104,7 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
             corners.append(configuration(task.robot, movement.target))
     steps = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()) / model.step
     if steps > MOST_STEPS:
-        raise SolutionError(f"its way is {steps:.0f} steps long; at most {MOST_STEPS} are made")
+        raise SolutionError(f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed")
     execution = execute(task, solution, model=model)
     if not execution.completed:
         raise IncompleteError(execution.reason)

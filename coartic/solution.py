@@ -235,7 +235,7 @@ def _by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movem
     groups: list[tuple[int, list[Movement]]] = []
     for movement in solution:
         if not isinstance(movement, Movement):
-            raise SolutionError(f"task {task.name!r}: {movement!r} is no Movement")
+            raise SolutionError(f"task {task.name!r}: {movement!r} is not a Movement")
         if not groups or groups[-1][0] != movement.goal:
             groups.append((movement.goal, []))
         where = f"task {task.name!r}, goal {movement.goal}"

@@ -315,7 +315,7 @@ def load_task(name_or_path: str | Path) -> Task:
         hint = did_you_mean(name_or_path, builtin_tasks()) or "."
         raise TaskError(
             f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
-            "A task file's name ends in .toml, that of an instance is FAMILY/v1/i017."
+            "A task file's name ends in .toml; an instance is written FAMILY/v1/i017."
         )
     task = _read(Path(name_or_path))
     if "/" in task.name:

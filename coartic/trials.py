@@ -219,7 +219,7 @@ def _checked_targets(task: Task, targets: Array) -> Array:
             f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
         )
     if np.any(np.abs(copy) > LARGEST):
-        raise ValueError(f"a target has a figure beyond {LARGEST:g}")
+        raise ValueError(f"a target has a number beyond {LARGEST:g}")
     for coordinate in task.locked_base:
         column = copy[..., "xy".index(coordinate)]
         if np.any(~np.isnan(column) & (column != task.q0["xy".index(coordinate)])):

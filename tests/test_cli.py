@@ -151,7 +151,7 @@ def test_reproduce(coartic, tmp_path):
     assert f"- rewards by trial differ, first at trial {worst}" in text
     code, _, error = coartic("reproduce", "", "--in", out)
     assert code == 2
-    assert "is no run id" in error
+    assert "is not a run id" in error
 
 
 def test_list_fits_a_screen(coartic, monkeypatch):

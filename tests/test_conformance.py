@@ -106,7 +106,7 @@ def test_what_a_session_shows_cannot_be_written(known):
     assert record.meter.trials == 1
     assert len(record.rewards) == 1
     assert record.rewards[0] < 0
-    assert "counter 'trials' cannot be stated" in record.details["said"]
+    assert "a method cannot set counter 'trials'" in record.details["said"]
 
 
 CASES = [

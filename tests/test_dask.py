@@ -415,7 +415,7 @@ def test_a_wrong_address_ends_the_command_with_exit_code_2(monkeypatch, capsys, 
     assert (code, out) == (2, "")
     calls, sentence = filter(None, error.splitlines())
     assert calls.startswith("calling the Dask scheduler at ")
-    assert sentence.startswith("error: no Dask scheduler at ")
+    assert sentence.startswith("Error: no Dask scheduler at ")
 
 
 def certificate(folder, name, authority=None):

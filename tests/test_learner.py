@@ -407,8 +407,8 @@ def test_errors():
         ("noise_sd", 1e20, "not within 0 to 100"),
         ("discount", 1.5, "discount 1.5 is not within 0 to 1"),
         ("discount", float("nan"), "not within 0 to 1"),
-        ("discount", 0.5, "it takes credit 'subtask'"),
-        ("credit", "goal", "credit 'goal': it is 'overall' or 'subtask'"),
+        ("discount", 0.5, "set credit to 'subtask'"),
+        ("credit", "goal", "credit is 'goal'; it must be 'overall' or 'subtask'"),
     ]:
         with pytest.raises(ValueError, match=message):
             replace(CONDITIONS["EC1"], **{field: value})

@@ -222,7 +222,7 @@ def test_a_broken_plugin_is_a_warning(coartic, tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text("[coartic.methods]\nbad = no_such_module:Method\n")
     code, listed, error = coartic("list")
     assert code == 0
-    assert "warning: plug-in bad: entry point 'bad' cannot be used" in error
+    assert "Warning: plug-in bad: entry point 'bad' cannot be used" in error
     assert "dual-process/" in listed
 
 

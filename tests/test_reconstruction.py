@@ -325,7 +325,7 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
     assert not any(test.implied for test in beside)
     clear = [test.p_below for test in tests if isinstance(test, Order)]
     assert clear == [0.01, 0.01]
-    with pytest.raises(CoarticError, match="nothing to reconstruct of task 'ascending'"):
+    with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
 
 

@@ -134,7 +134,9 @@ def test_text_from_files_is_escaped():
 
 def test_a_page_stands_alone(traced):
     text = page(traced, list(sections.filled(traced)))
-    assert not re.search(r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/|numbers)', text)
+    assert not re.search(
+        r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/|numbers)', text
+    )
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(ids)

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -767,11 +766,7 @@ def test_frame_has_the_student_interval_of_its_runs(tmp_path):
     assert row.n.item() == 4
 
 
-def test_the_register_and_its_documentation_say_the_same():
-    page = Path("docs/signatures.md").read_text(encoding="utf-8")
-    rows = [line for line in page.splitlines() if line.startswith("| ")]
-    for signature in REGISTER.values():
-        assert f"| {signature.name} | {signature.extent} | {signature.meaning} |" in rows
+def test_sources_of_signatures_can_be_cited():
     works = references()
     assert all(key in works for entry in REGISTER.values() for key in entry.sources)
 

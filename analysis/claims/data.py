@@ -49,8 +49,8 @@ class Data:
         if len(cell.good) < len(cell.runs):
             failed = len(cell.runs) - len(cell.good)
             raise MissingError(
-                f"{failed} of {len(cell.runs)} runs of {method} on {task} failed, and without "
-                "their rewards the cell is not what the method does"
+                f"{failed} of {len(cell.runs)} runs of {method} on {task} failed, so "
+                "the mean of the others would mislead"
             )
         if method.startswith(LEARNER):
             trials = sorted(set(cell.runs.trials))

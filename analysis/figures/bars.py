@@ -43,7 +43,7 @@ def bars(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
             labels[name] = own
     if not labels:
         asked = ", ".join(methods or CONDITIONS)
-        raise missing(study, f"no solved runs of {asked} on one task, more than one of them")
+        raise missing(study, f"no task with solved runs of more than one of {asked}")
     data = pd.concat([_rows(study, name, own) for name, own in labels.items()], ignore_index=True)
     # One row of panels, their widths as their numbers of bars.
     counts = [len(own) + 1.2 for own in labels.values()]

@@ -81,7 +81,7 @@ def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Sea
     known = layouts()
     if task not in known:
         raise CoarticError(
-            f"there is nothing to reconstruct of task {task!r}; tasks with goals that are not "
+            f"the paper prints the goals of task {task!r}; tasks with goals that are not "
             f"printed: {', '.join(known)}{did_you_mean(task, known)}"
         )
     chosen = load_readings(readings)

@@ -179,5 +179,5 @@ def difference_of_shares(
 
 def _positive(margin: float) -> float:
     if not margin > 0:
-        raise ValueError(f"margin {margin}: it is a positive difference")
+        raise ValueError(f"margin {margin}: it must be positive")
     return margin

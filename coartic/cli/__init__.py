@@ -24,6 +24,7 @@ from coartic.errors import CoarticError
 app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     help="Comparative benchmark of coarticulation in motor skill acquisition.",
 )
 
@@ -47,8 +48,8 @@ def _options(
 for module in (run, read, draw):
     for command in module.COMMANDS:
         name = command.__name__.removesuffix("_")
-        app.command(name=name, rich_help_panel=module.GROUP)(command)
-app.add_typer(paper.app, name="paper", rich_help_panel="The paper")
+        app.command(name=name)(command)
+app.add_typer(paper.app, name="paper")
 
 
 def main() -> None:
@@ -57,7 +58,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
-    warnings.showwarning = lambda message, *_, **__: complain("warning", str(message))
+    warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
     # Ctrl-C ends the process; where something is to be saved before, it is caught there. As an
     # exception, in the middle of an import, it can get lost. Ignored (nohup, &), it stays so.
@@ -73,12 +74,12 @@ def main() -> None:
                 sys.stdout.flush()  # a full disk is noticed here, and said
             raise
     except CoarticError as error:
-        complain("error", str(error))
+        complain("Error", str(error))
         sys.exit(2)
     except BrokenPipeError:  # whoever read, such as head, has enough: typer ends quietly
         raise
     except OSError as error:
-        complain("error", str(error.strerror or error))
+        complain("Error", str(error.strerror or error))
         _flush_or_drop()
         sys.exit(1)
     finally:

@@ -10,7 +10,24 @@ import typer
 
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.inputs import MOST_SECONDS
+
+
+def at_least(least: int, most: int | None = None) -> Callable[[str], int]:
+    """Reads a whole number; typer says what is wrong with one that is out of bounds."""
+
+    def parse(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            raise typer.BadParameter(f"{text!r} is not a whole number.") from None
+        if number < least:
+            raise typer.BadParameter(f"{number} is below {least}.")
+        if most is not None and number > most:
+            raise typer.BadParameter(f"{number} is above {most}.")
+        return number
+
+    return parse
 
 
 def _suites() -> Iterable[str]:
@@ -58,7 +75,7 @@ SuiteName = Annotated[
 Something = Annotated[
     str | None,
     typer.Argument(
-        metavar="[NAME]",
+        metavar="NAME",
         help="Task, suite, method or family.",
         autocompletion=_completing(_names_everywhere),
     ),
@@ -88,13 +105,13 @@ Readings = Annotated[
 ]
 Runs = Annotated[
     int | None,
-    typer.Option(min=1, max=MOST_RUNS, metavar="N", show_default=False, help="Runs of each cell."),
+    typer.Option(parser=at_least(1), metavar="N", help="Runs of each cell."),
 ]
 Trials = Annotated[
-    int | None, typer.Option(min=1, max=MOST_TRIALS, metavar="N", help="Trials of each run.")
+    int | None, typer.Option(parser=at_least(1), metavar="N", help="Trials of each run.")
 ]
 Jobs = Annotated[
-    int, typer.Option(min=-1, max=1024, metavar="N", help="Processes; -1 is one for each core.")
+    int, typer.Option(parser=at_least(-1), metavar="N", help="Processes; -1 is one for each core.")
 ]
 Tasks = Annotated[
     str | None,
@@ -122,13 +139,13 @@ MethodFiles = Annotated[
         "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, metavar="N", help="Seed of the suite.")]
+Seed = Annotated[int, typer.Option(parser=at_least(0), metavar="N", help="Seed of the suite.")]
 TimeLimit = Annotated[
     float | None, typer.Option(metavar="SECONDS", help="Longest that a run may take.")
 ]
 TrialBudget = Annotated[
     int | None,
-    typer.Option(min=1, max=MOST_TRIALS, metavar="N", help="Most trials that a run may make."),
+    typer.Option(parser=at_least(1), metavar="N", help="Most trials that a run may make."),
 ]
 Scheduler = Annotated[
     str | None,

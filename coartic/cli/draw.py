@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
+from coartic.cli.arguments import at_least
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
 from coartic.text import counted, one_line
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from coartic import MotionModel, Task
     from coartic.analysis.figures.animation import Panel
 
-GROUP = "Draw"
 _PICTURED = 12
 """Tasks of a picture, at most."""
 
@@ -24,14 +24,14 @@ _PICTURED = 12
 def draw(
     tasks: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[TASK]...", help="Tasks, task files, or long/v1/i000..i003."),
+        typer.Argument(metavar="TASK", help="Tasks, task files, or long/v1/i000..i003."),
     ] = None,
     out: Annotated[
         Path, typer.Option(metavar="FILE", help="Picture (.png, .svg, .pdf), or a folder.")
     ] = Path("tasks.svg"),
     replace: given.Replace = False,
 ) -> None:
-    """Draw tasks; into a folder, write them as task files as well."""
+    """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
     from coartic.families import named_by, task_text
     from coartic.files import check_outputs, publish, write_outputs
@@ -58,7 +58,7 @@ def animate(
     run_id: given.RunId,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Film to write: .gif or .mp4.")],
     other: Annotated[
-        str | None, typer.Argument(metavar="[OTHER_RUN]", help="A run to show beside it.")
+        str | None, typer.Argument(metavar="OTHER_RUN", help="A run to show beside it.")
     ] = None,
     folder: given.In = Path("results"),
     initial: Annotated[
@@ -66,18 +66,20 @@ def animate(
     ] = False,
     speed: Annotated[
         float | None,
-        typer.Option(min=0.1, max=10_000, metavar="N", help="Ticks per second."),
+        typer.Option(metavar="N", help="Ticks per second."),
     ] = None,
     width: Annotated[
-        int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
+        int, typer.Option(parser=at_least(200, 3840), metavar="N", help="Width in pixels.")
     ] = 800,
     replace: given.Replace = False,
 ) -> None:
-    """Make a film of a run's solution, alone or beside another one."""
+    """Make a film of a run, alone or beside another one."""
     from coartic.analysis.figures.animation import Panel, animate, check_output
     from coartic.benchmarks.reproduce import find_record, trajectory_of
 
     check_output(out, replace=replace)
+    if speed is not None and not speed > 0:
+        raise CoarticError(f"--speed {speed:g}: give a number of ticks per second above 0.")
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     panels = []

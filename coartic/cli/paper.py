@@ -11,21 +11,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import check_numbers
+from coartic.cli.arguments import at_least, check_numbers
 from coartic.cli.terminal import say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import check_folder, folder_named, publish
-from coartic.inputs import MOST_RUNS, MOST_TRIALS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 app = typer.Typer(
     no_args_is_help=True,
-    help="Study what the paper leaves open: its readings, and goals that it does not print.",
+    help="Study what the paper leaves open.",
 )
 _TrialsOf = Annotated[
-    int, typer.Option(min=1, max=MOST_TRIALS, metavar="N", help="Trials of each run.")
+    int, typer.Option(parser=at_least(1), metavar="N", help="Trials of each run.")
 ]
 
 
@@ -37,7 +36,7 @@ def readings(
     ] = None,
     runs: Annotated[
         int,
-        typer.Option(min=40, max=MOST_RUNS, metavar="N", help="Runs of each reading and task."),
+        typer.Option(parser=at_least(40), metavar="N", help="Runs of each reading and task."),
     ] = 1000,
     trials: _TrialsOf = 10_000,
     pairs: Annotated[
@@ -45,7 +44,10 @@ def readings(
     ] = False,
     jobs: given.Jobs = -1,
 ) -> None:
-    """List how the paper can be read, or judge each reading by the printed one-armed results."""
+    """List how the paper can be read, or judge each reading.
+
+    A reading is judged by the results that the paper prints of the one-armed tasks.
+    """
     from coartic.readings import readings as known
 
     if judge is None:
@@ -70,7 +72,7 @@ def readings(
     table = judged_table(judged)
     publish(folder, {"readings.csv": _csv(table)}, owner="paper", alone=False)
     show_frame(table[["readings", "log likelihood", "p", "verdict"]])
-    say(f"All of it: {folder / 'readings.csv'}")
+    say(f"Written: {folder / 'readings.csv'}")
 
 
 @app.command("goals")
@@ -78,15 +80,18 @@ def goals(
     task: Annotated[str, typer.Argument(metavar="TASK", help="Task whose goals are not printed.")],
     folder: given.OutFolder,
     members: Annotated[
-        int, typer.Option(min=2, max=2000, metavar="N", help="Sets of goals to keep.")
+        int, typer.Option(parser=at_least(2), metavar="N", help="Sets of goals to keep.")
     ] = 240,
     runs: Annotated[
-        int, typer.Option(min=2, max=1000, metavar="N", help="Runs of each set and condition.")
+        int, typer.Option(parser=at_least(2), metavar="N", help="Runs of each set and condition.")
     ] = 20,
     reading: given.Readings = None,
     jobs: given.Jobs = -1,
 ) -> None:
-    """Search for goals that give the printed results, and keep an ensemble of them."""
+    """Search for goals that give the printed results.
+
+    It keeps an ensemble of them.
+    """
     from coartic.analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
 
     check_numbers(jobs, None)
@@ -96,8 +101,11 @@ def goals(
     found = reconstruct(search, effort=Effort(members=members, runs=runs), report=say)
     tables = zip(names, (found.members, found.tried), strict=True)
     publish(out, {name: _csv(table) for name, table in tables}, owner="paper", alone=False)
-    say(f"The nearest set lies {found.nearest.distance:.2f} standard errors from what is printed.")
-    say(f"All of it: {out / names[0]} and {out / names[1]}")
+    say(
+        f"The nearest set lies {found.nearest.distance:.2f} standard errors from the printed "
+        "results."
+    )
+    say(f"Written: {out / names[0]} and {out / names[1]}")
 
 
 @app.command("results")
@@ -106,7 +114,7 @@ def results(
         list[str], typer.Argument(metavar="TASK...", help="Tasks, or members of an ensemble.")
     ],
     runs: Annotated[
-        int, typer.Option(min=3, max=MOST_RUNS, metavar="N", help="Runs of each condition.")
+        int, typer.Option(parser=at_least(3), metavar="N", help="Runs of each condition.")
     ] = 100,
     trials: _TrialsOf = 10_000,
     out: Annotated[
@@ -126,7 +134,7 @@ def results(
     show_frame(table[columns].map(_short))
     if folder is not None:
         publish(folder, {"printed.csv": _csv(table)}, owner="paper", alone=False)
-        say(f"All of it: {folder / 'printed.csv'}")
+        say(f"Written: {folder / 'printed.csv'}")
 
 
 @app.command("claims")
@@ -134,13 +142,13 @@ def claims(
     folders: Annotated[
         list[Path],
         typer.Argument(
-            parser=folder_named, metavar="FOLDER...", help="Results folders, one of each reading."
+            parser=folder_named, metavar="FOLDER", help="Results folders, one of each reading."
         ),
     ],
     out: given.OutFolder,
     jobs: given.Jobs = -1,
 ) -> None:
-    """Judge the paper's claims under each reading and with each admissible set of goals."""
+    """Judge the claims under other readings and goals."""
     from coartic.analysis import load
     from coartic.analysis.figures.plot import FORMATS, picture
     from coartic.analysis.reconstruction.curve import specification_curve, verdicts
@@ -166,7 +174,7 @@ def claims(
     files |= {f"{plot.id}{kind}": picture(plot, kind) for plot in figures for kind in FORMATS}
     publish(folder, files, owner="paper", alone=False)
     show_frame(counted)
-    say(f"All of it: {folder}")
+    say(f"Written: {folder}")
 
 
 def _folder(name: str, files: Sequence[str], what: str = "--out") -> Path:

@@ -14,7 +14,6 @@ from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.text import counted, did_you_mean
 
-GROUP = "Read"
 _ReportFolder = Annotated[
     Path | None,
     typer.Option(
@@ -28,7 +27,7 @@ _ForPaper = Annotated[
 
 
 def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPaper = False) -> None:
-    """Write the report of a results folder: a page with its tables and figures."""
+    """Write the report of a results folder."""
     out = folder / "report" if out is None else out
     if_interrupted(f"Nothing was written to {out}.")
     from coartic.analysis.report.build import write_report
@@ -52,8 +51,8 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
 
 
 def trace(
-    table: Annotated[str | None, typer.Argument(metavar="[TABLE]", help="Id of a table.")] = None,
-    row: Annotated[str | None, typer.Argument(metavar="[ROW]", help="Name of a row.")] = None,
+    table: Annotated[str | None, typer.Argument(metavar="TABLE", help="Id of a table.")] = None,
+    row: Annotated[str | None, typer.Argument(metavar="ROW", help="Name of a row.")] = None,
     folder: Annotated[
         Path,
         typer.Option(
@@ -61,7 +60,7 @@ def trace(
         ),
     ] = Path("results"),
 ) -> None:
-    """Name the runs behind a row of a report's table, with the command that repeats each."""
+    """Name the runs behind a row of a report's table."""
     from coartic.analysis.report.trace import runs_of, tables_of
 
     tables = tables_of(folder)
@@ -94,7 +93,7 @@ def compare(
     ] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Compare two results folders: what differs between them, and in which results."""
+    """Compare two results folders."""
     from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
     from coartic.files import check_outputs, write_outputs
 
@@ -120,27 +119,30 @@ def compare(
 
 
 def verify(folder: given.Results) -> None:
-    """Execute every stored solution again and compare rewards, ticks and hands."""
+    """Execute every stored solution again and compare."""
     from coartic.analysis.results.folder import load_results
 
     results = load_results(folder)
     runs, cells = counted(len(results.runs), "run"), counted(len(results.cells), "cell")
-    say(f"{folder} is sound: {runs} in {cells}. Executed again, every solution gets its reward.")
-    say("Whether a run was made as it says, only `coartic reproduce RUN` shows.")
+    say(
+        f"{folder}: the solutions of {runs} in {cells} were executed again; "
+        "each gets its stored reward."
+    )
+    say("`coartic reproduce RUN` also repeats how a solution was found.")
 
 
 def cite(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            parser=folder_named, metavar="[FOLDER]", help="Results folder; without, all methods."
+            parser=folder_named, metavar="FOLDER", help="Results folder; without, all methods."
         ),
     ] = None,
     analysis: Annotated[
         bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print what to cite as BibTeX: software, paper, and the methods of a folder."""
+    """Print what to cite, as BibTeX."""
     from coartic.analysis.citations import MethodSource, bibliography
     from coartic.benchmarks.registry import CLASSES
     from coartic.record import BUILT_IN

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from coartic.cli.terminal import Display
     from coartic.record import Record
 
-GROUP = "Run"
-
 
 def run(
     suite: given.SuiteName,
@@ -45,7 +43,7 @@ def run(
     retry_failed: given.RetryFailed = False,
     redo: given.Redo = False,
 ) -> None:
-    """Run the part of a suite that its folder lacks, and say what came out.
+    """Run the missing part of a suite and say what came out.
 
     If it is interrupted, repeat the command; it resumes where it stopped.
     """
@@ -93,7 +91,7 @@ def _conclude(report: RunReport, seconds: float) -> None:
 
 
 def list_(name: given.Something = None, method_file: given.MethodFiles = None) -> None:
-    """List tasks, suites and methods, or say more about one of them."""
+    """List tasks, suites and methods, or describe one of them."""
     from coartic.benchmarks.registry import registry
 
     known = registry(method_file or [])
@@ -160,8 +158,9 @@ def _details(name: str, known: Registry) -> Iterator[tuple[str, str]]:
             names = [*suites(), *builtin_tasks(), *families(), *known]
             hint = did_you_mean(name, names)
             raise CoarticError(
-                f"there is nothing called {name!r}{hint}" if hint else str(error)
-            ) from None
+                f"there is no task, suite, method or family {name!r}"
+                f"{hint or '; `coartic list` shows them all'}."
+            ) from error
         for method in methods:
             yield from _method_details(known[method])
 
@@ -187,7 +186,7 @@ def reproduce(
     folder: given.In = Path("results"),
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Show a run, perform it again, and say whether the result is identical."""
+    """Perform a run again and say whether the result is identical."""
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import differences, find_record, perform_once, spec_of
     from coartic.benchmarks.specification import Limits
@@ -208,7 +207,10 @@ def reproduce(
     )
     again = perform_once(spec)
     if record.code != again.code:
-        say(f"The run was made by code {record.code[:12]}; this is {again.code[:12]}.")
+        say(
+            f"Another version of the code made the run ({record.code[:12]}; this is "
+            f"{again.code[:12]})."
+        )
     found = differences(record, again)
     if found:
         say("Performed again, it is different:", *(f"- {difference}" for difference in found))
@@ -223,7 +225,7 @@ def _result(record: Record) -> str:
 
 
 def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None:
-    """Check a method or a task file against the rules of the benchmark."""
+    """Check a method or a task file against the rules."""
     from coartic.benchmarks.registry import registry
 
     broken = 0

@@ -38,7 +38,7 @@ def say(*lines: str, stream: TextIO | None = None) -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """An ``error`` or a ``warning``, a line each of the text."""
+    """Print an ``Error`` or a ``Warning``, line by line."""
     say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
 
 
