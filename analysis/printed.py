@@ -243,7 +243,7 @@ def constraints(task: str) -> tuple[Entry, ...]:
 
 
 def tests(task: str) -> tuple[Entry, ...]:
-    """What is printed of a task and never selects; CoarticError for a task the paper lacks."""
+    """Printed results of learning on a task. Raises CoarticError for a task the paper lacks."""
     return _of(task, "test")
 
 

@@ -2,7 +2,7 @@
 
 The levels are written here as they are defined; :mod:`coartic.baselines.cascade` has the same
 programs as
-numbers, which saves 94 to 99 % of the time (``python -m coartic.benchmarks.qp_solvers``).
+numbers, which saves 94 to 99 % of the time.
 """
 
 from __future__ import annotations

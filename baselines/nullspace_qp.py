@@ -84,7 +84,7 @@ class NullspaceParameters(Parameters):
     at each goal the hand that is nearest when the last one is hit, without a secondary
     objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
     solver: SolverName = "daqp"
-    """Of both levels; ``python -m coartic.benchmarks.qp_solvers`` compares them."""
+    """Of both levels."""
     modelling: Modelling = "none"
     """``cvxpy`` states the programs in its language, ``none`` fills in their numbers; the same
     programs, and with DAQP the same rates to the last bit."""

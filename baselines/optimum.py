@@ -35,7 +35,7 @@ from coartic.task import hands_of, letters_of
 
 Start = tuple[tuple[Hand, ...], Array]
 MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution
-CITATION = "This package; the bound on reward is section 7 of docs/model.md."
+CITATION = "This package; docs/model.md derives the bound on reward."
 
 
 class OptimumParameters(Parameters):

@@ -8,7 +8,7 @@ Variants go beyond the paper. Two integrate informed search as its Discussion pr
 a secondary objective in the nullspace of the corrective process, and noise whose mean
 lies in the direction that the corrective process suggests. One takes the corrective
 process away, one learns from the reward of each subtask in place of the overall one, which
-the paper calls crucial. What each does to learning is measured in docs/model.md.
+the paper calls crucial. Suite ablations measures what each does to learning.
 """
 
 from __future__ import annotations
@@ -138,8 +138,8 @@ CONDITIONS = {
 }
 
 
-NULLSPACE_GAIN = 0.05  # β of the nullspace variants (sweep: docs/model.md)
-BIAS = 0.25  # of the biased variants, SDs of η (sweep: docs/model.md)
+NULLSPACE_GAIN = 0.05  # β of the nullspace variants
+BIAS = 0.25  # of the biased variants, SDs of η
 
 
 def _variants(base: str) -> tuple[ExplorationCondition, ...]:

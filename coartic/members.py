@@ -1,7 +1,7 @@
 """Reconstructions of the tasks whose goals the paper does not print, as an ensemble.
 
 ``tasks/members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
-(made by ``coartic reconstruct``; docs/reconstruction.md). A member is a task by the name
+(made by ``coartic paper goals``; docs/reconstruction.md). A member is a task by the name
 ``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one that the search chose, and the
 task itself; v0.1 is what the task was in the first release, and not admitted.
 """

@@ -9,7 +9,7 @@ from coartic.errors import need
 
 
 class MotionModel(NamedTuple):
-    """Constants of the paper's model; what each one rests on is in docs/model.md.
+    """Constants of the paper's model; docs/model.md says where each comes from.
 
     A named tuple, so that the compiled kernels take it as it is.
     """

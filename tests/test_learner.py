@@ -185,7 +185,7 @@ def test_learned_rewards_of_the_paper(name, condition, low, high, hands):
     assert {run.hands for run in runs} <= hands
     for run in runs:
         assert run.execute().reward == run.reward  # the best trial, executed anew
-        # On two-armed 2 most runs of EC4 find nothing better (docs/model.md).
+        # On two-armed 2 most runs of EC4 find nothing better.
         assert run.reward > run.initial_reward or (name, condition) == ("two-armed-2", "EC4")
         assert run.reward >= run.initial_reward
         assert abs(run.replay_reward - run.reward) < 30
@@ -335,7 +335,7 @@ def test_fewer_trials_are_a_prefix():
 
 
 def test_arrival_tolerance_evidence():
-    """Why θ^a is 0.01: 0.1 is farther from the published -303 and -314 (docs/model.md)."""
+    """Why θ^a is 0.01: 0.1 is farther from the published -303 and -314."""
     wide = MotionModel(arrival_tolerance=0.1)
     published = {"ascending": -303, "descending": -314}
     wider = {
@@ -526,7 +526,7 @@ def test_a_subtask_learned_alone_does_not_know_what_follows():
 
 
 def test_least_change_of_posture_shortens_the_initial_solution():
-    """Hardly longer, and shorter where the base cannot give way (docs/model.md)."""
+    """Hardly longer, and shorter where the base cannot give way."""
     initial = {
         name: [learn(load_task(name), c, seed=0, trials=1).reward for c in conditions]
         for name, conditions in [

@@ -56,7 +56,7 @@ def test_what_is_shipped_holds(entry):
         assert np.all(execution.configurations[:, column] == task.q0[column])
     assert set(entry.searches) == {method.name for method in METHODS}
     assert max(entry.searches.values()) == entry.reward
-    # On two-armed 1 with the other arm still only random starts find the best (docs/model.md).
+    # On two-armed 1 with the other arm still only random starts find the best.
     apart = 3 if name_of(entry) == "two-armed-1-still-task" else 1
     assert entry.reward - min(entry.searches.values()) <= apart
     assert entry.bound >= entry.reward
@@ -66,7 +66,7 @@ def test_what_is_shipped_holds(entry):
 @pytest.mark.parametrize("arm", ["free", "still"])
 def test_the_optimum_of_every_task_is_proven_or_bounded(name, arm):
     (entry,) = (e for e in SOLVED if name_of(e) == f"{name}-{arm}-task")
-    # The proofs of two-armed 1 have not ended: they leave 5 and 20 ticks (docs/model.md).
+    # The proofs of two-armed 1 have not ended: they leave 5 and 20 ticks.
     left = {"two-armed-1-free": 5, "two-armed-1-still": 20}.get(f"{name}-{arm}", 0)
     assert entry.bound - entry.reward == left
 

@@ -306,7 +306,7 @@ def test_the_pages_show_the_example_as_it_is():
 def test_the_suite_of_the_page_can_be_used(tmp_path):
     from coartic.benchmarks.suites import load_suite, select_cells
 
-    page = (ROOT / "docs" / "howto" / "suite.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "howto" / "task.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```toml\n(# noise.toml.*?)```", page, re.DOTALL)
     path = tmp_path / "noise.toml"
     path.write_text(block, encoding="utf-8")

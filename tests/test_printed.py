@@ -88,7 +88,7 @@ def test_tasks_are_as_printed(name):
 
 @pytest.mark.parametrize("name", TASKS)
 def test_constraints_hold_of_what_is_computed(name):
-    """As a search may ask; the initial rewards of reconstructed goals are near (docs/model.md)."""
+    """As a search may ask; the initial rewards of reconstructed goals are near."""
     task = load_task(name)
 
     def reward(hands):

@@ -177,4 +177,6 @@ def test_few_runs_say_so(tmp_path):
     for study in (few, without):
         files = report_files(study)
         assert {"report.html", "summary.md", "numbers.tex"} <= set(files)
-        assert load_task("ascending").label in files["report.html"].decode()
+        text = files["report.html"].decode()
+        assert load_task("ascending").label in text
+        assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))

@@ -32,6 +32,7 @@ from coartic.analysis.methods import (
     name_of,
 )
 from coartic.analysis.published import RUNS, TRIALS
+from coartic.analysis.signatures.register import signatures
 from coartic.analysis.signatures.shared_goal import SharedGoal, shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study, cached
@@ -71,6 +72,41 @@ def coarticulation(study: Study) -> Coarticulation | None:
     method = study.cells[goal.tasks[0].name, goal.method].method
     tested = study.results.manifest.specification.methods[method].stochastic
     return Coarticulation(goal, name_of(goal.method), sum(map(len, goal.postures)), tested)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The joint that follows a moved goal most, at the goal before it."""
+
+    method: str
+    joint: str
+    goal: int
+    moving: int
+    slope: float
+    """Length unit or rad per length unit that the goal moves."""
+    low: float
+    high: float
+
+    @property
+    def seen(self) -> bool:
+        """Whether the interval leaves out 0."""
+        return self.low > 0 or self.high < 0
+
+
+@cached
+def moved(study: Study) -> Moved | None:
+    """Of the paper's learner, or of the first other method; None where no goal moves."""
+    frame = signatures(study)
+    frame = frame[(frame.signature == "locus slope") & frame.value.notna()]
+    frame = frame[frame.goal < frame.moving]
+    for label in (*CONDITIONS, *main_methods(frame.label)):
+        own = frame[frame.label == label].sort_values("value", key=abs)
+        if len(own):
+            row = own.iloc[-1]
+            joint = str(row.joint).replace("_", " ")
+            return Moved(name_of(label), joint, int(row.goal), int(row.moving), row.value,
+                         row.low, row.high)  # fmt: skip
+    return None
 
 
 @dataclass(frozen=True)

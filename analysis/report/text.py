@@ -66,8 +66,12 @@ def answers(study: Study) -> list[dict[str, str]]:
     for name, question, word in ANSWERS:
         of = getattr(facts, name)(study)
         text = "" if of is None else sentence(f"{name}_short", of)
-        if of is None and name == "coarticulation" and (gain := facts.gain(study)):
-            text = sentence("gain_short", gain)
+        section = name
+        if of is None and name == "coarticulation":
+            if moved := facts.moved(study):
+                text, section = sentence("moved_short", moved), "slopes"
+            elif gain := facts.gain(study):
+                text, section = sentence("gain_short", gain), "learning"
         if text:
-            found.append({"id": name, "question": question, "word": word, "text": text})
+            found.append({"id": section, "question": question, "word": word, "text": text})
     return found

@@ -49,7 +49,7 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
     (d_held - d)/d_initial, where d_held is the distance if the arm had kept its joints since
     its own last hit (since the start, before any), with the base where it is. Length per
     length, -∞ to ∞: 0 where the arm keeps still, whatever the base does (always under the
-    exploration conditions 1 to 3); all of the readiness where only the arm's waiting differs
+    exploration conditions 1 and 3); all of the readiness where only the arm's waiting differs
     from the initial solution. NaN where the other hand hits no later goal.
     """
     held = np.array(path.execution.configurations)

@@ -58,9 +58,10 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
     indent = max((len(word) for word, _ in kept), default=0) + 2
     width = max(console().width, indent + READABLE)
     for word, text in kept:
-        lines = textwrap.wrap(text, width - indent, break_on_hyphens=False) or [""]
+        together = text.replace(" %", "\xa0%")  # on one line
+        lines = textwrap.wrap(together, width - indent, break_on_hyphens=False) or [""]
         for number, line in enumerate(lines):
-            say(f"{'' if number else word:{indent}}{line}".rstrip())
+            say(f"{'' if number else word:{indent}}{line}".replace("\xa0", " ").rstrip())
 
 
 def show_frame(frame: pd.DataFrame) -> None:
