@@ -1,27 +1,26 @@
 # Two commands set everything up on a machine with Python >= 3.11 (with venv) and make:
-#   make benchmark   the paper's experiments and all methods beside them, then the report
+#   make benchmark   the paper's experiments, all methods beside them, and the report
 #   make test        the test suite
-# make docs builds the site into build/docs.
-# make benchmark FULL=1 also searches and proves the optima and moves the goals (suites
-# optimum and locus), each with its report.
+# make benchmark FULL=1 adds the ablations, the moved goals and the search for the optima.
+# make docs builds the site; make findings makes the numbers in it anew.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
 FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
-SUITES := paper comparison $(if $(FULL),optimum locus)
+SUITES := comparison $(if $(FULL),ablations locus optimum)
+STORED := comparison ablations locus families
 
-.PHONY: benchmark test check format docs speed example setup clean
+.PHONY: benchmark test check format docs findings speed setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
-	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite || exit; \
-	done
-	@for suite in $(filter-out paper,$(SUITES)); do \
+	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
-	@echo "Look at $(OUT)/comparison/report/report.html, and at $(OUT)/paper/comparison.md."
+	@echo "Look at $(OUT)/comparison/report/report.html."
+
 # Bytecode is kept, even where the environment says no: each worker, and each process that a
 # test starts, would compile all sources anew.
 test: $(READY)
@@ -46,9 +45,13 @@ docs: $(VENV)/.docs
 speed: $(READY)
 	$(BIN)/python -m coartic.benchmarks.speed
 
-example: $(READY)  # the report in the repository, of what make benchmark left
-	$(BIN)/coartic report $(OUT)/comparison --out benchmarks/example --formats svg
-	$(BIN)/python docs/paper_numbers.py
+# The suites behind docs/findings.md, their reports, and the pages made from them: half an hour.
+findings: $(READY)
+	@for suite in $(STORED); do \
+	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
+	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
+	done
+	$(BIN)/python docs/make_findings.py --from $(OUT)
 
 setup: $(READY)
 

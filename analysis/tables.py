@@ -229,7 +229,8 @@ def ranking(study: Study) -> pd.DataFrame:
     rows = []
     for method, rows_of in found.groupby("method", sort=False):
         by_task = rows_of.set_index("task")
-        whole = by_task.loc[ALL_TASKS] if ALL_TASKS in by_task.index else None
+        only = ALL_TASKS if len(set(found.task)) > 1 else found.task.iloc[0]
+        whole = by_task.loc[only] if only in by_task.index else None
         parts = gaps(study)[gaps(study).method == method].drop_duplicates(["task", "label"])
         keys = list(zip(parts.task, parts.label, strict=True))
         by_cell = parts.set_index("task").label

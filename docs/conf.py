@@ -1,7 +1,6 @@
 """The site: `make docs` builds it, and ends at the first warning."""
 
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -16,7 +15,6 @@ author = copyright = "The coartic developers"  # noqa: A001
 version = release = coartic.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "site_directives"]
-exclude_patterns = ["Thumbs.db", ".DS_Store"]
 source_suffix = {".md": "myst-nb"}
 
 html_theme = "furo"
@@ -26,9 +24,9 @@ html_css_files = ["site.css"]
 html_show_sphinx = False
 
 myst_heading_anchors = 4
-myst_enable_extensions = ["colon_fence", "fieldlist"]
+myst_enable_extensions = ["attrs_inline", "colon_fence"]
 
-# Notebooks are text, and run whenever the site is built: what they show is what came out.
+# Pages with code are run whenever the site is built, so they show what came out.
 nb_execution_mode = "force"
 nb_execution_timeout = 900  # a busy machine is slow
 nb_execution_raise_on_error = True
@@ -36,7 +34,6 @@ nb_execution_in_temp = True
 nb_merge_streams = True
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
 autodoc_default_options = {"members": True}
 autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
@@ -44,37 +41,28 @@ toc_object_entries = False
 # Names in signatures are short, and two packages may have one: the link goes to the first.
 suppress_warnings = ["ref.python"]
 
-_OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./[^)#\s]+)(#[^)\s]*)?\)")
-
-
-def _in_repository(page: Path, text: str) -> str:
-    """Links into the repository, which leave the site, as paths."""
-
-    def path_of(link: re.Match[str]) -> str:
-        target = (page.parent / link[2]).resolve()
-        if target.is_relative_to(DOCS) or link.string[link.start() - 1 : link.start()] == "!":
-            return link[0]
-        return f"{link[1]} (`{target.relative_to(ROOT)}`)"
-
-    return _OUTSIDE.sub(path_of, text)
+_OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\((\.\./[^)#\s]+)(#[^)\s]*)?\)")
+_BAR = re.compile(r"(?<![`\\\w])\|(?=\S)|(?<=\S)\|(?![`\w])")
 
 
 def setup(app):
-    """Pages are read by repository and site alike."""
+    """Let the pages be read in the repository and on the site alike."""
 
-    def read(app, name, source):
-        source[0] = _in_repository(Path(app.env.doc2path(name)), source[0])
+    def links(app, name, source):
+        """Turn links to files of the repository that are not on the site into paths."""
+        folder = Path(app.env.doc2path(name)).parent
+
+        def path_of(link):
+            target = (folder / link[2]).resolve()
+            if target.is_relative_to(DOCS):
+                return link[0]
+            return f"{link[1]} (`{target.relative_to(ROOT)}`)"
+
+        source[0] = _OUTSIDE.sub(path_of, source[0])
 
     def bars(app, what, name, thing, options, lines):
-        # |x| is a size here, and no name of something to be put in its place.
-        lines[:] = [
-            re.sub(r"(?<![`\\\w])\|(?=\S)|(?<=\S)\|(?![`\w])", r"\|", line) for line in lines
-        ]
+        """Escape |x|, a size, which would be a substitution in reStructuredText."""
+        lines[:] = [_BAR.sub(r"\|", line) for line in lines]
 
-    def example(app, error):
-        # The player works as it is. The name report.html is that of the page on reports.
-        shutil.copy(ROOT / "benchmarks/example/report.html", app.outdir / "example.html")
-
-    app.connect("source-read", read)
-    app.connect("build-finished", example)
+    app.connect("source-read", links)
     app.connect("autodoc-process-docstring", bars)

@@ -108,9 +108,9 @@ def test_the_shipped_families():
 
 
 def test_the_family_of_the_guide_is_one(tmp_path):
-    guide = (ROOT / "docs" / "howto" / "family.md").read_text(encoding="utf-8")
+    guide = (ROOT / "docs" / "howto" / "task.md").read_text(encoding="utf-8")
     path = tmp_path / "six-links.v1.toml"
-    path.write_text(guide.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+    path.write_text(guide.partition("# six-links.v1.toml\n")[2].partition("```")[0])
     family = read_family(path)
     assert (family.name, family.links, family.base) == ("six-links/v1", (6, 6), ("rail",))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -156,8 +157,9 @@ def _facts(study: Study) -> dict[str, str]:
 def _tasks(study: Study) -> dict[str, str]:
     tasks = study.results.manifest.specification.tasks
     return {
-        name: json.dumps({key: task[key] for key in task if key not in _WORDS}, sort_keys=True)
+        name: f"definition {hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:8]}"
         for name, task in tasks.items()
+        for own in [{key: task[key] for key in task if key not in _WORDS}]
     }
 
 

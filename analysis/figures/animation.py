@@ -1,4 +1,4 @@
-"""Movements tick by tick as a GIF, an MP4 or an SVG, by the conventions of the paper's figures.
+"""Movements tick by tick as a GIF or an MP4, by the conventions of the paper's figures.
 
 Open squares mark the left arm, closed circles the right one; goals are numbered circles,
 filled from the tick at which they are hit. Thin lines trace both hands.

@@ -42,7 +42,7 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     common = shares.sort_values(ascending=False, kind="stable").index
     order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
     bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
-    shape = style.grid(len(found), len(found))
+    shape = style.grid(len(found), 2)
     size = style.TWO, (0.75 + 0.155 * max(bars)) * shape[0]
     figure, panels = style.figure_of(shape, size)
     colors = dict(zip(order[:MOST], style.PALETTE, strict=False))

@@ -28,7 +28,8 @@ def numbers_tex(study: Study) -> str:
     about = facts.made(study)
     lines = [
         f"% Headline numbers of suite {about['suite']}, seed {about['seed']}: {about['runs']} runs",
-        f"% of coartic {about['version']} {about['commit']}, {about['date']}.",
+        f"% of coartic {' '.join(filter(None, (about['version'], about['commit'])))}, "
+        f"{about['date']}.",
         "% `coartic trace TABLE ROW` prints the runs behind a row that a comment names.",
     ]
     taken: set[str] = set()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import CoarticError
+from coartic.analysis.methods import name_of
 from coartic.text import did_you_mean
 
 
@@ -32,6 +33,8 @@ def runs_of(table: Path, row: str | None) -> tuple[list[str], list[str]]:
     frame = pd.read_csv(table, dtype=str, index_col="row", keep_default_na=False)
     if row is None:
         return list(frame.index), []
+    named = {name_of(name): name for name in frame.index}
+    row = named.get(row, row)
     if row not in frame.index:
         hint = did_you_mean(row, frame.index) or "; without a row, the command lists them"
         raise CoarticError(f"table {table.stem} has no row {row!r}{hint}")

@@ -75,6 +75,7 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic.analysis.figures.animation import Panel, animate, check_output
+    from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_record, trajectory_of
 
     check_output(out, replace=replace)
@@ -86,7 +87,7 @@ def animate(
     for name in (run_id,) if other is None else (run_id, other):
         _, record = find_record(name, folder)
         found = trajectory_of(record)
-        title = one_line(f"{found.task.name}: {record.method}, run {record.run}")
+        title = one_line(f"{found.task.label}: {name_of(record.method)}, run {record.run}")
         panels.append(Panel(title, found))
     if initial:
         panels.insert(0, _initial_panel(panels[0].trajectory.task, record.model))
@@ -99,7 +100,7 @@ def _initial_panel(task: Task, model: MotionModel) -> Panel:
     from coartic.analysis.figures.animation import Panel
 
     movements = corrective_trial(task, initial_hands(task, model=model), model=model).movements
-    return Panel(f"{task.name}: initial solution", trajectory(task, movements, model=model))
+    return Panel(f"{task.label}: initial solution", trajectory(task, movements, model=model))
 
 
 COMMANDS = (draw, animate)

@@ -1,0 +1,127 @@
+"""Writes the pages whose numbers come from stored results: ``python docs/make_findings.py``.
+
+``docs/stored`` keeps tables and figures of reports, a folder for each suite. ``*.md.jinja`` beside
+this file are filled in from them and from nothing else. ``make findings`` runs the suites and
+their reports, copies the tables with ``--from results``, and fills in the pages.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+
+from coartic.analysis.words import in_brackets, listed, number, p_value
+
+DOCS = Path(__file__).parent
+STORED = DOCS / "stored"
+KEPT = {
+    "comparison": (
+        "claims contexts hands learning methods price published ranking signatures tasks",
+        "postures published ranking price recruitment learning-curves",
+    ),
+    "ablations": ("methods signatures claims", ""),
+    "locus": ("signatures", ""),
+    "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
+}
+"""Tables and figures that are kept of each suite's report."""
+
+
+class Row:
+    """A row of a stored table, with its columns as attributes."""
+
+    def __init__(self, values: pd.Series) -> None:
+        self._values = values
+
+    def __getattr__(self, column: str) -> Any:
+        return self._values[column]
+
+    def __getitem__(self, column: str) -> Any:
+        return self._values[column]
+
+
+def table(suite: str, name: str) -> pd.DataFrame:
+    """A stored table, with its rows by name."""
+    return pd.read_csv(STORED / suite / f"{name}.csv", index_col="row")
+
+
+def row(suite: str, name: str, which: str) -> Row:
+    """A row of a stored table. Raises KeyError for one that is not there."""
+    return Row(table(suite, name).loc[which])
+
+
+def claim(name: str, suite: str = "comparison") -> Row:
+    """A judged claim by its id."""
+    return row(suite, "claims", name)
+
+
+def verdicts(suite: str = "comparison") -> dict[str, int]:
+    """How many claims have each verdict."""
+    counts = table(suite, "claims").verdict.value_counts()
+    return {str(verdict): int(count) for verdict, count in counts.items()}
+
+
+def interval(values: Row, column: str, digits: int = 1, scale: float = 1.0) -> str:
+    """A number with its interval, as ``7.8 [7.3, 8.1]``."""
+    value, low, high = (scale * float(values[f"{column}{end}"]) for end in ("", "_low", "_high"))
+    return f"{number(value, digits)} {in_brackets(low, high, digits)}".strip()
+
+
+def expect(holds: bool, what: str) -> str:
+    """Nothing, where a sentence holds. Raises ValueError where the results no longer bear it."""
+    if not holds:
+        raise ValueError(f"this no longer holds: {what}")
+    return ""
+
+
+def filled_pages() -> dict[str, str]:
+    """Every page that is made from a template, by its file name."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(DOCS),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {
+        "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
+        "expect": expect,
+    }  # fmt: skip
+    environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
+    return {
+        path.stem: environment.get_template(path.name).render()
+        for path in sorted(DOCS.glob("*.md.jinja"))
+    }
+
+
+def store(results: Path) -> None:
+    """Copy tables and figures from the reports below ``results``; lists of run ids stay there."""
+    for suite, (tables, figures) in KEPT.items():
+        report, kept = results / suite / "report", STORED / suite
+        shutil.rmtree(kept, ignore_errors=True)
+        kept.mkdir(parents=True)
+        for name in tables.split():
+            frame = pd.read_csv(report / "tables" / f"{name}.csv", index_col="row")
+            frame = frame.drop(columns="run_ids", errors="ignore")
+            frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+        for name in figures.split():
+            shutil.copy(report / "figures" / f"{name}.svg", kept)
+
+
+def main() -> None:
+    """Store what is new, then write the pages."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--from", dest="results", type=Path, help="Folder of the suites' results.")
+    results = parser.parse_args().results
+    if results is not None:
+        store(results)
+    for name, text in filled_pages().items():
+        (DOCS / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
