@@ -156,11 +156,12 @@ def _facts(study: Study) -> dict[str, str]:
 
 def _tasks(study: Study) -> dict[str, str]:
     tasks = study.results.manifest.specification.tasks
-    return {
-        name: f"definition {hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:8]}"
-        for name, task in tasks.items()
-        for own in [{key: task[key] for key in task if key not in _WORDS}]
-    }
+    hashes = {}
+    for name, task in tasks.items():
+        definition = {key: task[key] for key in task if key not in _WORDS}
+        text = json.dumps(definition, sort_keys=True)
+        hashes[name] = f"definition {hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    return hashes
 
 
 def _codes(study: Study) -> dict[str, str]:
