@@ -11,18 +11,19 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
-from coartic import Task, exploration
+from coartic import Task
 from coartic.analysis.references import Key
 from coartic.analysis.words import read_beside
-from coartic.learning import METHOD_PREFIX
-from coartic.record import SEARCH
+from coartic.learner import conditions
+from coartic.learner.learning import METHOD_PREFIX
+from coartic.runs.record import SEARCH
 from coartic.text import one_line
 
 LEARNER = METHOD_PREFIX
 """Beginning of the paper's learner's id; the exploration condition follows."""
-CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in exploration.CONDITIONS)
-"""Labels of the learner under the paper's conditions: the first with one arm, the others with two,
-more exploration later."""
+CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in conditions.CONDITIONS)
+"""Labels of the learner under the paper's conditions: the first with one arm, the others with
+two, more exploration later."""
 TWO_ARMED = CONDITIONS[1:]
 TOGETHER = f"{LEARNER.rstrip('/')} ("
 """Beginning of the label of several conditions together, each on the tasks that it is for."""

@@ -25,8 +25,8 @@ from coartic import (
 )
 from coartic.analysis.results.folder import CellRuns
 from coartic.errors import NotApplicableError
+from coartic.learner.rows import movements_from
 from coartic.robot import Array
-from coartic.rows import movements_from
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,10 @@ import numpy as np
 from pydantic import Field
 
 from coartic.baselines.uninformed import TOLD, Practice, UninformedParameters
-from coartic.initial import too_many_sequences
 from coartic.method import Method, Result, Session
+from coartic.motion.initial import too_many_sequences
 from coartic.robot import Array
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 CITATION = (
     "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "

@@ -9,11 +9,11 @@ from __future__ import annotations
 import itertools
 
 from coartic import Execution, Movement, Task
-from coartic.dual_process import spend_search
-from coartic.initial import changes_of_hand, search_initial_hands, too_many_sequences
+from coartic.learner.method import spend_search
 from coartic.method import Information, Method, MethodError, Result, Session
+from coartic.motion.initial import changes_of_hand, search_initial_hands, too_many_sequences
 from coartic.robot import Hand
-from coartic.task import hands_of
+from coartic.tasks.task import hands_of
 
 CITATION = (
     "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "

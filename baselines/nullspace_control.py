@@ -27,7 +27,7 @@ import numpy as np
 from coartic import Movement, Task
 from coartic.baselines.cascade import Cascade
 from coartic.method import Session
-from coartic.movement import follow
+from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions
 
 FACES = 16

@@ -59,10 +59,10 @@ from coartic.baselines.nullspace_control import (
     StuckError,
     UnfinishedError,
 )
-from coartic.initial import changes_of_hand, too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.motion.initial import changes_of_hand, too_many_sequences
 from coartic.robot import HANDS, Hand
-from coartic.task import LETTERS, MOST_GOALS, hands_of, letters_of
+from coartic.tasks.task import LETTERS, MOST_GOALS, hands_of, letters_of
 
 CITATION = (
     "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "

@@ -27,11 +27,11 @@ from coartic.baselines.trajectory_problem import (
     trajectory_problem,
 )
 from coartic.baselines.whole_ticks import Rounding, movements
-from coartic.corrective import correct
-from coartic.initial import hand_sequences, too_many_sequences
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.motion.corrective import correct
+from coartic.motion.initial import hand_sequences, too_many_sequences
 from coartic.robot import Array, Hand
-from coartic.task import hands_of, letters_of
+from coartic.tasks.task import hands_of, letters_of
 
 Start = tuple[tuple[Hand, ...], Array]
 MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution

@@ -45,10 +45,10 @@ from pydantic import Field
 
 from coartic import Movement, Task
 from coartic.baselines.posture_graph import cheapest_chains
-from coartic.compiled import entry, inner
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.motion.compiled import entry, inner
 from coartic.robot import BASE_DOF, Array, Hand, chain, lever
-from coartic.task import hands_of
+from coartic.tasks.task import hands_of
 
 Mask = NDArray[np.bool_]
 Hands = tuple[Hand, ...]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from coartic.method import MethodError, Session
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad

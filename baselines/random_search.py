@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic.baselines.uninformed import TOLD, Practice, UninformedParameters
-from coartic.dual_process import spend_search
-from coartic.initial import search_initial_hands
+from coartic.learner.method import spend_search
 from coartic.method import Information, Method, Result, Session
+from coartic.motion.initial import search_initial_hands
 from coartic.robot import Array
 
 _AHEAD = 128  # trials that are drawn before they are made, at most

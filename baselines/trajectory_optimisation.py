@@ -28,9 +28,9 @@ from coartic.baselines.trajectory_problem import (
 )
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.movement import follow
+from coartic.motion.movement import follow
 from coartic.robot import Array, Hand
-from coartic.task import hands_of, letters_of
+from coartic.tasks.task import hands_of, letters_of
 
 SAMPLES = 200  # points of a smooth path between goals; four times as many changed no reward
 

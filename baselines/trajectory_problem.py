@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.robot import HANDS, Array, Hand, Robot
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
 COSTS: tuple[Cost, ...] = ("path-length", "squared-changes", "acceleration", "jerk")

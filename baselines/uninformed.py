@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement, execute
-from coartic.learning import TRIALS
+from coartic.learner.learning import TRIALS
 from coartic.method import Information, MethodError, Parameters, Result, Session
+from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
-from coartic.task import hands_of
-from coartic.trials import make_trials
+from coartic.tasks.task import hands_of
 
 TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 

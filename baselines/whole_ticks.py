@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from coartic import MotionModel, Movement, Task
 from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
-from coartic.movement import move
+from coartic.motion.movement import move
 from coartic.robot import Array, Hand
 
 MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals

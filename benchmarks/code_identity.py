@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from coartic.benchmarks.declaration import Foreign, MethodFileError, brief
-from coartic.compiled import PACKAGE, model_files
 from coartic.inputs import read_bytes
+from coartic.motion.compiled import PACKAGE, model_files
 
 LARGEST_MODULE = 10_000_000
 """Bytes of a module that belongs to a method."""

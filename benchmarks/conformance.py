@@ -33,8 +33,8 @@ from coartic.benchmarks.reproduce import differences, perform_once
 from coartic.benchmarks.sandbox import Keeper, keeper
 from coartic.benchmarks.specification import Limits, RunSpec, Setting
 from coartic.method import METERED
-from coartic.record import Record
-from coartic.task import checked_task
+from coartic.runs.record import Record
+from coartic.tasks.task import checked_task
 from coartic.text import counted, plain
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick

@@ -22,7 +22,7 @@ from pydantic import Field, ValidationError
 from coartic import CoarticError, Task
 from coartic.inputs import problems_inline
 from coartic.method import Information, Method
-from coartic.stored import Plain, Values
+from coartic.runs.stored import Plain, Values
 from coartic.text import Line, plain
 
 

@@ -18,9 +18,9 @@ from coartic.benchmarks.store import Damage, Store
 from coartic.errors import IncompleteError
 from coartic.inputs import problems_inline
 from coartic.method import Information
-from coartic.record import SEARCH, SOLUTIONS, Environment, Record, Status, Timing
-from coartic.scores import MOST_MOVEMENTS, PlainMovement, Solved, Unscored, scored_together
-from coartic.stored import Plain, Reward, Spent, Values
+from coartic.runs.record import SEARCH, SOLUTIONS, Environment, Record, Status, Timing
+from coartic.runs.scores import MOST_MOVEMENTS, PlainMovement, Solved, Unscored, scored_together
+from coartic.runs.stored import Plain, Reward, Spent, Values
 from coartic.text import counted, plain
 
 Handed = Annotated[tuple[PlainMovement, ...], Field(max_length=MOST_MOVEMENTS)]
@@ -64,7 +64,7 @@ def perform_missing(
     """Perform every run that the store, which the caller has locked, has no good record of.
 
     A record is good where it is as it was written and agrees with itself
-    (:meth:`coartic.record.Record.check`). One that timed out under a shorter limit than now
+    (:meth:`coartic.runs.record.Record.check`). One that timed out under a shorter limit than now
     asked for is redone, and with ``retry_failed`` every timeout and crash is; ``redo`` performs
     everything anew. ``watch`` is called before the first run and after each. Raises CoarticError
     where records cannot be written or runs keep getting lost.

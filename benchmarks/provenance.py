@@ -17,8 +17,8 @@ from typing import Any
 import psutil
 
 import coartic
-from coartic.compiled import PACKAGE, source_fingerprint
-from coartic.record import Environment
+from coartic.motion.compiled import PACKAGE, source_fingerprint
+from coartic.runs.record import Environment
 from coartic.text import LONGEST_LINE, plain
 
 _LIBRARIES = (

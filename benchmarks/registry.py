@@ -18,7 +18,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from coartic import CoarticError, Task, record
+from coartic import CoarticError, Task
 from coartic.benchmarks.code_identity import built_in_code, foreign_code
 from coartic.benchmarks.declaration import (
     Declaration,
@@ -31,10 +31,11 @@ from coartic.benchmarks.declaration import (
 )
 from coartic.benchmarks.sandbox import Failure, Sandbox
 from coartic.inputs import problems_inline, read_text
-from coartic.learning import METHOD_PREFIX
+from coartic.learner.learning import METHOD_PREFIX
 from coartic.method import Method
-from coartic.record import SEARCH
-from coartic.stored import Values
+from coartic.runs import record
+from coartic.runs.record import SEARCH
+from coartic.runs.stored import Values
 from coartic.text import LONGEST_LINE, did_you_mean, plain
 
 ENTRY_POINTS = "coartic.methods"
@@ -43,7 +44,7 @@ RESERVED = (METHOD_PREFIX, SEARCH)
 QUESTION_LIMIT_S = 60.0
 """Seconds that a method which is not built in has to say what it is."""
 MODULES = (
-    "coartic.dual_process",
+    "coartic.learner.method",
     "coartic.baselines.corrective_alone",
     "coartic.baselines.random_search",
     "coartic.baselines.cma_es",

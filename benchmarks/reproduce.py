@@ -12,8 +12,8 @@ from coartic.benchmarks.registry import Registry, unknown
 from coartic.benchmarks.sandbox import supervise
 from coartic.benchmarks.specification import Limits, RunSpec, Setting
 from coartic.benchmarks.store import Store
-from coartic.packs import Packs, check_layout
-from coartic.record import Record, RecordError
+from coartic.runs.packs import Packs, check_layout
+from coartic.runs.record import Record, RecordError
 
 
 def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:

@@ -39,10 +39,10 @@ from coartic.benchmarks.tables import (
 )
 from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
-from coartic.packs import Chosen, Packs
-from coartic.readings import ChosenReading, load_readings
-from coartic.record import Record
-from coartic.tables import Manifest
+from coartic.runs.packs import Chosen, Packs
+from coartic.runs.record import Record
+from coartic.runs.tables import Manifest
+from coartic.tasks.readings import ChosenReading, load_readings
 from coartic.text import counted
 
 

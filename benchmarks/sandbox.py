@@ -28,7 +28,7 @@ import psutil
 
 from coartic.benchmarks.guard import THREADS, end, end_below
 from coartic.errors import CoarticError
-from coartic.learning import METHOD_PREFIX
+from coartic.learner.learning import METHOD_PREFIX
 from coartic.text import plain
 
 MARK = "COARTIC_SANDBOX"

@@ -25,8 +25,8 @@ from coartic.baselines.optimum import DynamicProgramming
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.trajectory_optimisation import METHODS as PLANNERS
 from coartic.baselines.trajectory_optimisation import TrajectoryParameters
-from coartic.initial import initial_hands
 from coartic.method import Method, MethodError, Session
+from coartic.motion.initial import initial_hands
 
 EVERY = 256  # hand sequences of the eight goals that tasks have at most
 BEAM = TrajectoryParameters().most_sequences

@@ -11,7 +11,7 @@ from coartic import PAPER, MotionModel, Task
 from coartic.benchmarks.code_identity import built_in_sources
 from coartic.benchmarks.provenance import command
 from coartic.benchmarks.registry import MODULE_OF, Entry
-from coartic.record import RECORD_FORMAT, Asked, Specification
+from coartic.runs.record import RECORD_FORMAT, Asked, Specification
 
 
 @dataclass(frozen=True)

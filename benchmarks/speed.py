@@ -22,16 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from coartic import CONDITIONS, Robot, Task, learn_many, load_task, parse_task, reference
+from coartic import CONDITIONS, Robot, Task, learn_many, load_task, parse_task
 from coartic.benchmarks.executors import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import plan_suite
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
-from coartic.compiled import addresses, entry, generator_at
-from coartic.exploration import ExplorationCondition
-from coartic.lanes import LANES, board, lanes_for, near, place
-from coartic.learner import rules_of
-from coartic.learning import METHOD_PREFIX, TRIALS, LearningRun, warm_up
+from coartic.learner.conditions import ExplorationCondition
+from coartic.learner.kernel import rules_of
+from coartic.learner.learning import METHOD_PREFIX, TRIALS, LearningRun, warm_up
+from coartic.motion import reference
+from coartic.motion.compiled import addresses, entry, generator_at
+from coartic.motion.lanes import LANES, board, lanes_for, near, place
 
 SLOW_TRIALS = 60
 GROWTH_TRIALS = 2_000
@@ -91,7 +92,7 @@ def main() -> None:
         for cell in select_cells(suite, registry())
     ]
     print("compiling, unless it was done before ...", flush=True)
-    warm_up()
+    warm_up(load_task("ascending"))
     for number in range(repeats):
         print(f"\nMeasurement {number + 1} of {repeats}, microseconds of processor time a trial:\n")
         _print_cells(suite, cells, trials)

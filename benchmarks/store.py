@@ -1,6 +1,7 @@
 """The run store: one immutable, checksummed record per run, in packs of what was done together.
 
-A pack (:mod:`coartic.packs`) is a text file. It is written to a temporary file, flushed to disk
+A pack (:mod:`coartic.runs.packs`) is a text file. It is
+written to a temporary file, flushed to disk
 and renamed, so its records are there whole or not at all. Nothing in a results folder is ever
 unpickled.
 """
@@ -17,10 +18,10 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from coartic import CoarticError
-from coartic.codec import encode
 from coartic.files import clear_leftovers, write_atomically
-from coartic.packs import Packs, check_layout, is_pack, number_of, packs_in
-from coartic.record import Record, RecordError, check_together, in_lots
+from coartic.runs.codec import encode
+from coartic.runs.packs import Packs, check_layout, is_pack, number_of, packs_in
+from coartic.runs.record import Record, RecordError, check_together, in_lots
 
 
 @dataclass(frozen=True)

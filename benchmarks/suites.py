@@ -33,7 +33,6 @@ from coartic import (
 from coartic.benchmarks.provenance import surroundings
 from coartic.benchmarks.registry import Entry, Registry, unknown
 from coartic.benchmarks.specification import UNLIMITED, Limits, RunSpec, Setting
-from coartic.families import named_by
 from coartic.inputs import (
     MOST_CELLS,
     MOST_PLANNED,
@@ -44,12 +43,10 @@ from coartic.inputs import (
     problems,
     read_toml,
 )
-from coartic.learning import METHOD_PREFIX
-from coartic.members import members, task_of
-from coartic.readings import ChosenReading, condition_under, model_under, task_under
-from coartic.record import run_seeds
+from coartic.learner.learning import METHOD_PREFIX
 from coartic.robot import Finite
-from coartic.tables import (
+from coartic.runs.record import run_seeds
+from coartic.runs.tables import (
     DeclaredMethod,
     Manifest,
     Plan,
@@ -59,7 +56,10 @@ from coartic.tables import (
     trials_in,
     variant_of,
 )
-from coartic.task import LONGEST_NAME, NAME_PATTERN, address_of, checked_task
+from coartic.tasks.families import named_by
+from coartic.tasks.members import members, task_of
+from coartic.tasks.readings import ChosenReading, condition_under, model_under, task_under
+from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of, checked_task
 from coartic.text import Line, plain
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -151,8 +151,8 @@ class _Block(BaseModel):
     def tasks_among(self, own: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
 
-        ``TASK-*`` are the members of a task (:mod:`coartic.members`), ``FAMILY/v1/i000..i039``
-        instances of a family (:mod:`coartic.families`).
+        ``TASK-*`` are the members of a task (:mod:`coartic.tasks.members`),
+        ``FAMILY/v1/i000..i039`` instances of a family (:mod:`coartic.tasks.families`).
         """
         every = [*builtin_tasks(), *own]
         names: dict[str, None] = {}

@@ -1,4 +1,4 @@
-"""Writes the tables of a results folder: what :mod:`coartic.tables` makes of its records."""
+"""Writes the tables of a results folder: what :mod:`coartic.runs.tables` makes of its records."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from coartic.benchmarks.store import Store
 from coartic.errors import CoarticError
 from coartic.files import check_folder, check_no_report, digest_of, holds, publish, temporary
 from coartic.inputs import read_bytes
-from coartic.packs import Packs
-from coartic.record import check_together, in_lots
-from coartic.tables import (
+from coartic.runs.packs import Packs
+from coartic.runs.record import check_together, in_lots
+from coartic.runs.tables import (
     LARGEST_MANIFEST,
     TABLES,
     Manifest,

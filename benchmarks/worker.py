@@ -33,7 +33,7 @@ from coartic.benchmarks.declaration import (
 from coartic.benchmarks.guard import THREADS
 from coartic.benchmarks.provenance import environment, process_peak_mb
 from coartic.errors import SolutionError
-from coartic.learning import warm_up
+from coartic.learner.learning import warm_up
 from coartic.method import (
     BudgetError,
     Information,
@@ -43,8 +43,8 @@ from coartic.method import (
     Session,
     UndeclaredError,
 )
-from coartic.record import SOLUTIONS
-from coartic.scores import PlainMovement
+from coartic.runs.record import SOLUTIONS
+from coartic.runs.scores import PlainMovement
 
 _solved_before: set[str] = set()
 

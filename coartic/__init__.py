@@ -9,18 +9,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coartic.corrective import Correction, correct
     from coartic.errors import CoarticError, NotApplicableError, TaskError
-    from coartic.exploration import CONDITIONS, VARIANTS, ExplorationCondition
-    from coartic.initial import corrective_trial, hand_sequences, initial_hands
-    from coartic.learning import Counters, LearningRun, learn, learn_many
+    from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
+    from coartic.learner.learning import Counters, LearningRun, learn, learn_many
+    from coartic.learner.rows import learning_table, runs_table, solutions_table
     from coartic.model import PAPER, MotionModel
-    from coartic.movement import MoveResult, move
+    from coartic.motion.corrective import Correction, correct
+    from coartic.motion.initial import corrective_trial, hand_sequences, initial_hands
+    from coartic.motion.movement import MoveResult, move
+    from coartic.motion.solution import Execution, Movement, execute
+    from coartic.motion.ticks import Trajectory, trajectory
     from coartic.robot import Arm, Hand, Robot
-    from coartic.rows import learning_table, runs_table, solutions_table
-    from coartic.solution import Execution, Movement, execute
-    from coartic.task import Provenance, Start, Task, builtin_tasks, load_task, parse_task
-    from coartic.ticks import Trajectory, trajectory
+    from coartic.tasks.catalogue import builtin_tasks, load_task
+    from coartic.tasks.task import Provenance, Start, Task, parse_task
 
 __version__ = "0.1.0"
 
@@ -64,18 +65,19 @@ __all__ = [
 ]
 
 _HOMES = {
-    "corrective": ("Correction", "correct"),
     "errors": ("CoarticError", "NotApplicableError", "TaskError"),
-    "exploration": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
-    "initial": ("corrective_trial", "hand_sequences", "initial_hands"),
-    "learning": ("Counters", "LearningRun", "learn", "learn_many"),
+    "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
+    "learner.learning": ("Counters", "LearningRun", "learn", "learn_many"),
+    "learner.rows": ("learning_table", "runs_table", "solutions_table"),
     "model": ("PAPER", "MotionModel"),
-    "movement": ("MoveResult", "move"),
+    "motion.corrective": ("Correction", "correct"),
+    "motion.initial": ("corrective_trial", "hand_sequences", "initial_hands"),
+    "motion.movement": ("MoveResult", "move"),
+    "motion.solution": ("Execution", "Movement", "execute"),
+    "motion.ticks": ("Trajectory", "trajectory"),
     "robot": ("Arm", "Hand", "Robot"),
-    "rows": ("learning_table", "runs_table", "solutions_table"),
-    "solution": ("Execution", "Movement", "execute"),
-    "task": ("Provenance", "Start", "Task", "builtin_tasks", "load_task", "parse_task"),
-    "ticks": ("Trajectory", "trajectory"),
+    "tasks.catalogue": ("builtin_tasks", "load_task"),
+    "tasks.task": ("Provenance", "Start", "Task", "parse_task"),
 }
 _HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
 

@@ -20,12 +20,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from coartic.corrective import Correction, correct
 from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
+from coartic.motion.corrective import Correction, correct
+from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import Array, Hand
-from coartic.solution import Execution, Movement, execute
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 
 class Information(StrEnum):

@@ -16,7 +16,7 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
-from coartic.families import Parts
+from coartic.tasks.families import Parts
 
 _IN_PARTS = get_args(Parts)[1]  # what reads a figure of a file into thousandths
 _SIMPLE = {bool: "`true` or `false`", int: "integer", float: "number", str: "text"}
@@ -142,9 +142,9 @@ def fields(module: str, owner: str, but: str = "") -> Iterator[str]:
 def parameters() -> Iterator[str]:
     """The parameters of every built-in method; methods that share them stand together."""
     from coartic.benchmarks.registry import CLASSES
-    from coartic.dual_process import DualProcessParameters
-    from coartic.exploration import ExplorationCondition
-    from coartic.readings import readings
+    from coartic.learner.conditions import ExplorationCondition
+    from coartic.learner.method import DualProcessParameters
+    from coartic.tasks.readings import readings
 
     condition = meanings_of(ExplorationCondition)
     open_questions = {
@@ -167,7 +167,7 @@ def parameters() -> Iterator[str]:
 
 def readings() -> Iterator[str]:
     """The open questions about the paper, with the choice made here and its alternatives."""
-    from coartic.readings import readings
+    from coartic.tasks.readings import readings
 
     for reading in readings():
         yield from (f"**`{reading.id}`** (`{reading.parameter}`). {reading.question}", "")

@@ -45,9 +45,10 @@ def session_folder(tmp_path_factory):
 def _kernels():
     """Compiled or loaded before the first test, on no test's clock; workers share the work."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        from coartic.learning import warm_up
+        from coartic import load_task
+        from coartic.learner.learning import warm_up
 
-        warm_up()
+        warm_up(load_task("ascending"))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -88,7 +88,7 @@ gc.disable()  # all is imported
 import coartic
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
 from coartic.benchmarks.worker import _method
-assert _method("dual-process/EC1", None, "coartic.dual_process").name == "dual-process/EC1"
+assert _method("dual-process/EC1", None, "coartic.learner.method").name == "dual-process/EC1"
 assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.registry"} & set(sys.modules)
 print("worker", flush=True)
 from coartic import *
@@ -126,7 +126,7 @@ def test_help_needs_no_compiler():
 
 def test_one_kinematic_module():
     """No cosine or sine is taken outside the robot and the functions handed to it."""
-    home = {"coartic/robot.py", "coartic/trigonometry.py"}
+    home = {"coartic/robot.py", "coartic/motion/trigonometry.py"}
     pattern = re.compile(r"\b(np|numpy|math|casadi|ca|cs)\.(cos|sin|tan|exp)\(|\b(cosine|sine)\(")
     for path in sources():
         if path.relative_to(ROOT).as_posix() not in home:

@@ -13,10 +13,10 @@ from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.relaxation import Multipliers, Relaxation, _normals, _support
 from coartic.baselines.whole_ticks import mergeable
-from coartic.initial import hand_sequences
+from coartic.motion.initial import hand_sequences
+from coartic.motion.solution import Movement
 from coartic.robot import directions
-from coartic.solution import Movement
-from coartic.task import hands_of
+from coartic.tasks.task import hands_of
 from tests.support.strategies import changed
 
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]

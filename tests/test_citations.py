@@ -15,7 +15,7 @@ from coartic.analysis.results.laws import read_manifest
 from coartic.analysis.signatures.register import REGISTER
 from coartic.benchmarks.registry import BUILT_IN, registry
 from coartic.benchmarks.suites import Cell
-from coartic.record import Commit
+from coartic.runs.record import Commit
 from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
 

@@ -13,7 +13,7 @@ import pytest
 from coartic import __version__
 from coartic.benchmarks import executors
 from coartic.benchmarks.store import Store
-from coartic.record import run_seeds
+from coartic.runs.record import run_seeds
 from tests.support.bad_inputs import GOOD
 from tests.support.commands import call
 from tests.support.suites import BROKEN, ROOT, InProcess

@@ -12,12 +12,12 @@ import pytest
 from filelock import FileLock
 from numba import njit, types
 
-from coartic import compiled
+from coartic.motion import compiled
 from tests.support.forks import apart, forget
 
 ROOT = Path(__file__).parent.parent
 KERNEL = """
-from coartic.compiled import entry, joint_lever
+from coartic.motion.compiled import entry, joint_lever
 
 @entry
 def across(xs, ys):

@@ -13,7 +13,7 @@ from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.specification import RunSpec
-from coartic.task import TASK_FOLDER
+from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
 from tests.support.suites import InProcess, ask_here, performed, spec_of

@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from coartic import PAPER, MotionModel, Robot, correct, reference
-from coartic.compiled import entry, joint_chain, joint_lever
-from coartic.corrective import shift_kernel
-from coartic.movement import Goal, largest_square, scratch_for
+from coartic import PAPER, MotionModel, Robot, correct
+from coartic.motion import reference
+from coartic.motion.compiled import entry, joint_chain, joint_lever
+from coartic.motion.corrective import shift_kernel
+from coartic.motion.movement import Goal, largest_square, scratch_for
 from coartic.robot import HANDS
 from tests.support.strategies import UNEVEN, configurations
 

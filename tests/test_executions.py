@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from coartic import CONDITIONS, PAPER, learn_many, load_task
-from coartic import scores as scores_module
 from coartic.errors import CoarticError
-from coartic.scores import MANY, MOST_STEPS, PlainMovement, Solved, scored_together, solved
+from coartic.runs import scores as scores_module
+from coartic.runs.scores import MANY, MOST_STEPS, PlainMovement, Solved, scored_together, solved
 
 CELLS = [
     ("ascending", "EC1"),

@@ -11,10 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import coartic.families
+import coartic.tasks.families
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task, parse_task
 from coartic.benchmarks.run import Selection, plan_suite, run_suite
-from coartic.families import (
+from coartic.inputs import MOST_CELLS
+from coartic.runs.tables import RUNS
+from coartic.tasks.families import (
     CORRECTIVE,
     FAMILY_FOLDER,
     RULES,
@@ -32,9 +34,7 @@ from coartic.families import (
     task_hash,
     task_text,
 )
-from coartic.inputs import MOST_CELLS
-from coartic.tables import RUNS
-from coartic.task import Address, address_of
+from coartic.tasks.task import Address, address_of
 from tests.support.commands import call
 from tests.support.suites import KNOWN, ROOT, suite_of
 
@@ -127,8 +127,10 @@ def test_a_family_is_there_whatever_another_file_holds(tmp_path, monkeypatch):
     broken.write_text("x = [", encoding="utf-8")
     shipped = read_family(FAMILY_FOLDER / "two-armed.v1.toml")
     (tmp_path / "two-armed.v1.toml").write_bytes((FAMILY_FOLDER / "two-armed.v1.toml").read_bytes())
-    monkeypatch.setattr(coartic.families, "FAMILY_FOLDER", tmp_path)
-    monkeypatch.setattr(coartic.families, "_shipped", coartic.families._shipped.__wrapped__)
+    monkeypatch.setattr(coartic.tasks.families, "FAMILY_FOLDER", tmp_path)
+    monkeypatch.setattr(
+        coartic.tasks.families, "_shipped", coartic.tasks.families._shipped.__wrapped__
+    )
     assert load_family("two-armed/v1") == shipped
     with pytest.raises(TaskError, match="broken.v1.toml: is not valid TOML"):
         load_family("broken")
@@ -415,7 +417,7 @@ def test_a_family_that_cannot_be_is_refused(tmp_path, changes, words):
 
 
 def test_a_family_that_cannot_be_met_ends(monkeypatch):
-    monkeypatch.setattr("coartic.families.MOST_ATTEMPTS", 20)
+    monkeypatch.setattr("coartic.tasks.families.MOST_ATTEMPTS", 20)
     monkeypatch.setitem(RULES, "overlap", lambda candidate: True)
     drawn.cache_clear()
     with pytest.raises(TaskError, match="20 draws of family 'two-armed/v1' broke a rule, 20 of"):
@@ -427,7 +429,7 @@ def test_draws_follow_version_and_number(monkeypatch):
     """What an instance takes its numbers from, and nothing else."""
     asked = []
     monkeypatch.setattr(
-        "coartic.families.Draws", lambda *given: asked.append(given) or Draws(*given)
+        "coartic.tasks.families.Draws", lambda *given: asked.append(given) or Draws(*given)
     )
     candidate_of(Address("long/v1", "2027-", 41), 3)
     key = hashlib.sha256(b"coartic long/v1/2027-").digest()[:8]

@@ -29,7 +29,7 @@ from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.register import signatures
 from coartic.analysis.study import Study
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.rows import movements_from
+from coartic.learner.rows import movements_from
 from tests.support.suites import KNOWN, run_and_write
 
 

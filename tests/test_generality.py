@@ -14,7 +14,7 @@ from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.results.folder import Results
 from coartic.analysis.results.optima import KnownOptimum
-from coartic.families import names_in
+from coartic.tasks.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")

@@ -38,12 +38,12 @@ from coartic.benchmarks.suites import (
 )
 from coartic.benchmarks.tables import write_tables
 from coartic.benchmarks.worker import ForeignCodeError, perform
-from coartic.initial import ranked_sequences
 from coartic.inputs import MOST_PLANNED
+from coartic.learner.rows import movements_from
 from coartic.method import Information, Parameters, Session
-from coartic.record import run_seeds
-from coartic.rows import movements_from
-from coartic.tables import FORMAT, RUNS
+from coartic.motion.initial import ranked_sequences
+from coartic.runs.record import run_seeds
+from coartic.runs.tables import FORMAT, RUNS
 from tests.support.strategies import as_released, tiny_task
 from tests.support.suites import (
     KNOWN,

@@ -14,11 +14,11 @@ from coartic.benchmarks.sandbox import failure
 from coartic.benchmarks.specification import Limits
 from coartic.benchmarks.store import Store
 from coartic.benchmarks.suites import Cell
-from coartic.compiled import entry
-from coartic.corrective import _errors
-from coartic.lanes import LANES, board, lanes_for, near, place
-from coartic.movement import Goal
-from coartic.trigonometry import LARGEST
+from coartic.motion.compiled import entry
+from coartic.motion.corrective import _errors
+from coartic.motion.lanes import LANES, board, lanes_for, near, place
+from coartic.motion.movement import Goal
+from coartic.motion.trigonometry import LARGEST
 from tests.support.strategies import UNEVEN
 from tests.support.suites import KNOWN, InProcess, paper_cells, run_specs
 

@@ -22,12 +22,12 @@ from coartic import (
     learn_many,
     load_task,
     parse_task,
-    reference,
 )
-from coartic.learning import TRIALS
+from coartic.learner.learning import TRIALS
 from coartic.model import PAPER
+from coartic.motion import reference
+from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
-from coartic.trials import make_trials
 from tests.support.strategies import PAPER_CELLS, tiny_task, uneven_task
 
 

@@ -20,8 +20,8 @@ from coartic.analysis.reconstruction.specifications import (
 from coartic.analysis.results.folder import Results
 from coartic.analysis.study import Study
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.members import members, members_file, task_of, with_members
-from coartic.tables import DeclaredMethod
+from coartic.runs.tables import DeclaredMethod
+from coartic.tasks.members import members, members_file, task_of, with_members
 from tests.support.made_up import manifest_for, replanned, row
 from tests.support.suites import KNOWN
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from coartic import PAPER, MotionModel, Robot, move, reference
-from coartic.compiled import entry, joint_chain
-from coartic.movement import clear_steps, follow
+from coartic import PAPER, MotionModel, Robot, move
+from coartic.motion import reference
+from coartic.motion.compiled import entry, joint_chain
+from coartic.motion.movement import clear_steps, follow
 from coartic.robot import HANDS
 from tests.support.strategies import UNEVEN, configurations
 

@@ -12,10 +12,10 @@ from coartic.analysis.results import optima
 from coartic.analysis.results.folder import Results
 from coartic.analysis.results.optima import ShippedOptimum, collect, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
+from coartic.learner.rows import movement_rows, movements_from
 from coartic.method import MethodError, Session
-from coartic.rows import movement_rows, movements_from
-from coartic.solution import other_arm_travel
-from coartic.task import hands_of
+from coartic.motion.solution import other_arm_travel
+from coartic.tasks.task import hands_of
 from tests.support.made_up import manifest_for
 from tests.support.strategies import changed
 

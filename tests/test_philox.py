@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coartic import families, philox
-from coartic.philox import Draws, key_of, philox4x32
+from coartic.tasks import families, philox
+from coartic.tasks.philox import Draws, key_of, philox4x32
 
 ONES = 0xFFFFFFFF
 # Of the authors' file of known answers (Random123, kat_vectors: philox4x32 10).

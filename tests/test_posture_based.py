@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from coartic import execute, load_task
 from coartic.baselines.posture_based import OneGoal, TwoGoals
 from coartic.method import MethodError, Session
-from coartic.task import letters_of
+from coartic.tasks.task import letters_of
 from tests.support.strategies import tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
@@ -232,7 +232,7 @@ def test_what_is_planned_is_what_happens(goals, locked, method, seed):
     A movement is planned from where the planner has the one before it end. Its points are
     those of the executor's formula, computed in another order
     (``coartic.baselines.posture_based``,
-    ``coartic.movement``), so that they may differ in the last digit.
+    ``coartic.motion.movement``), so that they may differ in the last digit.
     """
     if locked == ["x"]:
         goals = [(x / 3, y) for x, y in goals]

@@ -28,9 +28,9 @@ from coartic.analysis.printed import (
     parse_entries,
 )
 from coartic.analysis.published import RUNS, TRIALS
-from coartic.exploration import CONDITIONS
-from coartic.readings import readings
-from coartic.task import builtin_tasks
+from coartic.learner.conditions import CONDITIONS
+from coartic.tasks.readings import readings
+from coartic.tasks.task import builtin_tasks
 
 TASKS = list(builtin_tasks())
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from coartic import Movement, corrective_trial, learn, reference, trajectory
+from coartic import Movement, corrective_trial, learn, trajectory
 from coartic.errors import CoarticError, TaskError
-from coartic.exploration import (
+from coartic.learner.conditions import (
     CONDITIONS,
     ExplorationCondition,
     FirstTrial,
@@ -19,8 +19,11 @@ from coartic.exploration import (
     UnknownTarget,
 )
 from coartic.model import PAPER, checked_model
-from coartic.movement import follow, path_points
-from coartic.readings import (
+from coartic.motion import reference
+from coartic.motion.movement import follow, path_points
+from coartic.robot import HANDS, Robot
+from coartic.tasks.catalogue import builtin_tasks, load_task
+from coartic.tasks.readings import (
     Reading,
     condition_under,
     load_reading,
@@ -29,8 +32,7 @@ from coartic.readings import (
     readings,
     task_under,
 )
-from coartic.robot import HANDS, Robot
-from coartic.task import builtin_tasks, checked_task, load_task
+from coartic.tasks.task import checked_task
 from tests.support.strategies import tiny_task, uneven_task
 
 APPLIED = {

@@ -45,7 +45,7 @@ from coartic.analysis.reconstruction.scoring import (
 )
 from coartic.analysis.reconstruction.search import Search
 from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
-from coartic.sequences import CorrectiveTrials, corrective_trials
+from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
 NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])

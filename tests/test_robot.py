@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from coartic.compiled import entry, joint_chain, joint_lever
+from coartic.motion.compiled import entry, joint_chain, joint_lever
 from coartic.robot import HANDS, Robot
 from tests.support import strategies
 from tests.support.strategies import UNEVEN

@@ -47,8 +47,8 @@ from coartic.analysis.signatures.subtasks import (
 from coartic.analysis.statistics import intervals
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from, entropy
-from coartic.rows import movement_rows
-from coartic.solution import other_arm_travel
+from coartic.learner.rows import movement_rows
+from coartic.motion.solution import other_arm_travel
 from tests.support.made_up import manifest_for
 from tests.support.strategies import as_released, changed, tiny_task
 

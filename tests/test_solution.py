@@ -12,11 +12,11 @@ from coartic import (
     hand_sequences,
     learn_many,
     load_task,
-    reference,
 )
 from coartic.errors import SolutionError
-from coartic.exploration import load_condition
-from coartic.scores import MOST_STEPS, solved
+from coartic.learner.conditions import load_condition
+from coartic.motion import reference
+from coartic.runs.scores import MOST_STEPS, solved
 from tests.support.strategies import PAPER_CELLS, tiny_task
 
 

@@ -12,10 +12,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from coartic import CoarticError, codec, files
+from coartic import CoarticError, files
 from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.specification import Limits
 from coartic.benchmarks.store import Damage, RecordError, Store
+from coartic.runs import codec
 from tests.support.packs import (
     pack_lines,
     packs_of,

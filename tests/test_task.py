@@ -16,7 +16,7 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.task import TASK_FOLDER, parse_task
+from coartic.tasks.task import TASK_FOLDER, parse_task
 from tests.support.bad_inputs import GOOD, TASKS
 from tests.support.strategies import tiny_task
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coartic import MotionModel, Movement, corrective_trial, execute, hand_sequences, load_task
-from coartic.task import builtin_tasks, hands_of
-from coartic.trials import make_trials
+from coartic.motion.trials import make_trials
+from coartic.tasks.task import builtin_tasks, hands_of
 from tests.support.strategies import tiny_task, uneven_task
 
 TASKS = [

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from coartic import trigonometry
-from coartic.trigonometry import LARGEST, cosine, sine
+from coartic.motion import trigonometry
+from coartic.motion.trigonometry import LARGEST, cosine, sine
 
 
 @njit

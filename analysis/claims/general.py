@@ -21,9 +21,9 @@ from coartic.analysis.signatures.manifold import movable
 from coartic.analysis.signatures.subtasks import postures_before
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.words import number
-from coartic.learner import PARTS
+from coartic.learner.kernel import PARTS
 from coartic.robot import Array, Robot
-from coartic.task import hands_of
+from coartic.tasks.task import hands_of
 
 STARTS = 8
 """Random starts of the search beside the given one."""

@@ -14,8 +14,8 @@ from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import tally
 from coartic.method import Information
-from coartic.record import SEARCH
 from coartic.robot import Array
+from coartic.runs.record import SEARCH
 
 TOLD = {
     Information.GOALS: "G",

@@ -39,7 +39,7 @@ from coartic.analysis.statistics.hypotheses import (
     sign_flip_test,
 )
 from coartic.analysis.study import Study, cached
-from coartic.exploration import CONDITIONS
+from coartic.learner.conditions import CONDITIONS
 from coartic.robot import Array
 
 COLUMNS = (

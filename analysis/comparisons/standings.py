@@ -31,7 +31,7 @@ from coartic.analysis.statistics.across_tasks import gap_share, task_mean
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED, mean
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached
-from coartic.initial import initial_hands
+from coartic.motion.initial import initial_hands
 from coartic.robot import Array
 
 ALL_TASKS = "all tasks"

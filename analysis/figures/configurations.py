@@ -22,7 +22,7 @@ from coartic.analysis.methods import CONDITIONS, name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import number
 from coartic.robot import Array
-from coartic.task import hands_of
+from coartic.tasks.task import hands_of
 
 Rows = Sequence[tuple[str, Sequence[str]]]
 PAPER: dict[str, tuple[str, Rows]] = {

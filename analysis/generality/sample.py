@@ -13,8 +13,8 @@ from coartic.analysis.results.optima import locks_base
 from coartic.analysis.statistics.across_tasks import gap_share
 from coartic.analysis.statistics.instances import Runs, Scores
 from coartic.analysis.study import Study, cached
-from coartic.record import SEARCH
 from coartic.robot import Array
+from coartic.runs.record import SEARCH
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import MotionModel, Task
+from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 from coartic.robot import Array
-from coartic.sequences import CorrectiveTrials, corrective_trials
 
 Flags = NDArray[np.bool_]
 _BLOCK = 500  # sets of goals a thread is given at once

@@ -20,7 +20,7 @@ from coartic.analysis import printed
 from coartic.analysis.reconstruction.likelihood import Likelihood, likelihoods, of_gain, together
 from coartic.analysis.reconstruction.scoring import Figure, Learned, learned
 from coartic.analysis.reconstruction.targets import conditions_of, tests_of
-from coartic.readings import (
+from coartic.tasks.readings import (
     ChosenReading,
     condition_under,
     load_readings,

@@ -13,8 +13,8 @@ from coartic.analysis.reconstruction.constraints import RewardIs, sequences_of, 
 from coartic.analysis.reconstruction.scoring import Compared, Figure, Learned, compared, learned
 from coartic.analysis.reconstruction.targets import conditions_of, constraints_of, tests_of
 from coartic.analysis.statistics import equivalence
-from coartic.members import task_of
-from coartic.readings import condition_under, load_readings, model_under, task_under
+from coartic.tasks.members import task_of
+from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
 
 SHARES = 0.25
 """Margin of shares of runs."""

@@ -28,8 +28,8 @@ from coartic.analysis.reconstruction.waves import (
     described,
     scored,
 )
-from coartic.readings import load_readings, task_under
 from coartic.robot import Array
+from coartic.tasks.readings import load_readings, task_under
 from coartic.text import did_you_mean
 
 _MOST_NEAR = 20_000  # points of the grid, drawn at random, that are moved into the region

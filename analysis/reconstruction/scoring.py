@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from coartic import PAPER, MotionModel, Task, learn_many
-from coartic.exploration import ExplorationCondition
+from coartic.learner.conditions import ExplorationCondition
 
 
 class Learned(NamedTuple):

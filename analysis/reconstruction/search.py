@@ -22,8 +22,8 @@ from coartic.analysis.reconstruction.constraints import (
     try_sequences,
 )
 from coartic.analysis.reconstruction.layout import Layout
-from coartic.readings import ChosenReading, model_under
 from coartic.robot import Array
+from coartic.tasks.readings import ChosenReading, model_under
 
 _DIFFERENCE = 0.1  # of the finite differences: rewards are whole ticks, some 100 a length unit
 _STEPS = 12

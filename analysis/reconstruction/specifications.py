@@ -23,9 +23,9 @@ from coartic.analysis.reconstruction.constraints import sequences_of, try_sequen
 from coartic.analysis.reconstruction.reconstruct import search_for
 from coartic.analysis.results.folder import Results
 from coartic.analysis.study import Study
-from coartic.members import task_of, with_members
-from coartic.readings import condition_under, load_readings
-from coartic.tables import variant_of
+from coartic.runs.tables import variant_of
+from coartic.tasks.members import task_of, with_members
+from coartic.tasks.readings import condition_under, load_readings
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
 PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)

@@ -27,8 +27,8 @@ from coartic.analysis.reconstruction.scoring import (
 )
 from coartic.analysis.reconstruction.search import Search
 from coartic.analysis.reconstruction.targets import conditions_of, tests_of
-from coartic.readings import condition_under
 from coartic.robot import Array
+from coartic.tasks.readings import condition_under
 
 _SEEDS = 1_000_000  # of a wave begin at a multiple of this
 ENSEMBLE, LAST = 0, 99

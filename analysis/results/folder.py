@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from coartic import CoarticError, Task, parse_task
 from coartic.analysis.results.laws import check_tables, read_manifest
 from coartic.robot import Array
-from coartic.tables import Manifest, label_of
+from coartic.runs.tables import Manifest, label_of
 
 CellKey = tuple[str, str]
 """Name of a task, and label of a method: its name with its variant."""

@@ -21,9 +21,9 @@ from pydantic import ValidationError
 from coartic import CoarticError, parse_task
 from coartic.files import digest_of
 from coartic.inputs import open_regular, problems_inline, read_bytes
-from coartic.packs import Packs, check_layout
-from coartic.record import BUILT_IN, Record, RecordError, check_together, in_lots
-from coartic.tables import (
+from coartic.runs.packs import Packs, check_layout
+from coartic.runs.record import BUILT_IN, Record, RecordError, check_together, in_lots
+from coartic.runs.tables import (
     FORMAT,
     LARGEST_MANIFEST,
     DeclaredMethod,

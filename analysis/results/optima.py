@@ -24,8 +24,8 @@ from coartic import PAPER, CoarticError, Task
 from coartic.analysis.results.folder import Results, load_results
 from coartic.analysis.results.laws import BASE
 from coartic.files import write_atomically
-from coartic.record import SEARCH
-from coartic.tables import label_of
+from coartic.runs.record import SEARCH
+from coartic.runs.tables import label_of
 from coartic.text import one_line
 
 DATA = Path(__file__).with_name("optima.json")
@@ -58,7 +58,7 @@ class ShippedOptimum(BaseModel):
     searches: dict[str, int] = {}
     """Reward that each search found, by method."""
     solution: tuple[dict[str, Any], ...] = ()
-    """Movements as :func:`coartic.rows.movements_from` reads them, in full precision."""
+    """Movements as :func:`coartic.learner.rows.movements_from` reads them, in full precision."""
     infeasible: str = ""
     """Why no search has a solution."""
 

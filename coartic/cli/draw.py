@@ -33,8 +33,8 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.families import named_by, task_text
     from coartic.files import check_outputs, publish, write_outputs
+    from coartic.tasks.families import named_by, task_text
 
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]

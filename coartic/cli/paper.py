@@ -48,7 +48,7 @@ def readings(
 
     A reading is judged by the results that the paper prints of the one-armed tasks.
     """
-    from coartic.readings import readings as known
+    from coartic.tasks.readings import readings as known
 
     if judge is None:
         for reading in known():

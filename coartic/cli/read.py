@@ -145,7 +145,7 @@ def cite(
     """Print what to cite, as BibTeX."""
     from coartic.analysis.citations import MethodSource, bibliography
     from coartic.benchmarks.registry import CLASSES
-    from coartic.record import BUILT_IN
+    from coartic.runs.record import BUILT_IN
 
     environment = None
     if folder is None:

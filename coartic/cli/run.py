@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from coartic.benchmarks.registry import Entry, Registry
     from coartic.benchmarks.run import RunReport
     from coartic.cli.terminal import Display
-    from coartic.record import Record
+    from coartic.runs.record import Record
 
 
 def run(
@@ -105,7 +105,7 @@ def _everything(known: Registry) -> Iterator[tuple[str, str]]:
     """One screen: names of tasks and methods, suites with what they are for."""
     from coartic import builtin_tasks
     from coartic.benchmarks.suites import suites
-    from coartic.families import families
+    from coartic.tasks.families import families
 
     yield "Tasks", ", ".join(builtin_tasks())
     yield "Families", ", ".join(families())
@@ -129,7 +129,7 @@ def _details(name: str, known: Registry) -> Iterator[tuple[str, str]]:
     """
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import methods_named, suites
-    from coartic.families import families
+    from coartic.tasks.families import families
 
     if name in suites():
         suite = suites()[name]
@@ -167,7 +167,7 @@ def _details(name: str, known: Registry) -> Iterator[tuple[str, str]]:
 
 def _method_details(entry: Entry) -> Iterator[tuple[str, str]]:
     from coartic import builtin_tasks, load_task
-    from coartic.readings import readings
+    from coartic.tasks.readings import readings
 
     declared = entry.declared
     read = {each.field for each in readings()}

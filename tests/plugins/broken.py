@@ -7,7 +7,7 @@ import time
 from pydantic import ConfigDict
 
 from coartic.method import Information, Method, Parameters, Result
-from coartic.solution import Movement
+from coartic.motion.solution import Movement
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
 COUNTER = itertools.count()
@@ -304,10 +304,10 @@ class Stepper(Good):
 
     def solve(self, session):
         import coartic.benchmarks.harness
-        import coartic.scores
+        import coartic.runs.scores
 
         session.model = session.model._replace(step=1.0)
-        coartic.benchmarks.harness.solved = coartic.scores.solved = None
+        coartic.benchmarks.harness.solved = coartic.runs.scores.solved = None
         return Result(by_correction(session))
 
 

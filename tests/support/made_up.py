@@ -8,8 +8,8 @@ from coartic import load_task
 from coartic.analysis.results.folder import Results
 from coartic.analysis.results.optima import KnownOptimum
 from coartic.analysis.study import Study
-from coartic.record import Commit, Environment
-from coartic.tables import Manifest, Plan, PlanLimits, PlannedCell
+from coartic.runs.record import Commit, Environment
+from coartic.runs.tables import Manifest, Plan, PlanLimits, PlannedCell
 
 
 class MadeUp(Study):

@@ -192,7 +192,8 @@ def main():
     for module in sys.argv[2:]:
         importlib.import_module(module)
     if "coartic.benchmarks.worker" in sys.argv:
-        sys.modules["coartic.learning"].warm_up()
+        coartic = sys.modules["coartic"]
+        sys.modules["coartic.learner.learning"].warm_up(coartic.load_task("ascending"))
     gc.freeze()
     with socket.socket(fileno=int(sys.argv[1])) as line:
         while True:

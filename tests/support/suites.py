@@ -16,7 +16,7 @@ from coartic.benchmarks.sandbox import failure
 from coartic.benchmarks.specification import Limits
 from coartic.benchmarks.suites import Cell, cell_plans, load_suite, select_cells
 from coartic.benchmarks.worker import answer, perform
-from coartic.tables import TIMINGS
+from coartic.runs.tables import TIMINGS
 
 ROOT = Path(__file__).parents[2]
 

@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from coartic.method import Information, Method, Parameters, Result, Session
-from coartic.solution import Movement
+from coartic.motion.solution import Movement
 
 
 class NearestHandParameters(Parameters):

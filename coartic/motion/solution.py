@@ -1,7 +1,7 @@
 """Solutions, and the one function that executes and scores them.
 
 A solution is a list of movements, at least one per goal. :func:`execute` makes them
-from the task's start under the rules of :mod:`coartic.movement`, pays every tick,
+from the task's start under the rules of :mod:`coartic.motion.movement`, pays every tick,
 and has the corrective process finish any goal that they miss. Whatever a method
 says of its own solution, its score is what comes out here.
 """
@@ -15,12 +15,12 @@ from typing import Literal
 
 import numpy as np
 
-from coartic.corrective import correct
 from coartic.errors import LOADED, SolutionError, need
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import MoveResult, configuration, follow, move
+from coartic.motion.corrective import correct
+from coartic.motion.movement import MoveResult, configuration, follow, move
 from coartic.robot import Array, Hand
-from coartic.task import Task, letters_of
+from coartic.tasks.task import Task, letters_of
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value, read_toml
 from coartic.model import PAPER, MotionModel
-from coartic.task import Task, parse_task
+from coartic.tasks.task import Task, parse_task
 from coartic.text import did_you_mean
 
 Part = Literal["model", "condition", "robot"]

@@ -3,7 +3,7 @@
 A family is a file, ``families/NAME.vN.toml``: how many goals, where, for which hands, arms and
 base, from which start; once released, it is not changed, and a change is a new version. An
 instance is a task by the name ``two-armed/v1/i017``, and a function of this name alone: numbers
-come from a counter-based generator (:mod:`coartic.philox`) whose key is the hash of family,
+come from a counter-based generator (:mod:`coartic.tasks.philox`) whose key is the hash of family,
 version and stream and whose counter is the number of the instance. Streams are ``d`` (development:
 to tune on), ``i`` (test: to report on) and years (``2027-``: fresh ones).
 
@@ -11,7 +11,7 @@ What is drawn once is the structure: how many goals and links, the base, the kin
 and angles are drawn again until no rule of :data:`RULES` is broken, so that rejection leaves the
 shares of structures alone. They are whole thousandths from the start. Geometric rules compare
 integers; the others ask the compiled kernels, which use IEEE arithmetic alone
-(:mod:`coartic.trigonometry`): no rejection depends on a machine's library.
+(:mod:`coartic.motion.trigonometry`): no rejection depends on a machine's library.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from coartic.errors import NotApplicableError, TaskError
 from coartic.inputs import MOST_CELLS, problems, read_toml
 from coartic.model import PAPER
-from coartic.philox import Draws, key_of
 from coartic.robot import HANDS, Hand, Robot
-from coartic.task import (
+from coartic.tasks.philox import Draws, key_of
+from coartic.tasks.task import (
     INITIAL_POLICIES,
     Address,
     InitialPolicy,
@@ -285,7 +285,7 @@ def _out_of_reach(candidate: Candidate) -> bool:
 
 
 def _starts_in_goal(candidate: Candidate) -> bool:
-    from coartic.movement import move
+    from coartic.motion.movement import move
 
     task, family = candidate.task(), candidate.family
     near = (family.radius + family.clear) / _PARTS
@@ -332,7 +332,7 @@ def judged(candidate: Candidate) -> tuple[str | None, str]:
 
 def _initial_hands(candidate: Candidate) -> str | None:
     """With which the corrective process does the task under every restriction, or None."""
-    from coartic.initial import corrective_trial, initial_hands
+    from coartic.motion.initial import corrective_trial, initial_hands
 
     try:
         hands = initial_hands(candidate.task(), model=PAPER)

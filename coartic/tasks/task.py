@@ -1,6 +1,6 @@
 """Tasks: a start, a sequence of goals, and what is known about each figure.
 
-A task is read from a TOML file, one of those shipped in ``coartic/tasks`` or the
+A task is read from a TOML file, one of those shipped in ``paper`` or the
 user's own in the same form. Anything that cannot be right is refused with the file,
 the key and what would be right.
 """
@@ -34,7 +34,7 @@ from coartic.text import Line, did_you_mean
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
 LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
-TASK_FOLDER = Path(__file__).parent / "tasks"
+TASK_FOLDER = Path(__file__).parent / "paper"
 
 MOST_GOALS = 100
 LONGEST_NAME = 64
@@ -64,7 +64,7 @@ _SPLITS: dict[str, Split] = {"d": "development", "i": "test"}
 
 
 class Address(NamedTuple):
-    """Which instance of a family of random tasks (:mod:`coartic.families`) a task is."""
+    """Which instance of a family of random tasks (:mod:`coartic.tasks.families`) a task is."""
 
     family: str
     """With its version, as ``two-armed/v1``."""
@@ -289,49 +289,15 @@ def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
     return task
 
 
-def builtin_tasks() -> tuple[str, ...]:
-    """Names of the tasks shipped with the package, in the paper's order."""
-    return tuple(task.name for task in _shipped())
-
-
-def load_task(name_or_path: str | Path) -> Task:
-    """A shipped task, a member or an instance by name, or a task file by path.
-
-    Raises TaskError, naming the file and the key, where it cannot be used.
-    """
-    if isinstance(name_or_path, str) and not name_or_path.endswith(".toml"):
-        for task in _shipped():
-            if task.name == name_or_path:
-                return task
-        if "/" in name_or_path:
-            from coartic.families import instance  # made by what tasks are made for
-
-            return instance(name_or_path)
-        from coartic.members import members, task_of  # which are made from tasks
-
-        plain = task_of(name_or_path)
-        if plain is not None:
-            return members(plain)[name_or_path]
-        hint = did_you_mean(name_or_path, builtin_tasks()) or "."
-        raise TaskError(
-            f"unknown task {name_or_path!r}{hint} Shipped tasks: {', '.join(builtin_tasks())}. "
-            "A task file's name ends in .toml; an instance is written FAMILY/v1/i017."
-        )
-    task = _read(Path(name_or_path))
-    if "/" in task.name:
-        from coartic.families import check_instance
-
-        check_instance(task, str(name_or_path))
-    return task
+def read_task(path: Path) -> Task:
+    """The task of a file. Raises TaskError, naming the file and the key, where it is none."""
+    return parse_task(read_toml(path, error=TaskError), str(path))
 
 
 @cache
-def _shipped() -> tuple[Task, ...]:
-    return tuple(_read(path) for path in sorted(TASK_FOLDER.glob("*.toml")))
-
-
-def _read(path: Path) -> Task:
-    return parse_task(read_toml(path, error=TaskError), str(path))
+def shipped_tasks() -> dict[str, Task]:
+    """The tasks that come with the package by name, in the paper's order."""
+    return {task.name: task for task in map(read_task, sorted(TASK_FOLDER.glob("*.toml")))}
 
 
 def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> Task:

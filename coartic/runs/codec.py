@@ -18,8 +18,8 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from coartic.inputs import problems_inline
-from coartic.record import Asked, Common, Own, Record, RecordError
-from coartic.stored import Seed
+from coartic.runs.record import Asked, Common, Own, Record, RecordError
+from coartic.runs.stored import Seed
 
 FULL = 1 << 26
 """Bytes of lines in a pack beyond which another one is begun."""

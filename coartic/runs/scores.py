@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import Field
 
 from coartic.errors import CoarticError, IncompleteError, SolutionError
-from coartic.executions import Made, Straight, execute_straight
 from coartic.model import MotionModel
-from coartic.movement import configuration
+from coartic.motion.executions import Made, Straight, execute_straight
+from coartic.motion.movement import configuration
+from coartic.motion.solution import Execution, Kind, Movement, execute, other_arm_travel
 from coartic.robot import Hand
-from coartic.solution import Execution, Kind, Movement, execute, other_arm_travel
-from coartic.stored import Amount, Count, Itself, Plain, Reward
-from coartic.task import Task, hands_of, letters_of
+from coartic.runs.stored import Amount, Count, Itself, Plain, Reward
+from coartic.tasks.task import Task, hands_of, letters_of
 
 MOST_MOVEMENTS = 10_000
 """Movements of one solution."""
@@ -31,7 +31,7 @@ _REASONS = (CoarticError, ValueError, TypeError, OverflowError)
 
 
 class PlainMovement(Plain):
-    """A movement as it is stored; see :class:`coartic.solution.Movement`."""
+    """A movement as it is stored; see :class:`coartic.motion.solution.Movement`."""
 
     goal: Annotated[int, Field(ge=1)]
     hand: Hand
@@ -92,7 +92,7 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
     """Execute a solution apart from its method: the only score that counts.
 
     Raises SolutionError where it breaks the task's rules, IncompleteError where it does not
-    hit every goal, and what :func:`coartic.solution.execute` raises.
+    hit every goal, and what :func:`coartic.motion.solution.execute` raises.
     """
     if len(solution) > MOST_MOVEMENTS:
         raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
@@ -126,7 +126,7 @@ def scored_together(
     """:func:`scored` of many solutions of a task, in their order; what it raises in place of a
     score that cannot be had.
 
-    Many are executed side by side (:mod:`coartic.executions`), which gives the same.
+    Many are executed side by side (:mod:`coartic.motion.executions`), which gives the same.
     """
     whose = Itself(task)
     asked = [_Exact(b"".join(row.text() for row in rows), rows) for rows in solutions]

@@ -7,7 +7,7 @@ through the same state and hand replaces what is stored there; better by its who
 or, in a variant, by the return from that goal on.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
-trial (:mod:`coartic.learning` makes it). Each draws from a NumPy generator of its own
+trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy generator of its own
 (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
 ε, where hands are explored; a second one that picks a hand, where the first fell below ε
 and the pick is random, or where two hands are equal and ties are broken at random; one
@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import (
+from coartic.learner.conditions import ExplorationCondition
+from coartic.motion.compiled import (
     entry,
     fill_row,
     generator_at,
@@ -33,13 +34,12 @@ from coartic.compiled import (
     joint_chain,
     record_type,
 )
-from coartic.corrective import correct_lanes, shift_kernel
-from coartic.exploration import ExplorationCondition
-from coartic.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
-from coartic.movement import Scratch, move_lanes, scratch_for
-from coartic.problem import arm_of, goal_of
+from coartic.motion.corrective import correct_lanes, shift_kernel
+from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
+from coartic.motion.movement import Scratch, move_lanes, scratch_for
+from coartic.motion.problem import arm_of, goal_of
 from coartic.robot import HANDS
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 NO_HAND = 2  # ∅, the previous hand before goal 1
 LEARNED, CORRECTIVE = 0, 1

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 from coartic.errors import LOADED, NotApplicableError, need
 from coartic.model import PAPER, MotionModel
+from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import HANDS, Hand
-from coartic.solution import Execution, Movement, execute
-from coartic.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, hands_of, letters_of
 
 MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 

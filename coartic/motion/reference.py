@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.corrective import Correction
-from coartic.exploration import ExplorationCondition
-from coartic.initial import initial_hands
+from coartic.learner.conditions import ExplorationCondition
 from coartic.model import PAPER, MotionModel
-from coartic.movement import MoveResult
+from coartic.motion.corrective import Correction
+from coartic.motion.initial import initial_hands
+from coartic.motion.movement import MoveResult
 from coartic.robot import HANDS, Array, Hand, Robot
-from coartic.task import Task, hands_of
+from coartic.tasks.task import Task, hands_of
 
 State = tuple[int, Hand | None]
 
@@ -50,7 +50,7 @@ def move(
     stop_on_arrival: bool = True,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """:func:`coartic.movement.move`, visiting every step."""
+    """:func:`coartic.motion.movement.move`, visiting every step."""
     start, end = np.array(q), np.array(target)
     difference = end - start
     distance = math.sqrt(_sum_of_squares(difference))
@@ -79,7 +79,7 @@ def correct(
     nullspace_gain: float = 0.0,
     model: MotionModel = PAPER,
 ) -> Correction:
-    """:func:`coartic.corrective.correct`, with the Jacobian as a matrix."""
+    """:func:`coartic.motion.corrective.correct`, with the Jacobian as a matrix."""
     free = np.ones(robot.dof)
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
     start = np.array(q)
@@ -109,7 +109,7 @@ def learn(
     trials: int,
     model: MotionModel = PAPER,
 ) -> ReferenceRun:
-    """:func:`coartic.learning.learn`, after Figure 3 line by line."""
+    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line."""
     rng = np.random.default_rng(seed)
     first_hands = hands_of(initial_hands(task, condition.hands, model=model))
     values: dict[tuple[State, Hand], float] = {}

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import inlined, inner, lanewise, record_type
+from coartic.motion.compiled import inlined, inner, lanewise, record_type
+from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, Arm, Robot, chain
-from coartic.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 
 LANES = 72
 """Most lanes at once: they and their rows stay in the innermost cache."""

@@ -1,7 +1,7 @@
 """What the corrective process alone gives, for many sets of goals and hand sequences.
 
-The rules are those of :func:`coartic.initial.corrective_trial`. Meant for searches over where
-goals may be: what two trials begin with, goal and hand by goal and hand, is computed once
+The rules are those of :func:`coartic.motion.initial.corrective_trial`. Meant for searches over
+where goals may be: what two trials begin with, goal and hand by goal and hand, is computed once
 if one follows the other, so that sequences of hands and grids of goals cost little more than
 the movements in which they differ.
 """
@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import entry, fill_row, inner
-from coartic.corrective import correct_lanes
-from coartic.lanes import board, depart, lanes_for, runs_for
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import LARGEST, Goal, move_lanes
-from coartic.problem import arm_of, problem_of
+from coartic.motion.compiled import entry, fill_row, inner
+from coartic.motion.corrective import correct_lanes
+from coartic.motion.lanes import board, depart, lanes_for, runs_for
+from coartic.motion.movement import LARGEST, Goal, move_lanes
+from coartic.motion.problem import arm_of, problem_of
 from coartic.robot import HANDS, Array
-from coartic.task import Task, hands_of
+from coartic.tasks.task import Task, hands_of
 
 
 class CorrectiveTrials(NamedTuple):

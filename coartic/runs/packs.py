@@ -11,10 +11,10 @@ from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from coartic.codec import Line, decode, lines
 from coartic.errors import CoarticError
 from coartic.inputs import read_bytes
-from coartic.record import Record, RecordError
+from coartic.runs.codec import Line, decode, lines
+from coartic.runs.record import Record, RecordError
 
 LARGEST_PACK = 1 << 28
 """Bytes of a pack: rewards of ten million trials, twice over."""

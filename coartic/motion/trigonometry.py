@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numba import njit
 
-import coartic.llvm  # noqa: F401
+import coartic.motion.llvm  # noqa: F401
 
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 

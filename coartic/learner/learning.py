@@ -1,4 +1,4 @@
-"""Runs of the dual-process learner (:mod:`coartic.learner`) and everything they found."""
+"""Runs of the dual-process learner (:mod:`coartic.learner.kernel`) and everything they found."""
 
 from __future__ import annotations
 
@@ -13,13 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import addresses, compile_together
-from coartic.corrective import correct
 from coartic.errors import LOADED, CoarticError, NotApplicableError, need
-from coartic.exploration import ExplorationCondition, load_condition
-from coartic.initial import InitialSearch, search_initial_hands
-from coartic.lanes import LANES
-from coartic.learner import (
+from coartic.learner.conditions import ExplorationCondition, load_condition
+from coartic.learner.kernel import (
     COUNT,
     LEARNED,
     PARTS,
@@ -32,12 +28,16 @@ from coartic.learner import (
     work_for,
 )
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import move
-from coartic.problem import problem_of
+from coartic.motion.compiled import addresses, compile_together
+from coartic.motion.corrective import correct
+from coartic.motion.initial import InitialSearch, search_initial_hands
+from coartic.motion.lanes import LANES
+from coartic.motion.movement import move
+from coartic.motion.problem import problem_of
+from coartic.motion.solution import Execution, Movement, execute
+from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
-from coartic.solution import Execution, Movement, execute
-from coartic.task import Task, hands_of, letters_of
-from coartic.trials import make_trials
+from coartic.tasks.task import Task, hands_of, letters_of
 
 TRIALS = 10_000  # trials of one run (printed)
 METHOD_PREFIX = "dual-process/"
@@ -336,16 +336,12 @@ class _Learning:
         )
 
 
-def warm_up(task: Task | None = None, *, learns: bool = True) -> None:
+def warm_up(task: Task, *, learns: bool = True) -> None:
     """Compile the kernels, or load them, so that no run's time contains it.
 
-    They are those of the number of links that a task's robot has, of the shipped tasks' without
-    one; the learner's too if it ``learns``.
+    They are those of the number of links that the task's robot has; the learner's too if it
+    ``learns``.
     """
-    if task is None:
-        from coartic.task import load_task
-
-        task = load_task("ascending")
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
 

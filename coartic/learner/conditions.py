@@ -20,7 +20,7 @@ from coartic.errors import CoarticError, need
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
-    from coartic.task import Task
+    from coartic.tasks.task import Task
 
 MOST_NOISE = 100.0
 """Largest noise, length unit and rad, and bias: far beyond what any arm can use. Targets that
@@ -48,7 +48,7 @@ class ExplorationCondition:
     epsilon: float = 0.2  # ε
     noise_sd: float = 0.05  # SD of η, length unit (base) or rad (joints)
     nullspace_gain: float = 0.0
-    """β of the corrective process, 0 to 1 (:func:`coartic.corrective.correct`)."""
+    """β of the corrective process, 0 to 1 (:func:`coartic.motion.corrective.correct`)."""
     bias: float = 0.0
     """Mean of η along the step that **A** would make from q*, on the explored joints, in
     SDs of η. Its mean across that direction stays zero."""

@@ -1,6 +1,6 @@
 """Reconstructions of the tasks whose goals the paper does not print, as an ensemble.
 
-``tasks/members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
+``members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
 (made by ``coartic paper goals``; docs/reconstruction.md). A member is a task by the name
 ``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one that the search chose, and the
 task itself; v0.1 is what the task was in the first release, and not admitted.
@@ -12,9 +12,9 @@ import csv
 from functools import cache
 from pathlib import Path
 
-from coartic.task import TASK_FOLDER, Task, load_task
+from coartic.tasks.task import Task, shipped_tasks
 
-MEMBERS_FOLDER = TASK_FOLDER / "members"
+MEMBERS_FOLDER = Path(__file__).parent / "members"
 
 
 def members_file(task: str) -> Path:
@@ -33,7 +33,7 @@ def members(task: str) -> dict[str, Task]:
     path = members_file(task)
     if not path.exists():
         return {}
-    plain = load_task(task)
+    plain = shipped_tasks()[task]
     with path.open(encoding="utf-8", newline="") as file:
         found = (_member(plain, row) for row in csv.DictReader(file))
         return {member.name: member for member in found}

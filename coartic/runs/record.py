@@ -2,7 +2,7 @@
 
 A record says what was asked for (its specification, of which its id is a hash), what came of
 it, what the method states of itself, and with what it was made. A score is never taken from a
-method: :func:`coartic.scores.solved` makes it, and :meth:`Record.check` makes it again from
+method: :func:`coartic.runs.scores.solved` makes it, and :meth:`Record.check` makes it again from
 what is stored.
 """
 
@@ -19,13 +19,13 @@ from pydantic import Field
 from pydantic_core import to_json
 
 from coartic.errors import CoarticError
-from coartic.learner import PARTS
-from coartic.learning import CORRECTIONS, METHOD_PREFIX
+from coartic.learner.kernel import PARTS
+from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
-from coartic.scores import Solved, Unscored, scored_together
-from coartic.solution import Movement
-from coartic.stored import (
+from coartic.motion.solution import Movement
+from coartic.runs.scores import Solved, Unscored, scored_together
+from coartic.runs.stored import (
     Amount,
     Count,
     Itself,
@@ -38,7 +38,7 @@ from coartic.stored import (
     Values,
     canonical,
 )
-from coartic.task import INITIAL_POLICIES, Task, parse_task
+from coartic.tasks.task import INITIAL_POLICIES, Task, parse_task
 from coartic.text import LONGEST_REASON, Line, printable
 
 RECORD_FORMAT: Literal[2] = 2
@@ -238,7 +238,7 @@ _OTHERWISE = (b"0.0000", b"e-", b"e+", b"e1", b"e2", b"e3")
 
 
 def _canonical(part: Any) -> bytes:
-    """:func:`coartic.stored.canonical` of a part of a record, at a tenth of its cost."""
+    """:func:`coartic.runs.stored.canonical` of a part of a record, at a tenth of its cost."""
     content = part
     if isinstance(part, Solved):
         rows = [dict(sorted(vars(row).items())) for row in part.movements]

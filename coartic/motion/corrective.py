@@ -18,8 +18,9 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-from coartic.compiled import entry, inlined, inner, joint_chain, joint_lever, lanewise
-from coartic.lanes import (
+from coartic.model import PAPER, MotionModel, checked_model
+from coartic.motion.compiled import entry, inlined, inner, joint_chain, joint_lever, lanewise
+from coartic.motion.lanes import (
     GOING,
     board,
     copy_lanes,
@@ -32,10 +33,9 @@ from coartic.lanes import (
     whole,
     winding,
 )
-from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import checked_goal, configuration, largest_square
+from coartic.motion.movement import checked_goal, configuration, largest_square
+from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, Array, Hand, Robot
-from coartic.trigonometry import LARGEST
 
 _CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 # Of the smaller pivot of J Jᵀ, in units of its trace: nothing where J has full rank, above

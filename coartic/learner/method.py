@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from coartic.exploration import (
+from coartic.learner.conditions import (
     BIAS,
     CONDITIONS,
     MOST_NOISE,
@@ -29,11 +29,11 @@ from coartic.exploration import (
     UnknownTarget,
     Update,
 )
-from coartic.initial import InitialSearch, search_initial_hands
-from coartic.lanes import LANES
-from coartic.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
+from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.task import Task
+from coartic.motion.initial import InitialSearch, search_initial_hands
+from coartic.motion.lanes import LANES
+from coartic.tasks.task import Task
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
 
@@ -53,7 +53,7 @@ class DualProcessParameters(Parameters):
     update: Update = "greater"
     state: State = "previous-hand"
     learned: Learned = "best"
-    """What the paper leaves open (:class:`coartic.exploration.ExplorationCondition`)."""
+    """What the paper leaves open (:class:`coartic.learner.conditions.ExplorationCondition`)."""
 
 
 class NullspaceParameters(DualProcessParameters):

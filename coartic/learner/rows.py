@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coartic.learning import LearningRun
-from coartic.solution import Movement
-from coartic.task import Task
+from coartic.learner.learning import LearningRun
+from coartic.motion.solution import Movement
+from coartic.tasks.task import Task
 
 if TYPE_CHECKING:  # pandas is imported where a frame is made: workers make none
     import pandas as pd

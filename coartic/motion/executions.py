@@ -1,4 +1,4 @@
-"""Many solutions executed side by side: what :func:`coartic.solution.execute` gives for each.
+"""Many solutions executed side by side, as :func:`coartic.motion.solution.execute` does.
 
 Only of solutions that it executes without a word of the corrective process: movements straight
 in joint space whose targets are given and which hit every goal. That is what is stored of a run,
@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import entry, fill_row, inner
-from coartic.lanes import LANES, depart, lanes_for, runs_for
 from coartic.model import MotionModel, checked_model
-from coartic.movement import LARGEST, move_lanes
-from coartic.problem import arm_of, goal_of, problem_of
+from coartic.motion.compiled import entry, fill_row, inner
+from coartic.motion.lanes import LANES, depart, lanes_for, runs_for
+from coartic.motion.movement import LARGEST, move_lanes
+from coartic.motion.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array, Hand
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 
 class Straight(NamedTuple):
@@ -121,9 +121,9 @@ def execute_straight(
 ) -> dict[int, Made]:
     """Execute solutions from the task's start; by number those of which something can be said.
 
-    Of the others :func:`coartic.solution.execute` has to say what they are: those that miss a
-    goal, hit one on the way, are longer than ``most_steps`` or break the task's rules, and all of
-    them where corrective movements end on arrival. Raises
+    Of the others :func:`coartic.motion.solution.execute` has to say what they are: those that
+    miss a goal, hit one on the way, are longer than ``most_steps`` or break the task's rules, and
+    all of them where corrective movements end on arrival. Raises
     ValueError for a model that no movement can be made with.
     """
     checked_model(model, radius=task.radius)

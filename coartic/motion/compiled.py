@@ -26,39 +26,20 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from coartic.motion.trigonometry import cosine, sine
 from coartic.robot import chain, lever
-from coartic.trigonometry import cosine, sine
 
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0
 _PATIENCE_S = 120.0  # with a process that compiles a kernel, on a slow machine
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-# Modules that no result passes through: they say or show it, repeat it slowly, or make tasks,
-# which a run's specification holds whole.
-_PRESENTATION = {
-    "__init__.py",
-    "__main__.py",
-    "families.py",
-    "files.py",
-    "rows.py",
-    "inputs.py",
-    "packs.py",
-    "philox.py",
-    "codec.py",
-    "record.py",
-    "stored.py",
-    "reference.py",
-    "tables.py",
-    "text.py",
-    "ticks.py",
-}
-
-
 def model_files() -> list[Path]:
     """The files of this package that results come from."""
-    return [path for path in sorted(PACKAGE.glob("*.py")) if path.name not in _PRESENTATION]
+    single = (PACKAGE / name for name in ("robot.py", "model.py", "method.py", "tasks/task.py"))
+    rooms = ((PACKAGE / room).glob("*.py") for room in ("motion", "learner"))
+    return sorted([*single, *(path for room in rooms for path in room)])
 
 
 @cache

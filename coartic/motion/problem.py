@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.compiled import inlined
-from coartic.corrective import Corrector
 from coartic.model import MotionModel
-from coartic.movement import Goal, checked_goal, configuration
+from coartic.motion.compiled import inlined
+from coartic.motion.corrective import Corrector
+from coartic.motion.movement import Goal, checked_goal, configuration
 from coartic.robot import Arm
-from coartic.task import Task
+from coartic.tasks.task import Task
 
 
 class Problem(NamedTuple):

@@ -1,4 +1,4 @@
-"""A solution tick by tick: what :func:`coartic.solution.execute` scores, spelled out."""
+"""A solution tick by tick: what :func:`coartic.motion.solution.execute` scores, spelled out."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from coartic.errors import SolutionError
 from coartic.model import PAPER, MotionModel
-from coartic.movement import path_points
+from coartic.motion.movement import path_points
+from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import Array, Hand
-from coartic.solution import Execution, Movement, execute
-from coartic.task import Task, hands_of
+from coartic.tasks.task import Task, hands_of
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Trajectory:
 def trajectory(task: Task, movements: Iterable[Movement], model: MotionModel = PAPER) -> Trajectory:
     """Execute a solution and keep every control tick.
 
-    Agrees with :func:`~coartic.solution.execute` bit for bit in the number of ticks and
+    Agrees with :func:`~coartic.motion.solution.execute` bit for bit in the number of ticks and
     the configuration at each hit. Raises SolutionError where the solution breaks the
     task's rules or does not hit every goal.
     """

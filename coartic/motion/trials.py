@@ -1,6 +1,6 @@
 """Many trials in one call: target configurations in, rewards out.
 
-The rules are those of :func:`coartic.solution.execute` for solutions with at most one
+The rules are those of :func:`coartic.motion.solution.execute` for solutions with at most one
 learned movement per goal; the corrective process **A** finishes what they miss. Meant
 for methods that make thousands of trials.
 """
@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.compiled import entry, fill_row, inlined, inner
-from coartic.corrective import correct_lanes
-from coartic.lanes import LANES, Lanes, board, depart, lanes_for, runs_for
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.movement import LARGEST, move_lanes
-from coartic.problem import arm_of, goal_of, problem_of
+from coartic.motion.compiled import entry, fill_row, inlined, inner
+from coartic.motion.corrective import correct_lanes
+from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for
+from coartic.motion.movement import LARGEST, move_lanes
+from coartic.motion.problem import arm_of, goal_of, problem_of
 from coartic.robot import HANDS, Array
-from coartic.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, hands_of, letters_of
 
 
 class Trials(NamedTuple):

@@ -23,9 +23,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic import trigonometry
-from coartic.compiled import entry, fill_row, inner, lanewise
-from coartic.lanes import (
+from coartic.model import PAPER, MotionModel, checked_model
+from coartic.motion import trigonometry
+from coartic.motion.compiled import entry, fill_row, inner, lanewise
+from coartic.motion.lanes import (
     GOING,
     copy_lanes,
     depart,
@@ -37,7 +38,6 @@ from coartic.lanes import (
     width_of,
     winding,
 )
-from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 
 # Distance kept clear beyond what the bounds ask for, which is more where positions are rounded by

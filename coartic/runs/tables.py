@@ -20,14 +20,14 @@ import pyarrow as pa
 from pydantic import Field
 
 from coartic.errors import NotApplicableError
-from coartic.initial import hand_sequences, ranked_sequences
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
-from coartic.readings import load_readings, model_under
-from coartic.record import RECORD_FORMAT, Asked, Environment, Record, corrections_of, run_seeds
-from coartic.scores import PlainMovement
-from coartic.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
-from coartic.task import parse_task
+from coartic.motion.initial import hand_sequences, ranked_sequences
+from coartic.runs.record import RECORD_FORMAT, Asked, Environment, Record, corrections_of, run_seeds
+from coartic.runs.scores import PlainMovement
+from coartic.runs.stored import Count, Plain, Reason, Seed, TaskContent, Values, content_hash
+from coartic.tasks.readings import load_readings, model_under
+from coartic.tasks.task import parse_task
 from coartic.text import Line
 
 FORMAT: Literal[8] = 8  # of manifest and tables; raised when one of them changes its meaning
@@ -190,7 +190,7 @@ class Manifest(Plain):
     limits: PlanLimits
     environment: Environment
     records: Annotated[str, Field(pattern="^([0-9a-f]{64})?$")]
-    """:attr:`coartic.packs.Packs.digest` of what the tables were made of."""
+    """:attr:`coartic.runs.packs.Packs.digest` of what the tables were made of."""
     tables: dict[Line, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
     """SHA-256 of each table's file, by its name."""
 

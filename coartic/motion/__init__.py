@@ -1,0 +1,1 @@
+"""How the robot moves: kernels, the corrective process, and execution of solutions."""
