@@ -29,8 +29,8 @@ from coartic.analysis.printed import (
 )
 from coartic.analysis.published import RUNS, TRIALS
 from coartic.learner.conditions import CONDITIONS
+from coartic.tasks.catalogue import builtin_tasks
 from coartic.tasks.readings import readings
-from coartic.tasks.task import builtin_tasks
 
 TASKS = list(builtin_tasks())
 

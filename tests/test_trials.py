@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from coartic import MotionModel, Movement, corrective_trial, execute, hand_sequences, load_task
 from coartic.motion.trials import make_trials
-from coartic.tasks.task import builtin_tasks, hands_of
+from coartic.tasks.catalogue import builtin_tasks
+from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task, uneven_task
 
 TASKS = [
