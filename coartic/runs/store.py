@@ -1,0 +1,678 @@
+"""The runs of a results folder: one SQLite file, ``runs.sqlite``.
+
+``results`` has a row a run, ``movements`` a row a movement of its solutions, ``waypoints`` a row a
+waypoint of those that follow a path, ``learning`` the rewards of its trials. The views ``runs``,
+``solutions`` and ``paths`` show what the last ``coartic run`` asked for, with names in place of
+numbers. docs/results.md lists the columns. One process writes, a lot of finished runs at a time;
+whatever interrupts it, a lot is there whole or not at all.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from coartic.errors import CoarticError
+from coartic.method import Meter
+from coartic.motion.solution import Movement
+from coartic.robot import Array
+from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
+from coartic.tasks.task import Task, parse_task
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FILE = "runs.sqlite"
+FORMAT = 1
+"""Raised when a table changes its meaning."""
+_APPLICATION = 0x636F6172  # "coar"
+FAILED = -(2**31)
+"""Stored in place of the reward of a trial that did not hit every goal."""
+
+RESULTS = {
+    "run_id": "TEXT NOT NULL UNIQUE",
+    "setting": "INTEGER NOT NULL REFERENCES settings",
+    "suite_seed": "INTEGER NOT NULL",
+    "run": "INTEGER NOT NULL",  # number of the run, from 0
+    "seed": "INTEGER NOT NULL",
+    "status": "TEXT NOT NULL",  # ok, infeasible, solver-failed, timeout, crashed
+    "reason": "TEXT NOT NULL",  # empty where status is ok
+    "hands": "TEXT",  # of the solution, such as LRLR
+    "reward": "INTEGER",  # of the solution, executed and scored by the harness
+    "replay_reward": "INTEGER",  # one noiseless greedy trial with what was learned
+    "replay_hands": "TEXT",
+    "initial_reward": "INTEGER",  # trial 0 of a learner
+    "initial_hands": "TEXT",
+    "best_trial": "INTEGER",  # first trial with the solution's reward, if any
+    **dict.fromkeys(Meter.COUNTS, "INTEGER"),
+    "solution_corrections": "INTEGER",  # corrective movements the solution needed
+    "early_corrections": "INTEGER",  # in a learner's first tenth of trials after trial 0
+    "late_corrections": "INTEGER",  # in the last tenth
+    "other_arm_travel": "REAL",  # of the arm that is not chosen, rad
+    "proven_bound": "INTEGER",  # reward that no solution exceeds, where proven
+    "build_s": "REAL",
+    "solve_s": "REAL",
+    "wall_s": "REAL",
+    "cpu_s": "REAL",
+    "warm": "INTEGER",  # the process had run this method before
+    "together": "INTEGER",  # runs performed side by side; times are equal shares
+    "process_peak_mb": "REAL",  # of the worker so far, all its runs included
+    "time_limit_s": "REAL",
+    "date": "TEXT NOT NULL",
+    "environment": "INTEGER NOT NULL REFERENCES environments",
+    "used": "TEXT NOT NULL",  # what the method used of what it was told, comma-separated
+    "details": "TEXT NOT NULL",  # whatever the method keeps beside its solution, JSON
+    "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
+}
+"""Columns of table ``results`` beside its ``id``."""
+TIMINGS = (
+    "build_s",
+    "solve_s",
+    "wall_s",
+    "cpu_s",
+    "warm",
+    "together",
+    "process_peak_mb",
+    "commit",
+    "packages",
+)
+"""Columns of ``runs`` that may differ between two runs of one specification."""
+_OWN = [name for name in RESULTS if name not in ("setting", "suite_seed", "environment", "details")]
+_SCHEMA = f"""
+CREATE TABLE suite (name TEXT, seed INTEGER, runs INTEGER, trials INTEGER, readings TEXT,
+    time_limit_s REAL, trial_budget INTEGER, command TEXT, date TEXT, environment INTEGER);
+CREATE TABLE tasks (name TEXT PRIMARY KEY, definition TEXT NOT NULL);
+CREATE TABLE methods (name TEXT PRIMARY KEY, title TEXT, citation TEXT, told TEXT, secondary TEXT,
+    stochastic INTEGER, defaults TEXT, origin TEXT, code TEXT);
+CREATE TABLE cells (position INTEGER PRIMARY KEY, setting INTEGER NOT NULL, variant TEXT NOT NULL,
+    parameters TEXT NOT NULL, runs INTEGER NOT NULL);
+CREATE TABLE environments (id INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE, commit_id TEXT,
+    packages TEXT);
+CREATE TABLE settings (id INTEGER PRIMARY KEY, asked TEXT NOT NULL, code TEXT NOT NULL,
+    task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, parameters TEXT NOT NULL,
+    model TEXT NOT NULL, trial_budget INTEGER, told TEXT NOT NULL, UNIQUE (asked, code));
+CREATE TABLE results (id INTEGER PRIMARY KEY,
+    {", ".join(f"{name} {kind}" for name, kind in RESULTS.items())},
+    UNIQUE (setting, suite_seed, run));
+CREATE TABLE movements (result INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
+    goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL, ticks INTEGER NOT NULL,
+    PRIMARY KEY (result, part, "order")) WITHOUT ROWID;
+CREATE TABLE waypoints (result INTEGER NOT NULL, "order" INTEGER NOT NULL,
+    waypoint INTEGER NOT NULL, PRIMARY KEY (result, "order", waypoint)) WITHOUT ROWID;
+CREATE TABLE learning (result INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
+PRAGMA application_id = {_APPLICATION};
+PRAGMA user_version = {FORMAT};
+"""
+_ASKED_FOR = """
+    FROM cells JOIN settings ON settings.id = cells.setting
+    JOIN results ON results.setting = cells.setting
+        AND results.suite_seed = (SELECT seed FROM suite) AND results.run < cells.runs"""
+_VIEWS = f"""
+DROP VIEW IF EXISTS runs;
+DROP VIEW IF EXISTS solutions;
+DROP VIEW IF EXISTS paths;
+CREATE VIEW runs AS SELECT run_id, (SELECT name FROM suite) AS suite, settings.task, method,
+    variant, trim(method || ' ' || variant) AS label,
+    {", ".join(f"results.{name}" for name in _OWN if name != "run_id")},
+    settings.told, settings.parameters, commit_id AS "commit", settings.code, packages
+    {_ASKED_FOR} JOIN environments ON environments.id = results.environment
+    ORDER BY cells.position, results.run;
+CREATE VIEW solutions AS SELECT results.run_id, movements.* {_ASKED_FOR}
+    JOIN movements ON movements.result = results.id AND part = 'solution'
+    ORDER BY cells.position, results.run, "order";
+CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
+    JOIN waypoints ON waypoints.result = results.id
+    ORDER BY cells.position, results.run, "order", waypoint;
+"""
+
+_MOVEMENT = ("result", "part", "order", "goal", "hand", "kind", "ticks")
+_WAYPOINT = ("result", "order", "waypoint")
+PARTS = ("solution", "initial", "replay")
+"""What is kept of a run: its solution, the first trial of a learner, and one noiseless greedy
+trial with what it has learned."""
+
+
+class Environment(NamedTuple):
+    """With what something was made."""
+
+    content: dict[str, Any]
+    """Versions, platform, processor, threads, commit."""
+    commit: str | None
+    """Id of the commit, with a plus where files were changed since."""
+    packages: str
+    """Hash of Python's and all libraries' versions."""
+
+
+@dataclass
+class Run:
+    """One run as it is stored."""
+
+    row: dict[str, Any]
+    """Its columns of table ``results``, but for ``setting``."""
+    environment: Environment
+    movements: dict[str, tuple[Movement, ...]] = field(default_factory=dict)
+    """By part (:data:`PARTS`); those of a part that there is not are missing."""
+    rewards: list[int | None] = field(default_factory=list)
+    """Of each trial; None where it failed."""
+
+    @property
+    def run_id(self) -> str:
+        """Id of the run."""
+        return str(self.row["run_id"])
+
+    @property
+    def status(self) -> str:
+        """How it ended."""
+        return str(self.row["status"])
+
+
+class StoredRun(NamedTuple):
+    """A run with what was asked for."""
+
+    run: Run
+    task: Task
+    method: str
+    parameters: dict[str, Any]
+    model: dict[str, Any]
+    trial_budget: int | None
+    code: str
+
+
+class Store:
+    """The runs of one results folder. Made by :func:`open_store` and :func:`writing`."""
+
+    def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
+        self.folder = folder
+        self._db = connection
+        self._cells: list[tuple[int, tuple[str, ...]]] = []  # setting, and joints in their order
+        self._settings: dict[tuple[str, str], int] = {}
+        self._environments: dict[str, int] = {}
+
+    # What was asked for.
+
+    def ask(self, plan: Plan, environment: Environment, command: list[str], date: str) -> None:
+        """Say what is asked for from here on; runs of earlier plans stay, and are not shown."""
+        with self._writing():
+            for table in ("suite", "tasks", "methods", "cells"):
+                self._db.execute(f"DELETE FROM {table}")
+            self._insert(
+                "suite",
+                {
+                    "name": plan.suite,
+                    "seed": plan.seed,
+                    "runs": plan.runs,
+                    "trials": plan.trials,
+                    "readings": _json(plan.readings),
+                    "time_limit_s": plan.time_limit_s,
+                    "trial_budget": plan.trial_budget,
+                    "command": _json(command),
+                    "date": date,
+                    "environment": self._environment(environment),
+                },
+            )
+            for name, definition in plan.tasks.items():
+                self._insert("tasks", {"name": name, "definition": _json(definition)})
+            for name, method in plan.methods.items():
+                facts = asdict(method) | {
+                    key: _json(getattr(method, key)) for key in ("told", "secondary", "defaults")
+                }
+                self._insert("methods", {"name": name, **facts})
+            model = _json(plan.model._asdict())
+            joints = {
+                name: parse_task(task, name).robot.joint_names for name, task in plan.tasks.items()
+            }
+            self._cells.clear()
+            for position, cell in enumerate(plan.cells):
+                method = plan.methods[cell.method]
+                setting = {
+                    "asked": plan.asked(cell),
+                    "code": method.code,
+                    "task": cell.task,
+                    "definition": _json(plan.tasks[cell.task]),
+                    "method": cell.method,
+                    "parameters": _json(cell.complete, sort_keys=True),
+                    "model": model,
+                    "trial_budget": plan.trial_budget,
+                    "told": ", ".join(method.told),
+                }
+                self._cells.append((self._setting(setting), joints[cell.task]))
+                self._insert(
+                    "cells",
+                    {
+                        "position": position,
+                        "setting": self._cells[-1][0],
+                        "variant": cell.variant,
+                        "parameters": _json(cell.parameters),
+                        "runs": cell.runs,
+                    },
+                )
+            self._add_joints(dict.fromkeys(name for own in joints.values() for name in own))
+
+    def plan(self) -> Plan:
+        """What was asked for last. Raises CoarticError where nothing was yet."""
+        row = self._one("SELECT * FROM suite")
+        if row is None:
+            raise CoarticError(f"{self.folder} is not finished; repeat the `coartic run` command")
+        methods = {}
+        for method in self._db.execute("SELECT * FROM methods ORDER BY rowid"):
+            facts = dict(method)
+            name = facts.pop("name")
+            facts |= {key: tuple(json.loads(facts[key])) for key in ("told", "secondary")}
+            facts |= {"stochastic": bool(facts["stochastic"])}
+            methods[name] = DeclaredMethod(**facts | {"defaults": json.loads(facts["defaults"])})
+        cells = self._db.execute(
+            "SELECT task, method, variant, cells.parameters, settings.parameters AS complete, runs "
+            "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
+        )
+        return Plan(
+            suite=row["name"],
+            **{key: row[key] for key in ("seed", "runs", "trials", "time_limit_s", "trial_budget")},
+            readings=tuple(json.loads(row["readings"])),
+            tasks={
+                name: json.loads(text)
+                for name, text in self._db.execute(
+                    "SELECT name, definition FROM tasks ORDER BY rowid"
+                )
+            },
+            methods=methods,
+            cells=tuple(
+                PlannedCell(
+                    task=cell["task"],
+                    method=cell["method"],
+                    variant=cell["variant"],
+                    parameters=json.loads(cell["parameters"]),
+                    complete=json.loads(cell["complete"]),
+                    runs=cell["runs"],
+                )
+                for cell in cells
+            ),
+        )
+
+    def made_with(self) -> dict[str, Any]:
+        """With what the suite was run last: versions, platform, commit, command, date."""
+        row = self._one(
+            "SELECT content, command, date FROM suite JOIN environments ON id = environment"
+        )
+        assert row is not None
+        own = {"command": json.loads(row["command"]), "date": row["date"]}
+        return {**json.loads(row["content"]), **own}
+
+    # Which runs there are.
+
+    def present(self) -> Iterator[tuple[int, int, str, float | None]]:
+        """Position of the cell, number, status and time limit of the runs asked for that there
+        are."""
+        yield from map(
+            tuple,
+            self._db.execute(
+                f"SELECT position, results.run, status, time_limit_s {_ASKED_FOR} "
+                "ORDER BY position, results.run"
+            ),
+        )
+
+    def statuses(self) -> dict[str, int]:
+        """How many of the runs asked for ended in which way."""
+        rows = self._db.execute(f"SELECT status, count(*) {_ASKED_FOR} GROUP BY status")
+        return {status: count for status, count in rows}  # noqa: C416
+
+    def count(self) -> int:
+        """Number of runs, asked for or not."""
+        return int(self._db.execute("SELECT count(*) FROM results").fetchone()[0])
+
+    def stale(self) -> int:
+        """Runs of what is asked for now that other code made."""
+        found = self._db.execute(
+            """SELECT count(*) FROM results JOIN settings AS old ON old.id = results.setting
+            WHERE EXISTS (SELECT * FROM cells JOIN settings AS new ON new.id = cells.setting
+                WHERE new.asked = old.asked AND new.code != old.code
+                AND results.run < cells.runs)
+            AND results.suite_seed = (SELECT seed FROM suite)
+            AND old.id NOT IN (SELECT setting FROM cells)"""
+        )
+        return int(found.fetchone()[0])
+
+    # Runs, in and out.
+
+    def write(self, position: int, runs: Iterable[Run]) -> None:
+        """Keep finished runs of a cell together, all of them or none; they replace earlier ones.
+
+        Raises CoarticError where the disk does not take them.
+        """
+        setting, joints = self._cells[position]
+        movements: list[tuple[Any, ...]] = []
+        waypoints: list[tuple[Any, ...]] = []
+        with self._writing():
+            for run in runs:
+                self._forget(run.run_id)
+                environment = self._environment(run.environment)
+                row = run.row | {"setting": setting, "environment": environment}
+                result = self._insert("results", row)
+                for part, made in run.movements.items():
+                    for order, own in enumerate(made):
+                        assert own.target is not None
+                        place = (result, part, order, own.goal, own.hand, own.kind, own.ticks)
+                        movements.append((*place, *own.target.tolist()))
+                        points = [] if own.waypoints is None else own.waypoints.tolist()
+                        waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
+                if run.rewards:
+                    self._insert("learning", {"result": result, "rewards": _packed(run.rewards)})
+            self._insert_many("movements", (*_MOVEMENT, *joints), movements)
+            self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
+
+    def run(self, prefix: str) -> StoredRun:
+        """The one run whose id begins so. Raises CoarticError where there is none, or several."""
+        ids = self.ids(prefix)
+        if len(ids) != 1:
+            raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs in {self.folder}")
+        row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
+        assert row is not None
+        setting = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
+        made = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
+        assert setting is not None
+        assert made is not None
+        task = parse_task(json.loads(setting["definition"]), str(self.folder))
+        blob = self._one("SELECT rewards FROM learning WHERE result = ?", row["id"])
+        own = {name: row[name] for name in RESULTS if name not in ("setting", "environment")}
+        run = Run(
+            own,
+            Environment(json.loads(made["content"]), made["commit_id"], made["packages"]),
+            {
+                part: movements
+                for part in PARTS
+                if (movements := self._movements(row["id"], part, task))
+            },
+            [] if blob is None else _unpacked(blob["rewards"]),
+        )
+        return StoredRun(
+            run,
+            task,
+            setting["method"],
+            json.loads(setting["parameters"]),
+            json.loads(setting["model"]),
+            setting["trial_budget"],
+            setting["code"],
+        )
+
+    def ids(self, prefix: str) -> list[str]:
+        """Ids of all runs, asked for or not, that begin so."""
+        found = self._db.execute(
+            "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?", (len(prefix), prefix)
+        )
+        return [run_id for (run_id,) in found]
+
+    def frame(self, view: str) -> pd.DataFrame:
+        """A view as a data frame: ``runs``, ``solutions`` or ``paths``, with nullable types."""
+        import pandas as pd
+
+        rows = self._db.execute(f"SELECT * FROM {view}")
+        names = [column[0] for column in rows.description]
+        columns = list(zip(*rows, strict=True)) or [() for _ in names]
+        frame = pd.DataFrame(
+            {
+                name: pd.array(list(column), dtype=_dtype(name))
+                for name, column in zip(names, columns, strict=True)
+            },
+        )
+        return frame.drop(columns=[name for name in ("result", "part") if name in frame])
+
+    def rewards(self) -> Iterator[tuple[str, Array]]:
+        """Runs asked for that made trials, each with the reward of every trial, NaN where it
+        failed."""
+        rows = self._db.execute(
+            f"SELECT run_id, rewards {_ASKED_FOR} JOIN learning ON learning.result = results.id "
+            "ORDER BY cells.position, results.run"
+        )
+        for run_id, blob in rows:
+            stored = np.frombuffer(zlib.decompress(blob), dtype="<i4").astype(np.float64)
+            yield run_id, np.where(stored == FAILED, np.nan, stored)
+
+    # Inside.
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """One transaction. Raises CoarticError where the disk does not take it."""
+        try:
+            with self._db:
+                self._db.execute("BEGIN")
+                yield
+        except sqlite3.OperationalError as error:
+            self._environments.clear()
+            self._settings.clear()
+            raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
+
+    def _insert(self, table: str, row: Mapping[str, Any]) -> int:
+        names = ", ".join(f'"{name}"' for name in row)
+        marks = ", ".join("?" for _ in row)
+        text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
+        return int(self._db.execute(text, list(row.values())).lastrowid or 0)
+
+    def _insert_many(self, table: str, names: Iterable[str], rows: list[tuple[Any, ...]]) -> None:
+        listed = ", ".join(f'"{name}"' for name in names)
+        marks = ", ".join("?" for _ in names)
+        self._db.executemany(f"INSERT INTO {table} ({listed}) VALUES ({marks})", rows)
+
+    def _one(self, query: str, *values: object) -> sqlite3.Row | None:
+        row: sqlite3.Row | None = self._db.execute(query, values).fetchone()
+        return row
+
+    def _setting(self, setting: dict[str, Any]) -> int:
+        key = setting["asked"], setting["code"]
+        if key not in self._settings:
+            found = self._one("SELECT id FROM settings WHERE asked = ? AND code = ?", *key)
+            self._settings[key] = self._insert("settings", setting) if found is None else found[0]
+        return self._settings[key]
+
+    def _environment(self, environment: Environment) -> int:
+        text = _json(environment.content, sort_keys=True)
+        if text not in self._environments:
+            found = self._one("SELECT id FROM environments WHERE content = ?", text)
+            row = {
+                "content": text,
+                "commit_id": environment.commit,
+                "packages": environment.packages,
+            }
+            self._environments[text] = (
+                self._insert("environments", row) if found is None else found[0]
+            )
+        return self._environments[text]
+
+    def _add_joints(self, names: Iterable[str]) -> None:
+        """Columns for these joints, and the views anew, which show them."""
+        for table in ("movements", "waypoints"):
+            there = {row["name"] for row in self._db.execute(f"PRAGMA table_info({table})")}
+            for name in names:
+                if name not in there:
+                    self._db.execute(f"ALTER TABLE {table} ADD COLUMN {name} REAL")
+        for statement in _VIEWS.split(";\n"):
+            self._db.execute(statement)
+
+    def _forget(self, run_id: str) -> None:
+        row = self._one("SELECT id FROM results WHERE run_id = ?", run_id)
+        if row is not None:
+            for table in ("movements", "waypoints", "learning"):
+                self._db.execute(f"DELETE FROM {table} WHERE result = ?", (row["id"],))
+            self._db.execute("DELETE FROM results WHERE id = ?", (row["id"],))
+
+    def _movements(self, result: int, part: str, task: Task) -> tuple[Movement, ...]:
+        joints = task.robot.joint_names
+        points: dict[int, list[list[float]]] = {}
+        if part == "solution":
+            for row in self._db.execute(
+                'SELECT * FROM waypoints WHERE result = ? ORDER BY "order", waypoint', (result,)
+            ):
+                points.setdefault(row["order"], []).append([row[joint] for joint in joints])
+        rows = self._db.execute(
+            'SELECT * FROM movements WHERE result = ? AND part = ? ORDER BY "order"',
+            (result, part),
+        )
+        return tuple(
+            Movement(
+                goal=row["goal"],
+                hand=row["hand"],
+                kind=row["kind"],
+                target=np.array([row[joint] for joint in joints]),
+                ticks=row["ticks"],
+                waypoints=np.array(points[row["order"]]) if row["order"] in points else None,
+            )
+            for row in rows
+        )
+
+
+def open_store(folder: Path) -> Store:
+    """The runs of a results folder, to be read.
+
+    Raises CoarticError for what is no results folder of this version, and while a suite is at
+    work in it.
+    """
+    path = folder / FILE
+    if not folder.exists():
+        raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
+    if not path.is_file():
+        _check_older(folder)
+        raise CoarticError(f"{folder} is not a results folder: it has no {FILE}")
+    with _explained(folder):
+        connection = _connect(f"{path.resolve().as_uri()}?mode=rw", timeout_s=2.0)
+        connection.execute("PRAGMA query_only = ON")
+        if not _is_ours(connection, folder):
+            raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
+    return Store(folder, connection)
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[Store]:
+    """The runs of a results folder, made where there is none, while this process alone has them.
+
+    Raises CoarticError where the folder holds something else, cannot be written, or another
+    process is at work in it.
+    """
+    check_place(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
+    with _explained(folder):
+        connection = _connect(str(folder / FILE), timeout_s=0.0)
+        try:
+            # No write-ahead log: it is unsafe on network disks.
+            connection.execute("PRAGMA journal_mode = DELETE")
+            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+            connection.execute("BEGIN EXCLUSIVE")
+            connection.execute("COMMIT")
+            if not _is_ours(connection, folder):
+                connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
+        except BaseException:
+            connection.close()
+            raise
+    try:
+        yield Store(folder, connection)
+    finally:
+        connection.close()
+
+
+def check_place(folder: Path) -> None:
+    """Raises CoarticError for a place where no results folder can be."""
+    if folder.exists() and not folder.is_dir():
+        raise CoarticError(f"{folder} is a file where a folder is needed; choose another --out")
+    if folder.is_dir() and not (folder / FILE).exists():
+        _check_older(folder)
+        if any(not entry.name.startswith(".") for entry in folder.iterdir()):
+            raise CoarticError(
+                f"{folder} is not empty and holds no results of coartic. Choose another folder."
+            )
+
+
+def _check_older(folder: Path) -> None:
+    if (folder / "records").is_dir() or (folder / "manifest.json").exists():
+        raise CoarticError(
+            f"{folder} holds results of an older version of coartic, which this version does not "
+            "read. Run the suite again with another --out."
+        )
+
+
+def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
+    connection = sqlite3.connect(
+        where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
+    )
+    connection.row_factory = sqlite3.Row
+    return connection
+
+
+def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
+    """Whether the file has our tables; False for an empty one."""
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if application == _APPLICATION and version != FORMAT:
+        age, do = ("newer", "update coartic") if version > FORMAT else ("older", "choose another")
+        raise CoarticError(
+            f"{folder / FILE} was written by a{'n' * (age == 'older')} {age} version of coartic "
+            f"(format {version}; this version reads {FORMAT}); "
+            + (do if age == "newer" else "run the suite again with another --out")
+        )
+    if application != _APPLICATION:
+        tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        if tables:
+            raise CoarticError(f"{folder / FILE} is not a file of coartic; move it away")
+        return False
+    return True
+
+
+@contextmanager
+def _explained(folder: Path) -> Iterator[None]:
+    """What SQLite says when a file is opened, in words."""
+    try:
+        yield
+    except sqlite3.OperationalError as error:
+        if "locked" in str(error):
+            raise CoarticError(
+                f"another `coartic run` is at work in {folder}; wait for it, or choose another "
+                "folder"
+            ) from None
+        raise CoarticError(f"cannot open {folder / FILE}: {error}") from None
+    except sqlite3.DatabaseError as error:
+        raise CoarticError(
+            f"{folder / FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
+            "command, or restore a copy."
+        ) from None
+
+
+def _json(content: Any, *, sort_keys: bool = False) -> str:
+    return json.dumps(content, ensure_ascii=False, sort_keys=sort_keys)
+
+
+def _packed(rewards: list[int | None]) -> bytes:
+    values = [FAILED if reward is None else reward for reward in rewards]
+    return zlib.compress(np.array(values, dtype="<i4").tobytes(), level=1)
+
+
+def _unpacked(blob: bytes) -> list[int | None]:
+    values = np.frombuffer(zlib.decompress(blob), dtype="<i4").tolist()
+    return [None if value == FAILED else value for value in values]
+
+
+_TEXTS = {name for name, kind in RESULTS.items() if kind.startswith("TEXT")} | {
+    *("suite", "task", "method", "variant", "label"),
+    *("told", "parameters", "commit", "code", "packages", "hand", "kind"),
+}
+_WHOLE = {name for name, kind in RESULTS.items() if kind.startswith("INTEGER")} | {
+    *("order", "goal", "ticks", "waypoint"),
+}
+_NUMBERS = {name for name, kind in RESULTS.items() if kind == "REAL"}
+
+
+def _dtype(column: str) -> Any:
+    """How a column of a view is read: with nullable types, and joints as plain numbers."""
+    if column in _TEXTS:
+        return "string"
+    if column == "warm":
+        return "boolean"
+    if column in _WHOLE:
+        return "Int64"
+    return "Float64" if column in _NUMBERS else "float64"
