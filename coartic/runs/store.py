@@ -102,12 +102,12 @@ CREATE TABLE settings (id INTEGER PRIMARY KEY, asked TEXT NOT NULL, code TEXT NO
 CREATE TABLE results (id INTEGER PRIMARY KEY,
     {", ".join(f"{name} {kind}" for name, kind in RESULTS.items())},
     UNIQUE (setting, suite_seed, run));
-CREATE TABLE movements (result INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
+CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
     goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL, ticks INTEGER NOT NULL,
-    PRIMARY KEY (result, part, "order")) WITHOUT ROWID;
-CREATE TABLE waypoints (result INTEGER NOT NULL, "order" INTEGER NOT NULL,
-    waypoint INTEGER NOT NULL, PRIMARY KEY (result, "order", waypoint)) WITHOUT ROWID;
-CREATE TABLE learning (result INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
+    PRIMARY KEY (result_id, part, "order")) WITHOUT ROWID;
+CREATE TABLE waypoints (result_id INTEGER NOT NULL, "order" INTEGER NOT NULL,
+    waypoint INTEGER NOT NULL, PRIMARY KEY (result_id, "order", waypoint)) WITHOUT ROWID;
+CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
 PRAGMA application_id = {_APPLICATION};
 PRAGMA user_version = {FORMAT};
 """
@@ -126,15 +126,15 @@ CREATE VIEW runs AS SELECT run_id, (SELECT name FROM suite) AS suite, settings.t
     {_ASKED_FOR} JOIN environments ON environments.id = results.environment
     ORDER BY cells.position, results.run;
 CREATE VIEW solutions AS SELECT results.run_id, movements.* {_ASKED_FOR}
-    JOIN movements ON movements.result = results.id AND part = 'solution'
+    JOIN movements ON movements.result_id = results.id AND part = 'solution'
     ORDER BY cells.position, results.run, "order";
 CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
-    JOIN waypoints ON waypoints.result = results.id
+    JOIN waypoints ON waypoints.result_id = results.id
     ORDER BY cells.position, results.run, "order", waypoint;
 """
 
-_MOVEMENT = ("result", "part", "order", "goal", "hand", "kind", "ticks")
-_WAYPOINT = ("result", "order", "waypoint")
+_MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
+_WAYPOINT = ("result_id", "order", "waypoint")
 PARTS = ("solution", "initial", "replay")
 """What is kept of a run: its solution, the first trial of a learner, and one noiseless greedy
 trial with what it has learned."""
@@ -363,7 +363,7 @@ class Store:
                         points = [] if own.waypoints is None else own.waypoints.tolist()
                         waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
                 if run.rewards:
-                    self._insert("learning", {"result": result, "rewards": _packed(run.rewards)})
+                    self._insert("learning", {"result_id": result, "rewards": _packed(run.rewards)})
             self._insert_many("movements", (*_MOVEMENT, *joints), movements)
             self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
 
@@ -379,7 +379,7 @@ class Store:
         assert setting is not None
         assert made is not None
         task = parse_task(json.loads(setting["definition"]), str(self.folder))
-        blob = self._one("SELECT rewards FROM learning WHERE result = ?", row["id"])
+        blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         own = {name: row[name] for name in RESULTS if name not in ("setting", "environment")}
         run = Run(
             own,
@@ -421,13 +421,13 @@ class Store:
                 for name, column in zip(names, columns, strict=True)
             },
         )
-        return frame.drop(columns=[name for name in ("result", "part") if name in frame])
+        return frame.drop(columns=[name for name in ("result_id", "part") if name in frame])
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""
         rows = self._db.execute(
-            f"SELECT run_id, rewards {_ASKED_FOR} JOIN learning ON learning.result = results.id "
+            f"SELECT run_id, rewards {_ASKED_FOR} JOIN learning ON learning.result_id = results.id "
             "ORDER BY cells.position, results.run"
         )
         for run_id, blob in rows:
@@ -498,7 +498,7 @@ class Store:
         row = self._one("SELECT id FROM results WHERE run_id = ?", run_id)
         if row is not None:
             for table in ("movements", "waypoints", "learning"):
-                self._db.execute(f"DELETE FROM {table} WHERE result = ?", (row["id"],))
+                self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (row["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (row["id"],))
 
     def _movements(self, result: int, part: str, task: Task) -> tuple[Movement, ...]:
@@ -506,11 +506,11 @@ class Store:
         points: dict[int, list[list[float]]] = {}
         if part == "solution":
             for row in self._db.execute(
-                'SELECT * FROM waypoints WHERE result = ? ORDER BY "order", waypoint', (result,)
+                'SELECT * FROM waypoints WHERE result_id = ? ORDER BY "order", waypoint', (result,)
             ):
                 points.setdefault(row["order"], []).append([row[joint] for joint in joints])
         rows = self._db.execute(
-            'SELECT * FROM movements WHERE result = ? AND part = ? ORDER BY "order"',
+            'SELECT * FROM movements WHERE result_id = ? AND part = ? ORDER BY "order"',
             (result, part),
         )
         return tuple(
@@ -658,11 +658,11 @@ def _unpacked(blob: bytes) -> list[int | None]:
 
 
 _TEXTS = {name for name, kind in RESULTS.items() if kind.startswith("TEXT")} | {
-    *("suite", "task", "method", "variant", "label"),
+    *("suite", "task", "method", "variant", "label", "part"),
     *("told", "parameters", "commit", "code", "packages", "hand", "kind"),
 }
 _WHOLE = {name for name, kind in RESULTS.items() if kind.startswith("INTEGER")} | {
-    *("order", "goal", "ticks", "waypoint"),
+    *("result_id", "order", "goal", "ticks", "waypoint"),
 }
 _NUMBERS = {name for name, kind in RESULTS.items() if kind == "REAL"}
 
