@@ -157,7 +157,7 @@ def _run(
     """A run as it is kept."""
     solution = executions.get("solution")
     rewards = outcome.rewards
-    corrections = outcome.details.get(CORRECTIONS)
+    corrections: Any = outcome.details.get(CORRECTIONS)
     counted = isinstance(corrections, list) and len(corrections) == 1 + TENTHS
     row = {
         **_EMPTY,

@@ -26,8 +26,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from pebble import ProcessExpired, ProcessPool
 
-from coartic.benchmarks.provenance import THREADS, cores
+from coartic.benchmarks.provenance import THREADS
 from coartic.benchmarks.worker import Answer, Job, learns, perform, prepare
+from coartic.learner.learning import threads_for
 from coartic.text import plain
 
 _AHEAD = 2  # jobs a worker that wait for it
@@ -62,7 +63,7 @@ class Local:
     """Worker processes on this machine; ``jobs`` of them, or one a core."""
 
     def __init__(self, jobs: int = -1) -> None:
-        self.workers = jobs if jobs > 0 else cores()
+        self.workers = threads_for(jobs)
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
         """The number of each job with its answer, as they come."""
@@ -81,12 +82,12 @@ class Local:
                 workers, initializer=_begin, initargs=(folder, foreign, workers, tasks),
                 context=_context(),
             )  # fmt: skip
-            running: dict[Any, tuple[int, float]] = {}
+            running: dict[Future[Answer], tuple[int, float]] = {}
             waiting = iter(jobs)
             try:
                 while True:
                     for number, job in waiting:
-                        future = pool.schedule(perform, args=(job,), timeout=job.time_limit_s)
+                        future: Any = pool.schedule(perform, args=(job,), timeout=job.time_limit_s)
                         running[future] = number, time.monotonic()
                         if len(running) == (1 + _AHEAD) * workers:
                             break

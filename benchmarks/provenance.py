@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import coartic
+from coartic.learner.learning import threads_for
 from coartic.motion.compiled import PACKAGE, source_fingerprint
 from coartic.runs.plan import hash_of
 from coartic.runs.store import Environment
@@ -60,7 +61,7 @@ def environment() -> Environment:
             "packages": packages,
             "platform": plain(platform.platform(), LONGEST_LINE),
             "processor": plain(_processor(), LONGEST_LINE),
-            "cores": cores(),
+            "cores": threads_for(-1),
             "threads": THREADS,
         },
         commit=None if commit is None else commit["id"] + "+" * commit["dirty"],
@@ -71,13 +72,6 @@ def environment() -> Environment:
 def now() -> str:
     """Date and time, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def command() -> list[str]:

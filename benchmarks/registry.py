@@ -188,6 +188,15 @@ def file_module(path: Path) -> ModuleType:
     return module
 
 
+@cache
+def current_code(where: str, name: str) -> str:
+    """Hash of the code of a method that is imported from ``where``."""
+    if where.endswith(".py"):
+        found = {entry.name: entry.code for entry in _from_file(Path(where))}
+        return found.get(name, "none")
+    return code_of(_file_of(importlib.import_module(where)))
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     """An error for a name that is not among the known ones, with the nearest of them."""
     names = list(known)

@@ -4,15 +4,15 @@ import re
 from pathlib import Path
 
 import pytest
+from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.specification import RunSpec
 
 from coartic import load_task
-from coartic.analysis.results.optima import entries
+from coartic.analysis.optima import entries
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks import registry as registry_module
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.specification import RunSpec
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task

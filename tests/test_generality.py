@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from coartic.analysis.results.folder import Results
 
 from coartic import load_task
 from coartic.analysis import tables
@@ -12,8 +13,7 @@ from coartic.analysis.generality.exploration import budgets, contrasts
 from coartic.analysis.generality.presence import Signs, presence, recruitment, signs
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
-from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import KnownOptimum
+from coartic.analysis.optima import KnownOptimum
 from coartic.tasks.families import names_in
 from tests.support.made_up import MadeUp, manifest_for, row
 

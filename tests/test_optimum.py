@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
-from coartic import builtin_tasks, execute, load_task
 from coartic.analysis.results import optima
 from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import ShippedOptimum, collect, entries, essence
+
+from coartic import builtin_tasks, execute, load_task
+from coartic.analysis.optima import ShippedOptimum, collect, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.learner.rows import movement_rows, movements_from
 from coartic.method import MethodError, Session

@@ -57,7 +57,7 @@ def recomputed(study, name, row, values):
     if name == "hands":
         return {"runs": len(runs), "ours": mean, "ours_sd": sd}
     if name == "learning":
-        curves = dict(study.results.rewards())
+        curves = dict(study.rewards())
         best = [best_so_far(curves[run], 100) for run in runs.run_id]
         return {"after_100": sum(best) / len(best)}
     if name == "tasks":

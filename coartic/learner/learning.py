@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -223,7 +224,7 @@ def learn_many(
     checked_model(model, radius=task.radius)
     search = search_initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(map(_checked_seed, seeds))
-    threads = _threads(jobs)
+    threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
@@ -253,12 +254,13 @@ def _checked_seed(seed: Any) -> int:
     return int(seed)
 
 
-def _threads(jobs: int) -> int:
-    if jobs == 1:
-        return 1
-    from joblib import effective_n_jobs
-
-    return int(effective_n_jobs(jobs))
+def threads_for(jobs: int) -> int:
+    """A number of threads or processes as it is asked for: -1 for one a core."""
+    if jobs > 0:
+        return jobs
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 class _Learning:

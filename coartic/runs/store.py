@@ -22,6 +22,7 @@ import numpy as np
 
 from coartic.errors import CoarticError
 from coartic.method import Meter
+from coartic.model import MotionModel
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
@@ -181,7 +182,7 @@ class StoredRun(NamedTuple):
     task: Task
     method: str
     parameters: dict[str, Any]
-    model: dict[str, Any]
+    model: MotionModel
     trial_budget: int | None
     code: str
 
@@ -195,6 +196,12 @@ class Store:
         self._cells: list[tuple[int, tuple[str, ...]]] = []  # setting, and joints in their order
         self._settings: dict[tuple[str, str], int] = {}
         self._environments: dict[str, int] = {}
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._db.close()
 
     # What was asked for.
 
@@ -396,7 +403,7 @@ class Store:
             task,
             setting["method"],
             json.loads(setting["parameters"]),
-            json.loads(setting["model"]),
+            MotionModel(**json.loads(setting["model"])),
             setting["trial_budget"],
             setting["code"],
         )

@@ -3,13 +3,13 @@
 from functools import cached_property
 
 import pandas as pd
-
-from coartic import load_task
 from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import KnownOptimum
-from coartic.analysis.study import Study
 from coartic.runs.record import Commit, Environment
 from coartic.runs.tables import Manifest, Plan, PlanLimits, PlannedCell
+
+from coartic import load_task
+from coartic.analysis.optima import KnownOptimum
+from coartic.analysis.study import Study
 
 
 class MadeUp(Study):
