@@ -14,7 +14,6 @@ to inequality tasks, IEEE Transactions on Robotics. With one row and no limit th
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -24,7 +23,6 @@ from coartic.errors import CoarticError
 from coartic.robot import Array
 
 SolverName = Literal["clarabel", "daqp", "osqp", "proxqp"]
-Modelling = Literal["cvxpy", "none"]
 
 DAMPING = 0.01
 """λ, length unit per unit of change: 1e-4 of what level 1 asks is given up where the singular
@@ -207,18 +205,6 @@ _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
     "osqp": _osqp,
     "proxqp": _proxqp,
 }
-
-
-@cache
-def cascade_for(
-    rows: int, joints: int, solver: SolverName, modelling: Modelling = "none"
-) -> Cascade:
-    """The one cascade of this process for such a task, this solver and statement."""
-    if modelling == "none":
-        return Cascade(rows, joints, solver)
-    from coartic.baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
-
-    return ModelledCascade(rows, joints, solver)
 
 
 def damped_projection(

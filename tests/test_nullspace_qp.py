@@ -18,13 +18,18 @@ from coartic.baselines.cascade import (
     SLACK,
     Cascade,
     CascadeError,
-    cascade_for,
     damped_projection,
 )
 from coartic.baselines.corrective_alone import EverySequence
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES, Aim, Controller
-from coartic.baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
+from coartic.baselines.nullspace_qp import (
+    METHODS,
+    NextGoal,
+    NullspaceQP,
+    Preshaping,
+    cascade_for,
+)
 from coartic.method import MethodError, Session
 from coartic.robot import directions
 from tests.support.strategies import configurations, tiny_task
