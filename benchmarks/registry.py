@@ -20,7 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from coartic.benchmarks.code_identity import code_of
 from coartic.errors import CoarticError
@@ -126,7 +126,13 @@ class Entry:
         Raises CoarticError for wrong parameters.
         """
         self.complete(parameters or {})
-        reason = self.made(parameters or {}).why_not(task)
+        try:
+            reason = self.made(parameters or {}).why_not(task)
+        except Exception as error:
+            raise CoarticError(
+                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
+                f"{brief(error)}"
+            ) from None
         return None if reason is None else plain(str(reason))
 
 
@@ -188,7 +194,6 @@ def file_module(path: Path) -> ModuleType:
     return module
 
 
-@cache
 def current_code(where: str, name: str) -> str:
     """Hash of the code of a method that is imported from ``where``."""
     if where.endswith(".py"):
@@ -266,6 +271,10 @@ def _entries(
                 f"{origin}: method {method.name!r} declares a file that cannot be read: "
                 f"{error.filename}"
             ) from None
+        except (SyntaxError, ValueError) as error:
+            raise MethodFileError(
+                f"{origin}: it imports what is no Python: {brief(error)}"
+            ) from None
         yield Entry(method, origin, where, code)
     if not found:
         unfinished = [
@@ -292,6 +301,17 @@ def check_declaration(method: type[Method], origin: str) -> None:
     told = getattr(method, "told", None)
     if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
         raise MethodFileError(f"{where}: told must be a set of Information, not {told!r}")
+    for attribute, kind, what in (
+        ("stochastic", bool, "True or False"),
+        ("secondary", tuple | list, "a tuple of texts"),
+        ("files", tuple | list, "a tuple of names"),
+    ):
+        if not isinstance(given := getattr(method, attribute), kind):
+            raise MethodFileError(f"{where}: {attribute} must be {what}, not {given!r}")
+    if not inspect.isclass(method.Parameters) or not issubclass(method.Parameters, BaseModel):
+        raise MethodFileError(
+            f"{where}: Parameters must be a subclass of coartic.method.Parameters"
+        )
 
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
