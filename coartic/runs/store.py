@@ -200,8 +200,11 @@ class Store:
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         self._db.close()
+        if isinstance(error, sqlite3.DatabaseError | zlib.error):
+            with _explained(self.folder):
+                raise error
 
     # What was asked for.
 
@@ -450,10 +453,12 @@ class Store:
             with self._db:
                 self._db.execute("BEGIN")
                 yield
-        except sqlite3.OperationalError as error:
+        except BaseException as error:
             self._environments.clear()
             self._settings.clear()
-            raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
+            if isinstance(error, sqlite3.OperationalError):
+                raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
+            raise
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
         names = ", ".join(f'"{name}"' for name in row)
@@ -545,8 +550,7 @@ def open_store(folder: Path) -> Store:
     if not path.is_file():
         _check_older(folder)
         raise CoarticError(f"{folder} is not a results folder: it has no {FILE}")
-    with _explained(folder):
-        connection = _connect(f"{path.resolve().as_uri()}?mode=rw", timeout_s=2.0)
+    with _explained(folder), _opened(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
         connection.execute("PRAGMA query_only = ON")
         if not _is_ours(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
@@ -565,23 +569,17 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    with _explained(folder):
-        connection = _connect(str(folder / FILE), timeout_s=0.0)
-        try:
-            # No write-ahead log: it is unsafe on network disks.
-            connection.execute("PRAGMA journal_mode = DELETE")
-            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-            connection.execute("BEGIN EXCLUSIVE")
-            connection.execute("COMMIT")
-            if not _is_ours(connection, folder):
-                connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
-        except BaseException:
-            connection.close()
-            raise
-    try:
-        yield Store(folder, connection)
-    finally:
-        connection.close()
+    with _explained(folder), _opened(str(folder / FILE), 0.0) as connection:
+        _is_ours(connection, folder)  # or it is left as it is
+        # No write-ahead log: it is unsafe on network disks.
+        connection.execute("PRAGMA journal_mode = DELETE")
+        connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+        connection.execute("BEGIN EXCLUSIVE")
+        connection.execute("COMMIT")
+        if not _is_ours(connection, folder):
+            connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
+    with Store(folder, connection) as store:
+        yield store
 
 
 def check_place(folder: Path) -> None:
@@ -612,6 +610,17 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
     return connection
 
 
+@contextmanager
+def _opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+    """A connection that stays open, unless something is wrong with it."""
+    connection = _connect(where, timeout_s)
+    try:
+        yield connection
+    except BaseException:
+        connection.close()
+        raise
+
+
 def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
     """Whether the file has our tables; False for an empty one."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
@@ -633,7 +642,7 @@ def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
 
 @contextmanager
 def _explained(folder: Path) -> Iterator[None]:
-    """What SQLite says when a file is opened, in words."""
+    """What SQLite says of a file, in words."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -642,8 +651,8 @@ def _explained(folder: Path) -> Iterator[None]:
                 f"another `coartic run` is at work in {folder}; wait for it, or choose another "
                 "folder"
             ) from None
-        raise CoarticError(f"cannot open {folder / FILE}: {error}") from None
-    except sqlite3.DatabaseError as error:
+        raise CoarticError(f"cannot use {folder / FILE}: {error}") from None
+    except (sqlite3.DatabaseError, zlib.error) as error:
         raise CoarticError(
             f"{folder / FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
             "command, or restore a copy."

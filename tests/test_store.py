@@ -1,0 +1,290 @@
+"""What is kept of runs: read back to the last bit, whatever interrupts or damages it."""
+
+import random
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import CoarticError, Movement
+from coartic.analysis.study import load
+from coartic.benchmarks.pool import Failure
+from coartic.benchmarks.provenance import command, environment, now
+from coartic.benchmarks.registry import Entry
+from coartic.benchmarks.suites import Cell
+from coartic.runs import store as store_module
+from coartic.runs.plan import BUILT_IN
+from coartic.runs.store import FILE, FORMAT, Store, open_store, writing
+from tests.support.strategies import tiny_task
+from tests.support.suites import (
+    KNOWN,
+    Failing,
+    InProcess,
+    paper_cells,
+    planned,
+    run_and_write,
+    same_results,
+)
+
+STUCK = tiny_task(
+    name="stuck", locked_base=["x", "y"], goals=[[1.5, 0.1]], initial_hands="R",
+    start={"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]},
+)  # fmt: skip
+NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
+CELLS = [
+    Cell(STUCK, KNOWN["dual-process/EC4"], (("epsilon", 0.5),)),
+    Cell(NEAR, KNOWN["nullspace-qp/none"]),
+]
+ONE = paper_cells(tasks=["ascending"])
+FEW = {"runs": 9, "trials": 20}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Runs as they were handed over, and a study of them."""
+    handed, own = {}, Store.write
+
+    def write(store, position, runs):
+        handed.update((run.run_id, run) for run in runs)
+        own(store, position, runs)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Store, "write", write)
+        return handed, run_and_write(tmp_path_factory.mktemp("written"), CELLS, trials=40)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return run_and_write(tmp_path_factory.mktemp("undisturbed"), ONE, **FEW)
+
+
+def plain(run):
+    """All of a run, numbers by their bytes."""
+    movements = {
+        part: [
+            (m.goal, m.hand, m.kind, m.ticks, m.target.tobytes(),
+             None if m.waypoints is None else m.waypoints.tobytes())
+            for m in own
+        ]
+        for part, own in run.movements.items()
+    }  # fmt: skip
+    return run.row, run.environment, run.rewards, movements
+
+
+def test_what_is_written_is_read_back(written):
+    handed, study = written
+    learner, _, planner = study.runs.run_id
+    assert {None} < set(handed[learner].rewards)
+    assert handed[planner].movements["solution"][0].waypoints is not None
+    with open_store(study.folder) as store:
+        for cell in study.plan.cells:
+            for run_id in study.run_ids[cell.task, cell.label]:
+                stored = store.run(run_id)
+                assert plain(stored.run) == plain(handed[run_id])
+                assert (stored.task, stored.method) == (study.tasks[cell.task], cell.method)
+                assert (stored.parameters, stored.model) == (cell.complete, study.model)
+    for run_id, rewards in study.rewards():
+        kept = [np.nan if reward is None else reward for reward in handed[run_id].rewards]
+        np.testing.assert_array_equal(rewards, kept)
+
+
+def test_the_views_are_plain_sql_and_go_elsewhere_in_one_call(written, tmp_path):
+    handed, study = written
+    with closing(sqlite3.connect(study.folder / FILE)) as plain_sql:
+        rows = plain_sql.execute("SELECT run_id, reward FROM runs").fetchall()
+        assert dict(rows) == {run_id: run.row["reward"] for run_id, run in handed.items()}
+        for run_id, run in handed.items():
+            solution = run.movements.get("solution", ())
+            query = 'SELECT base_x, right_4 FROM solutions WHERE run_id = ? ORDER BY "order"'
+            found = plain_sql.execute(query, (run_id,)).fetchall()
+            assert found == [(m.target[0], m.target[-1]) for m in solution]
+            query = 'SELECT right_1 FROM paths WHERE run_id = ? ORDER BY "order", waypoint'
+            points = [q[6] for m in solution if m.waypoints is not None for q in m.waypoints]
+            assert [q for (q,) in plain_sql.execute(query, (run_id,))] == points
+    study.runs.to_parquet(tmp_path / "runs.parquet")
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "runs.parquet"), study.runs)
+
+
+def test_a_lot_is_there_whole_or_not_at_all(written, tmp_path):
+    edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
+    own = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
+    run = replace(next(iter(written[0].values())), movements={"solution": own})
+
+    def some():
+        yield run
+        raise KeyboardInterrupt
+
+    with writing(tmp_path) as store:
+        store.ask(planned(CELLS, trials=40).plan, environment(), command(), now())
+        with pytest.raises(KeyboardInterrupt):
+            store.write(0, some())
+        assert store.count() == 0
+        for _ in range(2):  # the second one replaces the first
+            store.write(0, [run])
+            assert store.count() == 1
+    with open_store(tmp_path) as store:
+        assert plain(store.run(run.run_id).run) == plain(run)
+
+
+def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
+    """Lots are of eight runs and of one: the second is not begun."""
+    plan = planned(ONE, **FEW)
+
+    class Two(InProcess):
+        workers = 2
+
+    def watch(progress, _):
+        if progress.done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan.perform(tmp_path, executor=Two(), watch=watch)
+    with pytest.raises(CoarticError, match=r"has 8 of 9 runs.*Repeat"):
+        load(tmp_path)
+    assert plan.perform(tmp_path, executor=Two()).progress.done == 1
+    same_results(load(tmp_path), undisturbed)
+
+
+KILLED = """
+import sys
+from coartic.benchmarks.run import run_suite
+run_suite("paper", sys.argv[1], runs=30, trials=60, watch=lambda p, _: print(p.done, flush=True))
+"""
+
+
+def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
+    chance, there, folder = random.Random(3), [0], tmp_path / "killed"
+    command = [sys.executable, "-c", KILLED, str(folder)]
+    for _ in range(4):
+        enough = chance.randrange(40)
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            next(line for line in process.stdout if int(line) >= enough)
+            time.sleep(chance.uniform(0, 0.05))
+            process.kill()
+        with closing(sqlite3.connect(folder / FILE)) as plain_sql:
+            assert plain_sql.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+            there += plain_sql.execute("SELECT count(*) FROM results").fetchone()
+    assert there == sorted(there)
+    assert 0 < there[-1] < 210
+    options = {"runs": 30, "trials": 60, "time_limit_s": 600.0}
+    same_results(run_and_write(folder, **options), run_and_write(tmp_path / "whole", **options))
+
+
+def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
+    plan = planned(ONE, **FEW)
+    busy = pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait")
+    with writing(tmp_path):
+        with busy:
+            plan.perform(tmp_path, executor=InProcess())
+        with busy:
+            load(tmp_path)
+    plan.perform(tmp_path, executor=InProcess())
+    same_results(load(tmp_path), undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [("PRAGMA max_page_count = 40", "is full"), ("PRAGMA query_only = ON", "readonly")],
+)
+def test_a_disk_that_takes_no_more_loses_nothing(undisturbed, tmp_path, monkeypatch, limit, words):
+    first = run_and_write(tmp_path, ONE, runs=1, trials=20)
+    own = store_module._connect
+
+    def limited(*arguments):
+        connection = own(*arguments)
+        connection.execute(limit)
+        return connection
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store_module, "_connect", limited)
+        with pytest.raises(CoarticError, match=rf"{FILE}.*{words}"):
+            run_and_write(tmp_path, **FEW)
+    with open_store(tmp_path) as store:
+        assert store.run(first.runs.run_id[0]).run.row["reward"] == first.runs.reward[0]
+    same_results(run_and_write(tmp_path, ONE, **FEW), undisturbed)
+    with pytest.raises(CoarticError, match="cannot write"):
+        run_and_write(tmp_path / FILE / "below", ONE, **FEW)
+
+
+class TooSlow(InProcess):
+    def perform(self, jobs):
+        for number, _ in enumerate(jobs):
+            yield number, Failure("timeout", "time limit exceeded", 1.0)
+
+
+def test_what_is_performed_again(undisturbed, tmp_path):
+    def done(executor=None, *, time_limit_s=1.0, **how):
+        plan = planned(ONE, time_limit_s=time_limit_s, **FEW)
+        return plan.perform(tmp_path, executor=executor or InProcess(), **how).progress.done
+
+    assert done(TooSlow()) == 9
+    assert done() == 0  # with the same limit they would be too slow again
+    assert done(Failing(0), time_limit_s=2.0) == 9
+    assert load(tmp_path).runs.status.tolist() == ["crashed"] + ["ok"] * 8
+    assert done(time_limit_s=3.0) == 0
+    assert done(retry_failed=True) == 1
+    assert load(tmp_path).runs.result.tolist() == undisturbed.runs.result.tolist()
+    assert done(redo=True, time_limit_s=300.0) == 9
+    same_results(load(tmp_path), undisturbed)
+
+
+def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
+    (cell,) = ONE
+    other = Cell(cell.task, Entry(cell.entry.method, BUILT_IN, cell.entry.where, "0" * 12))
+    run_and_write(tmp_path, [other], **FEW)
+    report = planned(ONE, **FEW).perform(tmp_path, executor=InProcess())
+    assert (report.progress.stale, report.progress.present, report.progress.done) == (9, 0, 9)
+    assert "leaving out 9 runs made by a different version of the code" in repr(report)
+    same_results(load(tmp_path), undisturbed)
+    with open_store(tmp_path) as store:
+        assert store.count() == 18
+
+
+def sql(statement):
+    def run(path):
+        with closing(sqlite3.connect(path, isolation_level=None)) as plain_sql:
+            plain_sql.execute(statement)
+
+    return run
+
+
+def foreign(path):
+    path.unlink()
+    sql("CREATE TABLE notes (text)")(path)
+
+
+def older(path):
+    path.rename(path.parent / "manifest.json")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (sql(f"PRAGMA user_version = {FORMAT + 1}"), "newer version.*update coartic"),
+        (sql(f"PRAGMA user_version = {FORMAT - 1}"), "older version.*another --out"),
+        (older, "older version of coartic.*another --out"),
+        (foreign, "is not a file of coartic"),
+        (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
+        (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),
+        (lambda path: path.rename(path.with_name("notes.txt")), "(not|no) .*results"),
+    ],
+)
+def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, words):
+    def content():
+        return {path: path.is_file() and path.read_bytes() for path in tmp_path.iterdir()}
+
+    (tmp_path / FILE).write_bytes((undisturbed.folder / FILE).read_bytes())
+    spoil(tmp_path / FILE)
+    before = content()
+    for use in (load, lambda folder: run_and_write(folder, ONE, **FEW)):
+        with pytest.raises(CoarticError, match=words) as caught:
+            use(tmp_path)
+        assert str(tmp_path) in str(caught.value)
+        assert len(str(caught.value).splitlines()) == 1
+        assert content() == before
