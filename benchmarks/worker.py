@@ -182,11 +182,12 @@ def _outcome(result: Any, session: Session) -> Outcome:
         "rewards": session.rewards,
     }
     try:
+        if isinstance(result, MethodError):
+            details = _details(result.details)
+            return Outcome(result.outcome, str(result), details=details, **own)
         if isinstance(result, BaseException):
             raise result
         return Outcome("ok", **own, **_stated(result, session))
-    except MethodError as error:
-        return Outcome(error.outcome, str(error), details=error.details, **own)
     except UndeclaredError as error:
         return Outcome("crashed", str(error), **own)
     except BudgetError as error:
@@ -207,10 +208,10 @@ class _ResultError(ValueError):
 def _stated(result: Any, session: Session) -> dict[str, Any]:
     if not isinstance(result, Result):
         raise _ResultError(f"the method returned {type(result).__name__}, not a Result")
-    session.check_solution(tuple(result.solution))
     try:
+        session.check_solution(tuple(result.solution))
         parts = {part: [_plain(movement) for movement in getattr(result, part)] for part in PARTS}
-        details = json.loads(json.dumps(result.details, allow_nan=False))
+        details = _details(result.details)
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise _ResultError(f"the method's result cannot be kept: {brief(error)}") from None
@@ -219,6 +220,11 @@ def _stated(result: Any, session: Session) -> dict[str, Any]:
         "details": details,
         "bound": bound,
     }
+
+
+def _details(given: Any) -> dict[str, Any]:
+    """As plain data."""
+    return dict(json.loads(json.dumps(given, allow_nan=False)))
 
 
 def _plain(movement: Movement) -> PlainMovement:

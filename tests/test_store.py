@@ -161,7 +161,7 @@ run_suite("paper", sys.argv[1], runs=30, trials=60, watch=lambda p, _: print(p.d
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
     command = [sys.executable, "-c", KILLED, str(folder)]
-    for _ in range(4):
+    for _ in range(3):
         enough = chance.randrange(40)
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             next(line for line in process.stdout if int(line) >= enough)
