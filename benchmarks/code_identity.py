@@ -66,10 +66,12 @@ def _home(top: str, method: Path) -> Path | None:
     if top in sys.stdlib_module_names or (top == "coartic" and PACKAGE not in method.parents):
         return None
     spec = importlib.util.find_spec(top)
-    if spec is None or spec.origin is None:
+    if spec is None:
         return None
-    origin = Path(spec.origin)
-    home = origin.parent if origin.name == "__init__.py" else origin.with_suffix("")
+    if spec.submodule_search_locations:
+        home = Path(next(iter(spec.submodule_search_locations)))
+    else:
+        home = Path(spec.origin or top).with_suffix("")
     return home if "site-packages" not in home.parts or home in method.parents else None
 
 
