@@ -66,6 +66,9 @@ HANDLED = {
     "many": ("return Result(corrected(session) * 9999)", "solver-failed", "movements; at most"),
     "waypoints": ("return Result((Movement(1, 'right', 'path', session.q0, waypoints='abc'),))",
                   "solver-failed", "cannot be kept"),
+    "smuggled": ("away = [session.q0 + 1]\n        return Result((Movement("
+                 "1, 'right', 'planned', session.q0, waypoints=away), *corrected(session)))",
+                 "solver-failed", "a planned movement has no waypoints"),
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be kept: TypeError"),
     "own_word": ("raise MethodError('infeasible', 'no way', {'why': np.zeros(2)})",
