@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import tempfile
 import time
+from pathlib import Path
 
 from coartic import CONDITIONS, Task, learn_many, load_task
-from coartic.analysis.study import load
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.run import plan_suite
 from coartic.learner.learning import METHOD_PREFIX, TRIALS, warm_up
 from coartic.motion.lanes import LANES
+from coartic.runs.store import open_store
 
 
 def main() -> None:
@@ -40,7 +41,8 @@ def main() -> None:
         plan.perform(folder, executor=Local(2))
         print(f"through the harness, 2 processes: {time.perf_counter() - clock:.1f} s")
         clock = time.perf_counter()
-        load(folder)
+        with open_store(Path(folder)) as store:
+            store.frame("runs")
         print(f"read back: {time.perf_counter() - clock:.2f} s")
 
 
