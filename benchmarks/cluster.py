@@ -6,82 +6,79 @@ import logging
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from coartic.benchmarks.pool import Failure, Local
 from coartic.benchmarks.provenance import environment
-from coartic.benchmarks.registry import current_code
+from coartic.benchmarks.registry import brief, current_code
 from coartic.benchmarks.worker import Answer, Job
 from coartic.errors import CoarticError
-from coartic.text import plain
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Future
 
-WORKERS_S = 600.0
-"""How long runs wait while no worker is connected, s."""
+WORKERS_S = 600.0  # that runs wait while no worker is connected
 _ASK_EVERY_S = 2.0
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """An executor: a Dask scheduler, with this version of coartic on its workers.
-
-    ``say`` is told, line by line, what is waited for. TLS is set up in Dask's own configuration.
-    """
+    """An executor: a Dask scheduler, with this version of coartic on its workers; ``say`` is told
+    what is waited for. TLS is set up in Dask's own configuration."""
 
     def __init__(
-        self,
-        address: str,
-        *,
-        workers_s: float = WORKERS_S,
-        say: Callable[[str], None] = lambda line: None,
+        self, address: str, *, workers_s: float = WORKERS_S, say: Callable[[str], None] = print
     ) -> None:
         self.address, self.workers_s, self.say = address, workers_s, say
         self.workers = 1  # it may have any number: lots are as large as methods take them
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
-        """The number of each job with its answer, as they come. Jobs of a worker that dies are
-        performed by another.
-
-        Raises CoarticError where there is no scheduler, it is lost, it has no workers for a long
-        time, or they have another version.
+        """The number of each job with its answer, as they come; another worker takes over the
+        jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, it has
+        no workers for a long time, or they have another version.
         """
-        from distributed import CancelledError, as_completed
-        from distributed.scheduler import KilledWorker
-
         client = self._client()
         try:
+            from distributed import as_completed
+
             futures = client.map(_remote, jobs, pure=False, retries=2)
             numbers = {future.key: number for number, future in enumerate(futures)}
-            answers, waited_since = as_completed(futures), None
+            answers, waited_since = as_completed(futures, loop=client.loop), None
             while not answers.is_empty():
                 waited_since = self._check_workers(client, waited_since)
                 deadline = time.monotonic() + _ASK_EVERY_S
                 while not answers.has_ready() and time.monotonic() < deadline:
                     time.sleep(_ASK_EVERY_S / 100)
                 for future in answers.next_batch(block=False):
-                    try:
-                        yield numbers[future.key], future.result()
-                    except KilledWorker:
-                        reason = "every worker that tried this run died"
-                        yield numbers[future.key], Failure("crashed", reason, 0.0)
-                    except CancelledError:
-                        raise self._lost("the connection was closed") from None
+                    yield numbers[future.key], self._answer(future)
         finally:
             client.close(timeout=3)
+
+    def _answer(self, future: Future[Any]) -> Answer | Failure:
+        from distributed import CancelledError, KilledWorker
+
+        try:
+            return future.result()  # type: ignore[no-any-return]
+        except KilledWorker:
+            return Failure("crashed", "every worker that tried this run died", 0.0)
+        except CoarticError:
+            raise
+        except (Exception, CancelledError) as error:
+            if future.status != "error":
+                raise self._lost(error) from None
+            raise CoarticError(f"a Dask worker cannot work: {brief(error)}. {_GOES_ON}") from None
 
     def _client(self) -> Client:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
         try:
             from distributed import Client
+
+            return Client(self.address, set_as_default=False)
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
-        try:
-            return Client(self.address, set_as_default=False)
         except Exception as error:  # Dask's, of many kinds: who answers may be anybody
             raise CoarticError(
-                f"no Dask scheduler at {self.address} ({_why(error)}). Give the address that the "
+                f"no Dask scheduler at {self.address} ({brief(error)}). Give the address that the "
                 "scheduler prints, such as tcp://127.0.0.1:8786."
             ) from None
 
@@ -90,9 +87,7 @@ class Dask:
         try:
             workers = client.scheduler_info()["workers"]
         except Exception as error:
-            raise self._lost(_why(error)) from None
-        if client.status != "running":
-            raise self._lost(f"the connection is {client.status}")
+            raise self._lost(error) from None
         if workers:
             return None
         if since is None:
@@ -105,8 +100,8 @@ class Dask:
             )
         return since
 
-    def _lost(self, why: str) -> CoarticError:
-        return CoarticError(f"lost the Dask scheduler at {self.address} ({why}). {_GOES_ON}")
+    def _lost(self, error: BaseException) -> CoarticError:
+        return CoarticError(f"lost Dask scheduler {self.address} ({brief(error)}). {_GOES_ON}")
 
 
 def _remote(job: Job) -> Answer | Failure:
@@ -122,7 +117,3 @@ def _remote(job: Job) -> Answer | Failure:
     if isinstance(answer, Answer):
         answer.environment = environment()._asdict()
     return answer
-
-
-def _why(error: BaseException) -> str:
-    return plain(f"{type(error).__name__}: {error}", 300)

@@ -1,0 +1,81 @@
+"""Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
+
+import subprocess
+import sys
+
+import pytest
+
+from coartic import CoarticError
+from coartic.benchmarks import cluster as cluster_module
+from coartic.benchmarks.cluster import Dask
+from tests.support.suites import paper_cells, planned, run_and_write, same_results
+
+distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
+QUIET = {"dashboard_address": None, "silence_logs": 50}
+CELLS = paper_cells(tasks=["ascending", "two-armed-2"])
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Of a cluster in this process, which is as far as patches reach."""
+    with distributed.LocalCluster(n_workers=2, processes=False, **QUIET) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_runs_come_out_as_they_do_here(address, tmp_path):
+    there = run_and_write(tmp_path / "there", CELLS, executor=Dask(address), runs=3, trials=40)
+    same_results(there, run_and_write(tmp_path / "here", CELLS, runs=3, trials=40))
+    assert set(there.runs.together) == {3}
+
+
+def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_module, "current_code", lambda *_: "c0ffee")
+    with pytest.raises(CoarticError, match=r"code c0ffee on a Dask worker.*install the same"):
+        planned(CELLS).perform(tmp_path, executor=Dask(address))
+
+
+def test_nobody_at_an_address(tmp_path):
+    import dask
+
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}):
+        for address in ("tcp://127.0.0.1:1", "nonsense://x"):
+            with pytest.raises(CoarticError, match=f"no Dask scheduler at {address}.*8786"):
+                planned(CELLS).perform(tmp_path, executor=Dask(address))
+
+
+def test_a_cluster_without_workers(tmp_path):
+    said = []
+    with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
+        executor = Dask(cluster.scheduler_address, workers_s=0.5, say=said.append)
+        with pytest.raises(CoarticError, match="no Dask worker was connected.*Finished runs are"):
+            planned(CELLS).perform(tmp_path, executor=executor)
+    assert len(said) == 1
+
+
+SCHEDULER = """
+import sys, time
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, dashboard_address=None, silence_logs=50) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        time.sleep(60)
+"""
+
+
+def test_a_scheduler_that_is_lost(tmp_path):
+    """What was finished before is kept."""
+    (tmp_path / "scheduler.py").write_text(SCHEDULER)
+    with subprocess.Popen(
+        [sys.executable, tmp_path / "scheduler.py"], stdout=subprocess.PIPE, text=True
+    ) as process:
+        executor = Dask(process.stdout.readline().strip())
+
+        def watch(progress, what):
+            if progress.done == 2:
+                process.kill()
+
+        with pytest.raises(CoarticError, match=r"lost Dask scheduler.*repeat the command"):
+            planned(CELLS).perform(tmp_path / "out", executor=executor, watch=watch)
+    again = run_and_write(tmp_path / "out", CELLS)
+    assert (again.runs.status == "ok").all()
