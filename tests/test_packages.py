@@ -62,7 +62,7 @@ def works(environment, place):
     small = ("--tasks", "ascending", "--runs", 2, "--trials", 20)
     methods = ("--methods", "dual-process/EC1,corrective-alone/given")
     do(coartic, "run", "quick", *small, *methods, "--out", "results", cwd=place)
-    do(coartic, "report", "results", "--formats", "svg", cwd=place)
+    do(coartic, "report", "results", cwd=place)
     assert (place / "results" / "report" / "report.html").stat().st_size > 100_000
     found = do(environment / "bin" / "python", "-m", "coartic", "--version", cwd=place)
     assert found.startswith("coartic ")
@@ -92,7 +92,7 @@ def test_what_is_in_them(built):
     with zipfile.ZipFile(wheel) as file:
         names = file.namelist()
     assert not [name for name in names if "example" in name or name.startswith("tests")]
-    assert any(name.endswith("analysis/results/optima.json") for name in names)
+    assert any(name.endswith("analysis/optima.json") for name in names)
     assert any(name.endswith("benchmarks/suites/quick.toml") for name in names)
     with tarfile.open(sdist) as file:
         inside = {name.partition("/")[2] for name in file.getnames()}
