@@ -14,7 +14,7 @@ from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
-"""What can be spent: columns of ``runs.parquet``; ``solve_s`` is wall time in s."""
+"""What can be spent: columns of ``runs``; ``solve_s`` is wall time in s."""
 
 
 @dataclass(frozen=True)
