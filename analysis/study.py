@@ -57,7 +57,7 @@ class Study:
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     runs: pd.DataFrame
     """One row a run: rewards, hand sequences, what was spent (docs/results.md)."""
-    _computed: dict[Callable[..., Any], Any] = field(default_factory=dict)
+    _computed: dict[Callable[..., Any], Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
         runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")

@@ -13,10 +13,10 @@ from coartic import (
     learn_many,
     load_task,
 )
+from coartic.benchmarks.outcome import MOST_STEPS, scored
 from coartic.errors import SolutionError
 from coartic.learner.conditions import load_condition
 from coartic.motion import reference
-from coartic.runs.scores import MOST_STEPS, solved
 from tests.support.strategies import PAPER_CELLS, tiny_task
 
 
@@ -57,10 +57,10 @@ def test_no_way_is_followed_without_end():
     """Nobody waits for a hand that is sent to the end of the world and back."""
     far = 0.9 * MOST_STEPS * PAPER.step
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
-    assert solved(task, planned(posture(far), posture(far)), PAPER).reward == -192  # on the way
+    assert scored(task, planned(posture(far), posture(far)), PAPER).reward == -192  # on the way
     back = planned(posture(far), posture(0.0))
     with pytest.raises(SolutionError, match="1800000 steps; at most 1000000 are allowed"):
-        solved(task, back, PAPER)
+        scored(task, back, PAPER)
 
 
 def test_first_printed_initial_solution_step_by_step():

@@ -13,8 +13,6 @@ from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
 
-from jinja2.utils import markupsafe
-
 from coartic import CoarticError
 from coartic.analysis import tables
 from coartic.analysis.claims.ensemble import held_in_words
@@ -100,9 +98,9 @@ def page(study: Study, sections: list[Filled]) -> str:
     return template.render(
         title=_title(study),
         description=" ".join(answer["text"] for answer in answers(study)),
-        styles=markupsafe.Markup((here / "page.css").read_text(encoding="utf-8")),
-        script=markupsafe.Markup(script),
-        player=markupsafe.Markup(player.replace("<", "\\u003c")),
+        styles=(here / "page.css").read_text(encoding="utf-8"),
+        script=script,
+        player=player.replace("<", "\\u003c"),
         answers=answers(study),
         sections=[_for_page(part) for part in sections],
         claims=_claims(study),
@@ -148,7 +146,7 @@ def _table(part: Filled) -> dict[str, Any] | None:
     return {
         "id": section.table,
         "caption": section.caption,
-        "html": markupsafe.Markup(html_table(part.table, section.table, section.caption)),
+        "html": html_table(part.table, section.table, section.caption),
         "searched": len(part.table) > SEARCHED,
         "example": f"'{part.table.index[0]}'",
     }
@@ -160,7 +158,7 @@ def _figure(plot: Plot) -> dict[str, Any]:
         "id": plot.id,
         "title": plot.title,
         "caption": plot.caption,
-        "svg": markupsafe.Markup(svg_for_page(plot)),
+        "svg": svg_for_page(plot),
         "wide": points > _WIDE,
         "width": f"{_MAGNIFIED * points / 12:.0f}",
     }
