@@ -11,19 +11,22 @@ from pydantic import Field
 
 from coartic.errors import CoarticError, IncompleteError, SolutionError
 from coartic.model import MotionModel
-from coartic.motion.executions import Made, Straight, execute_straight
 from coartic.motion.movement import configuration
-from coartic.motion.solution import Execution, Kind, Movement, execute, other_arm_travel
+from coartic.motion.solution import (
+    Execution,
+    Kind,
+    Movement,
+    execute_many,
+    other_arm_travel,
+)
 from coartic.robot import Hand
 from coartic.runs.stored import Amount, Count, Itself, Plain, Reward
-from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, hands_of
 
 MOST_MOVEMENTS = 10_000
 """Movements of one solution."""
 MOST_STEPS = 1_000_000
 """Movement steps along one solution, its targets visited in order: thousands do."""
-MANY = 32
-"""Solutions from which on they are executed side by side: for fewer its kernel is not compiled."""
 _KNOWN = 512  # scores that are kept
 Unscored = CoarticError | ValueError | TypeError | OverflowError
 """Why a solution has no score."""
@@ -94,6 +97,41 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
     Raises SolutionError where it breaks the task's rules, IncompleteError where it does not
     hit every goal, and what :func:`coartic.motion.solution.execute` raises.
     """
+    (found,) = _solved(task, [solution], model)
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def _solved(
+    task: Task, solutions: Iterable[Iterable[Movement]], model: MotionModel
+) -> list[Solved | Unscored]:
+    """The score of each solution, or why it has none."""
+
+    def checked(solution: Iterable[Movement]) -> list[Movement] | Unscored:
+        try:
+            return _checked_length(task, list(solution), model)
+        except _REASONS as error:
+            return error
+
+    def score(execution: Execution) -> Solved | Unscored:
+        try:
+            return _scored(task, execution)
+        except _REASONS as error:
+            return error
+
+    each = [checked(solution) for solution in solutions]
+    try:
+        made = execute_many(task, [own for own in each if isinstance(own, list)], model=model)
+    except _REASONS as error:  # of the task or the model
+        return [error if isinstance(own, list) else own for own in each]
+    executions = iter(made)
+    found = [next(executions) if isinstance(own, list) else own for own in each]
+    return [score(own) if isinstance(own, Execution) else own for own in found]
+
+
+def _checked_length(task: Task, solution: list[Movement], model: MotionModel) -> list[Movement]:
+    """The solution itself; SolutionError where it would take too long to execute."""
     if len(solution) > MOST_MOVEMENTS:
         raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
     corners = [task.q0]
@@ -105,10 +143,7 @@ def solved(task: Task, solution: Sequence[Movement], model: MotionModel) -> Solv
     steps = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()) / model.step
     if steps > MOST_STEPS:
         raise SolutionError(f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed")
-    execution = execute(task, solution, model=model)
-    if not execution.completed:
-        raise IncompleteError(execution.reason)
-    return _scored(task, execution)
+    return solution
 
 
 def scored(task: Task, movements: tuple[PlainMovement, ...], model: MotionModel) -> Solved:
@@ -125,8 +160,6 @@ def scored_together(
 ) -> list[Solved | Unscored]:
     """:func:`scored` of many solutions of a task, in their order; what it raises in place of a
     score that cannot be had.
-
-    Many are executed side by side (:mod:`coartic.motion.executions`), which gives the same.
     """
     whose = Itself(task)
     asked = [_Exact(b"".join(row.text() for row in rows), rows) for rows in solutions]
@@ -135,17 +168,13 @@ def scored_together(
         if (before := _known.get((whose, exact, model))) is not None:
             found[exact] = before
     new = [exact for exact in dict.fromkeys(asked) if exact not in found]
-    if len(new) >= MANY:
-        found |= _side_by_side(task, new, model)
-    for exact in new:
-        if exact not in found:
-            try:
-                rows = [row.movement() for row in exact.movements]
-                found[exact] = solved(task, rows, model)
-            except _REASONS as error:
-                found[exact] = error.with_traceback(None)
-        if isinstance(score := found[exact], Solved):
+    rows = [(row.movement() for row in exact.movements) for exact in new]
+    for exact, score in zip(new, _solved(task, rows, model), strict=True):
+        found[exact] = score
+        if isinstance(score, Solved):
             _known[whose, exact, model] = score
+        else:
+            score.with_traceback(None)
     while len(_known) > _KNOWN:
         _known.pop(next(iter(_known)), None)
     return [found[exact] for exact in asked]
@@ -163,7 +192,8 @@ _known: dict[tuple[Itself, _Exact, MotionModel], Solved] = {}
 
 
 def _scored(task: Task, execution: Execution) -> Solved:
-    assert execution.reward is not None
+    if execution.reward is None:
+        raise IncompleteError(execution.reason)
     return Solved(
         reward=execution.reward,
         hands=execution.hands,
@@ -173,45 +203,4 @@ def _scored(task: Task, execution: Execution) -> Solved:
             task, hands_of(execution.hands), execution.configurations
         ),
         movements=tuple(map(PlainMovement.of, execution.movements)),
-    )
-
-
-def _side_by_side(task: Task, asked: Sequence[_Exact], model: MotionModel) -> dict[_Exact, Solved]:
-    """The scores of those that can be executed so."""
-    straight = {
-        number: Straight(*zip(*rows, strict=True))
-        for number, exact in enumerate(asked)
-        if 0 < len(exact.movements) <= MOST_MOVEMENTS
-        and (rows := _straight(exact.movements)) is not None
-    }
-    made = execute_straight(task, straight, model, most_steps=MOST_STEPS)
-    return {asked[number]: _solved(task, asked[number], own) for number, own in made.items()}
-
-
-def _straight(
-    movements: tuple[PlainMovement, ...],
-) -> list[tuple[int, Hand, Kind, tuple[float, ...]]] | None:
-    """Goal, hand, kind and target of each; None where one is a path or lacks its target."""
-    rows: list[tuple[int, Hand, Kind, tuple[float, ...]]] = []
-    for row in movements:
-        if row.target is None or row.waypoints is not None or row.kind == "path":
-            return None
-        rows.append((row.goal, row.hand, row.kind, row.target))
-    return rows
-
-
-def _solved(task: Task, exact: _Exact, made: Made) -> Solved:
-    rows, ticks = [], [0] * len(task.goals)
-    for row, spent in zip(exact.movements, made.ticks, strict=True):
-        if spent is not None:
-            ticks[row.goal - 1] += spent
-            rows.append(row if row.ticks == spent else row.model_copy(update={"ticks": spent}))
-    hands = {row.goal: row.hand for row in rows}
-    return Solved(
-        reward=-sum(ticks),
-        hands=letters_of(list(hands.values())),
-        ticks_by_goal=tuple(ticks),
-        corrections=sum(row.kind == "corrective" for row in rows),
-        other_arm_travel=other_arm_travel(task, hands.values(), made.reached),
-        movements=tuple(rows),
     )
