@@ -1,14 +1,12 @@
 """How fast the compiled learner is, how fast it could be, and how that grows.
 
-``python -m coartic.benchmarks.speed`` measures in one run, on the cells of suite ``paper`` at
-full size, microseconds of processor time a trial of: the step-by-step loop in plain NumPy (on a
-few trials of every cell, whose rewards have to be equal; its cost per trial hardly changes with
-learning); the compiled kernel with one run at a time; the same with the runs of the cell side by
-side; with as many as fill the lanes; and the floor, which is what the same steps could not do
-without: the kernel's own evaluations of forward kinematics (those that its bounds on movements do
-not skip; better bounds would lower it), at the price of one among full lanes with the check of its
-angles, and the random numbers. The price is the best of five, all else one sample. ``--repeats``
-gives the spread.
+``python -m coartic.benchmarks.speed`` measures in one run, on the cells of suite ``paper`` at full
+size, microseconds of processor time a trial of: the compiled kernel with one run at a time; the
+same with the runs of the cell side by side; with as many as fill the lanes; and the floor, which
+is what the same steps could not do without: the kernel's own evaluations of forward kinematics
+(those that its bounds on movements do not skip; better bounds would lower it), at the price of one
+among full lanes with the check of its angles, and the random numbers. The price is the best of
+five, all else one sample. ``--repeats`` gives the spread.
 """
 
 from __future__ import annotations
@@ -30,11 +28,9 @@ from coartic.benchmarks.suites import Suite, load_suite, select_cells
 from coartic.learner.conditions import ExplorationCondition
 from coartic.learner.kernel import rules_of
 from coartic.learner.learning import METHOD_PREFIX, TRIALS, LearningRun, warm_up
-from coartic.motion import reference
 from coartic.motion.compiled import addresses, entry, generator_at
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 
-SLOW_TRIALS = 60
 GROWTH_TRIALS = 2_000
 _LINKS = (3, 4, 6)  # of an arm
 _BEST_OF = 5
@@ -64,7 +60,6 @@ class Times:
     """Microseconds of processor time a trial of one cell."""
 
     name: str
-    numpy: float
     alone: float
     together: float
     full: float
@@ -73,8 +68,7 @@ class Times:
     def row(self) -> str:
         """A line of the table."""
         return (
-            f"{self.name:18}{self.numpy:8.0f}{self.alone:9.2f}{self.together:9.2f}"
-            f"{self.full:9.2f}{self.floor:8.2f}{self.numpy / self.together:12.0f}"
+            f"{self.name:18}{self.alone:9.2f}{self.together:9.2f}{self.full:9.2f}{self.floor:8.2f}"
             f"{self.alone / self.together:10.2f}{self.together / self.floor:12.2f}"
             f"{self.full / self.floor:11.2f}"
         )
@@ -103,15 +97,15 @@ def _print_cells(
     suite: Suite, cells: Sequence[tuple[Task, ExplorationCondition]], trials: int
 ) -> None:
     print(
-        f"{'cell':18}{'NumPy':>8}{'one run':>9}{f'{suite.runs} runs':>9}{f'{LANES} runs':>9}"
-        f"{'floor':>8}{'NumPy/runs':>12}{'one/runs':>10}{'runs/floor':>12}{'full/floor':>11}"
+        f"{'cell':18}{'one run':>9}{f'{suite.runs} runs':>9}{f'{LANES} runs':>9}"
+        f"{'floor':>8}{'one/runs':>10}{'runs/floor':>12}{'full/floor':>11}"
     )
     prices = _prices(Robot())
     times = []
     for task, condition in cells:
         times.append(_times(task, condition, trials, suite.runs, prices))
         print(times[-1].row(), flush=True)
-    names = ("numpy", "alone", "together", "full", "floor")
+    names = ("alone", "together", "full", "floor")
     total = Times("all", *(sum(getattr(row, name) for row in times) for name in names))
     print(total.row())
     print(
@@ -119,34 +113,25 @@ def _print_cells(
         f"{prices.normal:.1f} ns, a uniform number {prices.uniform:.1f} ns."
     )
     one, two, harness = _suite(suite, trials)
-    slow = total.numpy * trials * suite.runs / 1e6
     print(
         f"Suite {suite.name}, {len(cells) * suite.runs} runs of {trials} trials: {one:.1f} s on\n"
         f"one thread, {two:.1f} s on two (ratio {one / two:.2f}), {harness:.1f} s through the "
-        f"harness with processes,\nrecords and tables ({harness / two:.2f} times two threads); "
-        f"in plain NumPy about {slow / 3600:.1f} h on\none (ratio {slow / one:.0f}, extrapolated "
-        f"from {SLOW_TRIALS} trials a cell)."
+        f"harness with processes,\nrecords and tables ({harness / two:.2f} times two threads)."
     )
 
 
 def _times(
     task: Task, condition: ExplorationCondition, trials: int, runs: int, prices: Prices
 ) -> Times:
-    clock = time.thread_time()
-    slow = reference.learn(task, condition, seed=0, trials=SLOW_TRIALS)
-    slow_us = (time.thread_time() - clock) / SLOW_TRIALS * 1e6
     (alone,) = learn_many(task, condition, seeds=[0], trials=trials, jobs=1)
     together = learn_many(task, condition, seeds=range(runs), trials=trials, jobs=1)
     full = learn_many(task, condition, seeds=range(LANES), trials=trials, jobs=1)
     name = f"{task.name} {condition.id}"
-    if not np.array_equal(alone.rewards[:SLOW_TRIALS], slow.rewards) or not np.array_equal(
-        alone.rewards, together[0].rewards
-    ):
+    if not np.array_equal(alone.rewards, together[0].rewards):
         raise SystemExit(f"{name}: two sides disagree")
     floors = [prices.floor_us(task, condition, run) for run in full]
     return Times(
         name,
-        slow_us,
         _us([alone]),
         _us(together),
         _us(full),
