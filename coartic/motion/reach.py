@@ -224,13 +224,14 @@ def reach_in_turn(
     largest = max((end - first for first, end in pairwise(bounds)), default=1)
     lot = max(min(largest, LANES), 1)
     free = ("x" not in locked_base, "y" not in locked_base)
+    flags = np.zeros((2, lot), dtype=np.bool_)
     _reach_all(
         _Asked(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
         _How(
             robot.arm("left"), robot.arm("right"), radius, Corrector(*free), model, corrects, looks
         ),
         made,
-        _Work(runs_for(lot, robot), *np.zeros((2, lot), np.bool_), lanes_for(robot)),
+        _Work(runs_for(lot, robot), flags[0], flags[1], lanes_for(robot)),
     )
     return made
 
@@ -273,7 +274,7 @@ def reach_unchecked(
     )
     back = np.empty_like(order)
     back[order] = np.arange(count)
-    return Reached(*(field[back, 0] for field in made))
+    return Reached._make(field[back, 0] for field in made)
 
 
 def reach(
@@ -306,8 +307,8 @@ def reach(
     for other locks, and for a model that no movement can be made with. Source: paper, sections
     *Generating Movement for Each Goal* and *The Corrective Process*.
     """
-    checked_model(model, radius=radius if corrects else None)
     checked_goal((0.0, 0.0), radius)
+    checked_model(model, radius=radius if corrects else None)
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     count, dof = len(hands), robot.dof

@@ -286,7 +286,7 @@ def _reach(task: Task, number: int, due: _Due, how: _How, model: MotionModel) ->
         locked_base=task.locked_base,
         model=model,
     )
-    return Reached(*(field[:, 0] for field in made))
+    return Reached._make(field[:, 0] for field in made)
 
 
 def _by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:
