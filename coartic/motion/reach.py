@@ -101,7 +101,7 @@ def _aim(first: int, count: int, g: int, asked: Any, work: Any) -> None:
             fill_row(target, run.target)
 
 
-@inlined
+@inner
 def _move_acting(
     first: int, count: int, g: int, goal: Any, stops: bool, asked: Any, how: Any, work: Any
 ) -> None:
