@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,12 @@ from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.provenance import environment, now
 from coartic.benchmarks.registry import Entry
 from coartic.benchmarks.worker import Answer, Outcome, PlainMovement
-from coartic.errors import CoarticError, IncompleteError, SolutionError
+from coartic.errors import IncompleteError, SolutionError
 from coartic.learner.kernel import PARTS as TENTHS
 from coartic.learner.learning import CORRECTIONS
 from coartic.method import Information, Meter
 from coartic.model import MotionModel
-from coartic.motion.solution import Execution, Movement, execute, other_arm_travel
+from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel
 from coartic.robot import Hand
 from coartic.runs.plan import SEARCH
 from coartic.runs.store import PARTS, RESULTS, Environment, Run
@@ -55,84 +56,88 @@ def kept(
         "together": len(names),
         "process_peak_mb": answer.process_peak_mb,
     }
-    runs = []
-    for name, outcome in zip(names, answer.outcomes, strict=True):
-        executions: dict[str, Execution] = {}
-        try:
-            _check(outcome, entry)
-            executions = {
-                part: scored(task, [_movement(row) for row in outcome.parts[part]], model)
-                for part in PARTS
-                if outcome.status == "ok" and (part == "solution" or part in outcome.parts)
-            }
-        except _FalseClaimError as error:
-            outcome = Outcome(error.status, str(error))
-        except IncompleteError as error:
-            outcome = _ended(outcome, "infeasible", str(error))
-        except (CoarticError, ValueError, TypeError, KeyError, OverflowError) as error:
-            outcome = _ended(outcome, "solver-failed", f"the solution cannot be executed: {error}")
-        made_with = environment()
-        if answer.environment is not None:
-            made_with = Environment(**answer.environment)
-        runs.append(_run(name, outcome, executions, times, task, made_with))
-    return runs
+    made_with = environment() if answer.environment is None else Environment(**answer.environment)
+    outcomes = [_believed(outcome, entry) for outcome in answer.outcomes]
+    parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
+    found = scored(
+        task, [list(map(_movement, outcomes[n].parts[part])) for n, part in parts], model
+    )
+    executions: list[dict[str, Execution]] = [{} for _ in outcomes]
+    for (n, part), execution in zip(parts, found, strict=True):
+        if isinstance(execution, Execution):
+            executions[n][part] = execution
+        elif isinstance(execution, IncompleteError):
+            outcomes[n] = _ended(outcomes[n], "infeasible", str(execution))
+        else:
+            why = f"the solution cannot be executed: {execution}"
+            outcomes[n] = _ended(outcomes[n], "solver-failed", why)
+    return [
+        _run(name, outcome, own if outcome.status == "ok" else {}, times, task, made_with)
+        for name, outcome, own in zip(names, outcomes, executions, strict=True)
+    ]
 
 
-def scored(task: Task, solution: Sequence[Movement], model: MotionModel) -> Execution:
-    """Execute a solution: the only score that counts.
+def scored(
+    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel
+) -> list[Execution | Exception]:
+    """Execute solutions side by side: the only scores that count.
 
-    Raises SolutionError where it breaks the task's rules, IncompleteError where it does not
-    hit every goal.
+    In place of an execution, a SolutionError for a solution that breaks the task's rules, an
+    IncompleteError for one that does not hit every goal.
     """
+    too_long = [_too_long(task, solution, model) for solution in solutions]
+    good = [own for own, error in zip(solutions, too_long, strict=True) if error is None]
+    made = iter(execute_many(task, good, model=model))
+    found: list[Execution | Exception] = []
+    for error in too_long:
+        execution = next(made) if error is None else error
+        if isinstance(execution, Execution) and not execution.completed:
+            found.append(IncompleteError(execution.reason))
+        else:
+            found.append(execution)
+    return found
+
+
+def _too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
+    """What is wrong with a solution that would take very long to execute."""
     if len(solution) > MOST_MOVEMENTS:
-        raise SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
+        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
     corners = [task.q0]
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
-    if len({len(corner) for corner in corners}) == 1:  # or it breaks the rules
-        steps = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()) / model.step
+    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
+        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / model.step
         if steps > MOST_STEPS:
-            raise SolutionError(f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed")
-    execution = execute(task, solution, model=model)
-    if not execution.completed:
-        raise IncompleteError(execution.reason)
-    return execution
+            return SolutionError(
+                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+            )
+    return None
 
 
-class _FalseClaimError(Exception):
-    """A method claims what it may not."""
-
-    def __init__(self, status: str, reason: str) -> None:
-        super().__init__(reason)
-        self.status = status
-
-
-def _check(outcome: Outcome, entry: Entry) -> None:
-    """Raises _FalseClaimError for an outcome that its method cannot have."""
+def _believed(outcome: Outcome, entry: Entry) -> Outcome:
+    """An outcome, or what becomes of one that its method cannot have."""
     used = {*outcome.used}
-    if any(kind == "corrective" and target is None
-           for _, _, kind, target, _ in outcome.parts.get("solution", [])):  # fmt: skip
+    solution = outcome.parts.get("solution", [])
+    if any(kind == "corrective" and target is None for _, _, kind, target, _ in solution):
         used.add(Information.CORRECTIVE_PROCESS.value)
     undeclared = sorted(used - {*entry.told})
     if undeclared:
-        raise _FalseClaimError(
-            "crashed", f"the method used {undeclared[0]!r}, which it does not declare"
-        )
+        why = f"the method used {undeclared[0]!r}, which it does not declare"
+        return Outcome("crashed", why)
     if outcome.status not in _STATUSES:
-        raise _FalseClaimError("solver-failed", f"it states the status {outcome.status!r}")
+        return Outcome("solver-failed", f"it states the status {outcome.status!r}")
     if outcome.bound is not None and not entry.name.startswith(SEARCH):
-        raise _FalseClaimError(
-            "solver-failed", f"it states a bound, which is for this project's methods {SEARCH}*"
-        )
+        why = f"it states a bound, which is for this project's methods {SEARCH}*"
+        return Outcome("solver-failed", why)
+    if outcome.status != "ok":
+        return replace(outcome, parts={}, bound=None)
+    return replace(outcome, parts={"solution": [], **outcome.parts})
 
 
 def _ended(outcome: Outcome, status: str, reason: str) -> Outcome:
     """An outcome whose solution is none."""
-    return Outcome(
-        status, reason, details=outcome.details, used=outcome.used, meter=outcome.meter,
-        rewards=outcome.rewards,
-    )  # fmt: skip
+    return replace(outcome, status=status, reason=reason, parts={}, bound=None)
 
 
 def _movement(row: PlainMovement) -> Movement:

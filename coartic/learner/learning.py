@@ -29,7 +29,7 @@ from coartic.learner.kernel import (
     work_for,
 )
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.compiled import addresses, compile_together
+from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import InitialSearch, search_initial_hands
 from coartic.motion.lanes import LANES
@@ -346,20 +346,12 @@ def warm_up(task: Task, *, learns: bool = True) -> None:
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
-
-    def learner() -> None:
+    if learns:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
         _compile_for(task, condition, PAPER, InitialSearch(hands))
-
-    def movements() -> None:
-        move(task.robot, task.q0, task.q0, hand, goal, task.radius)
-        correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
-        make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
-
-    kernels = {"learner": learner, "movements": movements}
-    if not learns:
-        del kernels["learner"]
-    compile_together(kernels, str(task.robot.most_links))
+    move(task.robot, task.q0, task.q0, hand, goal, task.radius)
+    correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
+    make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
 
 
 def _compile_for(
