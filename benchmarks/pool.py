@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from copy import copy
 from dataclasses import dataclass
 from itertools import groupby
@@ -28,10 +29,12 @@ from pebble import ProcessExpired, ProcessPool
 
 from coartic.benchmarks.provenance import THREADS
 from coartic.benchmarks.worker import Answer, Job, learns, perform, prepare
+from coartic.errors import CoarticError
 from coartic.learner.learning import threads_for
 from coartic.text import plain
 
 _AHEAD = 2  # jobs a worker that wait for it
+_LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
 
 
@@ -98,6 +101,12 @@ class Local:
                         number, started = running.pop(future)
                         seconds = time.monotonic() - started
                         yield number, _answer(future, jobs, number, seconds, Path(folder))
+            except RuntimeError:  # the pool's own
+                said = {_last_words(file) for file in Path(folder).glob("*.txt")}
+                raise CoarticError(
+                    f"worker processes cannot begin ({'; '.join(sorted(said))}); finished runs are "
+                    "kept"
+                ) from None
             finally:
                 pool.stop()  # type: ignore[no-untyped-call]
                 pool.join()
@@ -123,6 +132,8 @@ def _answer(
                 how = f"killed by {signal.Signals(-error.exitcode).name}"
         reason = f"the worker process ended ({how}): {_last_words(folder / f'{error.pid}.txt')}"
         return Failure("crashed", reason, seconds)
+    except BrokenProcessPool:
+        raise
     except Exception as error:  # its answer cannot be read
         return Failure("crashed", plain(f"{type(error).__name__}: {error}"), seconds)
 
@@ -164,7 +175,7 @@ def _bound_memory(workers: int) -> None:
         total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (ImportError, ValueError, OSError):
         return
-    share = total * 8 // (10 * workers)
+    share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
     resource.setrlimit(resource.RLIMIT_DATA, (share, share))
 
 

@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 
 import coartic
-from coartic import load_task
+from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
+from coartic.benchmarks.worker import job_of
 from coartic.runs.store import open_store
 from tests.support.suites import KNOWN, run_and_write
 
@@ -171,6 +172,13 @@ def test_a_script_needs_no_guard(tmp_path):
     assert said[:-1] == ["begun", "watched", "watched"]
     assert said[-1].startswith("1 run in")
     assert load(tmp_path / "out").runs.reward.tolist() == [HONEST]
+
+
+def test_workers_that_cannot_begin_get_a_sentence():
+    entry, task = KNOWN["dual-process/EC1"], load_task("ascending").model_dump(mode="json")
+    job = job_of(entry, task | {"goals": []}, entry.complete({}), (0,))
+    with pytest.raises(CoarticError, match="worker processes cannot begin.*goals is empty"):
+        list(Local(1).perform([job] * 10))
 
 
 def session_of(leader):
