@@ -200,8 +200,11 @@ class Store:
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         self._db.close()
+        if isinstance(error, sqlite3.Error):
+            with _explained(self.folder):
+                raise error
 
     # What was asked for.
 
@@ -579,7 +582,8 @@ def writing(folder: Path) -> Iterator[Store]:
             connection.close()
             raise
     try:
-        yield Store(folder, connection)
+        with _explained(folder):
+            yield Store(folder, connection)
     finally:
         connection.close()
 
@@ -633,7 +637,7 @@ def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
 
 @contextmanager
 def _explained(folder: Path) -> Iterator[None]:
-    """What SQLite says when a file is opened, in words."""
+    """What SQLite says of a file, in words."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -642,7 +646,7 @@ def _explained(folder: Path) -> Iterator[None]:
                 f"another `coartic run` is at work in {folder}; wait for it, or choose another "
                 "folder"
             ) from None
-        raise CoarticError(f"cannot open {folder / FILE}: {error}") from None
+        raise CoarticError(f"cannot use {folder / FILE}: {error}") from None
     except sqlite3.DatabaseError as error:
         raise CoarticError(
             f"{folder / FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
