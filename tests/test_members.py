@@ -120,7 +120,7 @@ def test_claims_are_judged_for_each_member():
     assert set(own.index) == {"", *names[2:], "two-armed-1-m001"}
     assert own.effect["two-armed-1-m002"] > 0 > own.effect["two-armed-1-m003"]
     assert own.verdict[["", *names[2:]]].tolist() == ["supported", "supported", "not supported"]
-    twice = judged_specifications([study, study], claims=claims)
+    twice = judged_specifications([study, study], claims=claims, jobs=2)
     pd.testing.assert_frame_equal(twice, found)
     counted = shares(found).set_index(["claim", "kind"])
     assert counted.specifications["ec4-beats-ec3", "two-armed-1"] == 3
