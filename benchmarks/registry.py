@@ -11,6 +11,7 @@ import inspect
 import json
 import re
 import sys
+import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -196,6 +197,15 @@ def file_module(path: Path) -> ModuleType:
 
 def current_code(where: str, name: str) -> str:
     """Hash of the code of a method that is imported from ``where``."""
+    with _parsing:
+        return _current_code(where, name)
+
+
+_parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
+
+
+@cache
+def _current_code(where: str, name: str) -> str:
     if where.endswith(".py"):
         found = {entry.name: entry.code for entry in _from_file(Path(where))}
         return found.get(name, "none")

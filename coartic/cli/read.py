@@ -129,9 +129,16 @@ def verify(
 ) -> None:
     """Execute every stored solution again and compare."""
     from coartic.analysis.verify import verify
+    from coartic.runs.store import open_store
 
-    report = verify(folder)
-    say(*report.sentences())
+    with open_store(folder):  # or it says what is the matter
+        report = verify(folder)
+    say(
+        f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
+        *(report.wrong or ["Nothing differs."]),
+        "Not checked:",
+        *(f"- {words}" for words in report.unchecked),
+    )
     different = bool(report.wrong)
     if again:
         from coartic.benchmarks.registry import registry
