@@ -153,7 +153,7 @@ def make(task: Any, q: Array, movement: Movement) -> tuple[Array, int, bool]:
     points = path(q, waypoints, model) if on_path else line(q, target, model)
     x, y = hand_at(points, arm, on_path)
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
-    hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) < task.radius
+    hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
     stops = hits.copy()
     if kind in ("learned", "planned") or (kind == "corrective" and model.corrective_arrival):
         end_x, end_y = hand_at(target[:, None], arm)
@@ -222,8 +222,8 @@ class Report(NamedTuple):
 
 def verify(folder: Path) -> Report:
     """Check all runs of a folder, asked for last or not. sqlite3.Error: it cannot be read."""
-    place = (folder / "runs.sqlite").resolve().as_uri()
-    with closing(sqlite3.connect(f"{place}?mode=ro", uri=True)) as db:
+    place = f"{(folder / 'runs.sqlite').resolve().as_uri()}?mode=ro"
+    with closing(sqlite3.connect(place, uri=True)) as db:
         db.row_factory = sqlite3.Row
         return check_all(db)
 
@@ -235,7 +235,7 @@ def check_all(db: sqlite3.Connection) -> Report:
         query = f"SELECT count(*) FROM {table} WHERE result_id NOT IN (SELECT id FROM results)"
         if lost := db.execute(query).fetchone()[0]:
             wrong.append(f"{lost} rows of table {table} are of no run.")
-    runs = movements = unsolved = 0
+    runs, movements, unsolved = 0, 0, 0
     rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
     query = "SELECT *, results.id AS own FROM results LEFT JOIN settings ON settings.id = setting"
     for row in db.execute(query):
@@ -274,11 +274,11 @@ def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list
     query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
     for order, number, *q in db.execute(query, [run]):
         need(number == len(waypoints[order]), f"movement {order} lacks a waypoint")
-        waypoints[order].append(np.array(q, dtype=np.float64))
+        waypoints[order].append(np.array(q, np.float64))
     query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
     for part, order, *facts in db.execute(query, [run]):
         points = waypoints.pop(order, []) if part == "solution" else []
-        parts[part].append(Movement(order, *facts[:4], np.array(facts[4:], np.float64), points))
+        parts[part].append(Movement._make([order, *facts[:4], np.array(facts[4:]) * 1.0, points]))
     need(not waypoints, "it has waypoints of no movement")
     return parts
 
