@@ -1,0 +1,21 @@
+"""The pages of the site whose numbers come from stored results."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parent.parent / "docs"
+_SPEC = importlib.util.spec_from_file_location("make_findings", DOCS / "make_findings.py")
+make_findings = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(make_findings)
+
+
+@pytest.mark.parametrize("page", ["findings.md", "paper.md"])
+def test_a_page_is_its_template_filled_from_the_stored_tables(page):
+    assert make_findings.filled_pages()[page] == (DOCS / page).read_text(encoding="utf-8")
+
+
+def test_a_sentence_that_no_longer_holds_is_refused():
+    with pytest.raises(ValueError, match="CMA-ES is nearer"):
+        make_findings.expect(1 > 2, "CMA-ES is nearer")
