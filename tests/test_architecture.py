@@ -125,8 +125,9 @@ def test_help_needs_no_compiler():
 
 
 def test_one_kinematic_module():
-    """No cosine or sine is taken outside the robot and the functions handed to it."""
-    home = {"coartic/robot.py", "coartic/motion/trigonometry.py"}
+    """No cosine or sine is taken outside the robot and the functions handed to it, but by the
+    check of results, which imports neither."""
+    home = {"coartic/robot.py", "coartic/motion/trigonometry.py", "analysis/verify.py"}
     pattern = re.compile(r"\b(np|numpy|math|casadi|ca|cs)\.(cos|sin|tan|exp)\(|\b(cosine|sine)\(")
     for path in sources():
         if path.relative_to(ROOT).as_posix() not in home:

@@ -1,0 +1,300 @@
+"""Is what a results folder says true? Every stored solution is executed again.
+
+This file stands on its own: it needs Python and NumPy, and imports nothing of coartic. Run as
+``python verify.py FOLDER``, it opens ``FOLDER/runs.sqlite`` and checks of every run that its
+solution keeps the rules and hits every goal; that each movement takes the stored ticks, exactly;
+that rewards, hands, corrections and the other arm's travel are those of the movements; and that no
+reward is above a proven bound of the task. A learner's first trial, and one without noise after it
+has learned, are checked likewise.
+
+The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
+Acquisition*): A robot, a mobile base with two arms, hits goals with its hands, in their order. A
+configuration q holds x and y of the base, then the angles of the left arm and of the right arm. A
+movement goes from q straight to a target q^t in steps of length m; its last step, a shorter one,
+ends at q^t. Before each step the robot looks. It stops if its hand is within the radius of the
+goal (a hit); in a learned or planned movement, also if its hand is within θ^a of where q^t would
+put it (arrival). k steps cost k ticks, and stopping costs one. The reward is minus all ticks. Each
+goal has one hand. The first movement for a goal, unless corrective, is always made, the others
+only while the goal is not hit. A path leads through waypoints and stops on a hit or at its end.
+The targets of corrective movements are stored; the corrective process is not run again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sqlite3
+import sys
+from collections import defaultdict
+from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+COLUMNS = {  # of table results: what is said of each solution that is stored of a run
+    "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
+    "initial": ("initial_reward", "initial_hands"),
+    "replay": ("replay_reward", "replay_hands"),
+}
+UNCHECKED = (
+    "Times, memory, counts of what was spent, and rewards of single trials are taken as stored.",
+    "Tasks, constants and parameters are taken as stored with each run, and proven bounds as true.",
+    "A change of a configuration that leaves all ticks and that travel as they are is not seen.",
+    "No method is run: `coartic verify --again N` sees whether it finds these solutions again.",
+)
+
+
+def need(holds: Any, words: str) -> None:
+    """Raises ValueError with these words where something does not hold."""
+    if not holds:
+        raise ValueError(words)
+
+
+# Ticks have to agree exactly, and the last bit of a hand's position can decide where a movement
+# stops. So everything is added and multiplied in coartic's order, and cosine and sine are its
+# polynomials: IEEE arithmetic then gives the same bits on every computer.
+HIGH, MIDDLE, LOW = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+S3, S5, S7, S9, S11, S13, S15, S17 = ((-1) ** n / math.factorial(2 * n + 1) for n in range(1, 9))
+C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in range(2, 9))
+
+
+def cosine_and_sine(angles: Array) -> tuple[Array, Array]:
+    """Of angles in rad: less k quarters of a turn (π/2 in three parts), by the Taylor series."""
+    quarters = np.rint(angles * (2.0 / math.pi))
+    x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
+    z = x * x
+    z2, z4 = z * z, (z * z) * (z * z)
+    odd = (S3 + z * S5) + z2 * (S7 + z * S9) + z4 * ((S11 + z * S13) + z2 * (S15 + z * S17))
+    even = (C4 + z * C6) + z2 * (C8 + z * C10) + z4 * ((C12 + z * C14) + z2 * C16)
+    sine, cosine = x + (x * z) * odd, 1.0 - (0.5 * z - z2 * even)
+    k = quarters.astype(np.int64)
+    cosine, sine = np.where(k & 1, sine, cosine), np.where(k & 1, cosine, sine)
+    cosine, sine = np.where((k + 1) & 2, -cosine, cosine), np.where(k & 2, -sine, sine)
+    far = np.abs(angles) >= 1e5  # rad; three parts of π/2 are too few: the C library's
+    cosine[far] = [math.cos(angle) for angle in angles[far]]
+    sine[far] = [math.sin(angle) for angle in angles[far]]
+    return cosine, sine
+
+
+def hand_at(q: Array, arm: Any, on_path: bool = False) -> tuple[Array, Array]:
+    """x and y of the hand, for configurations in columns. On paths, by NumPy's cosine and sine."""
+    joints, links, shoulder = arm
+    x, y = q[0] + shoulder[0], q[1] + shoulder[1]
+    angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
+    waves = (np.cos(angles), np.sin(angles)) if on_path else cosine_and_sine(angles)
+    for length, cosine, sine in zip(links, *waves, strict=True):
+        x, y = x + length * cosine, y + length * sine
+    return x, y
+
+
+def read_task(definition: str, model: str) -> Any:
+    """A task as it is stored, with the constants of movement, and what follows from both."""
+    task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
+    task.model = SimpleNamespace(**json.loads(model))
+    task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
+    task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
+    robot, middle = task.robot, 2 + len(task.robot.left_links)
+    task.arms = {  # place in q, lengths of the links, and the shoulder's place on the base
+        "left": (slice(2, middle), robot.left_links, robot.left_shoulder),
+        "right": (slice(middle, None), robot.right_links, robot.right_shoulder),
+    }
+    names = [f"{hand}_{k + 1}" for hand, arm in task.arms.items() for k in range(len(arm[1]))]
+    task.columns = ", ".join(["base_x", "base_y", *names])
+    return task
+
+
+class Movement(NamedTuple):
+    """A movement as it is stored."""
+
+    order: int  # from 0
+    goal: int  # from 1
+    hand: str
+    kind: str  # learned, planned, corrective, path
+    ticks: int
+    target: Array
+    waypoints: list[Array]  # of a path
+
+
+def line(q: Array, target: Array, model: Any) -> Array:
+    """The points of a straight movement, in columns."""
+    difference = target - q
+    distance = math.sqrt(np.cumsum(difference * difference)[-1])
+    last = math.ceil(distance / model.step)
+    fractions = np.arange(last + 1) * model.step / (distance or 1.0)
+    points: Array = q[:, None] + fractions * difference[:, None]
+    if last == 0 or not model.whole_last_step:  # another reading has the last step pass q^t
+        points[:, -1] = target
+    return points
+
+
+def path(q: Array, waypoints: list[Array], model: Any) -> Array:
+    """The points of a path, in columns. Point k lies k steps along it, the last at its end."""
+    corners = np.array([q, *waypoints])
+    lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    last = math.ceil(ends[-1] / model.step)
+    along = np.append(np.arange(last) * model.step, ends[-1])
+    points = np.array([np.interp(along, ends, joint) for joint in corners.T])
+    points[:, -1] = corners[-1]
+    if model.whole_last_step and last:
+        final, beyond = np.flatnonzero(lengths)[-1], last * model.step - ends[-1]
+        points[:, -1] += beyond / lengths[final] * (corners[final + 1] - corners[final])
+    return points
+
+
+def make(task: Any, q: Array, movement: Movement) -> tuple[Array, int, bool]:
+    """Make a movement from q: where it stops, after how many ticks, and whether that is a hit."""
+    _, goal, hand, kind, _, target, waypoints = movement
+    model, arm, on_path = task.model, task.arms[hand], kind == "path"
+    points = path(q, waypoints, model) if on_path else line(q, target, model)
+    x, y = hand_at(points, arm, on_path)
+    dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
+    hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
+    stops = hits.copy()
+    if kind in ("learned", "planned") or (kind == "corrective" and model.corrective_arrival):
+        end_x, end_y = hand_at(target[:, None], arm)
+        dx, dy = end_x - x, end_y - y
+        stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
+    stops[-1] = True
+    stops[0] &= len(stops) == 1 or not model.first_step  # in another reading it looks later
+    k = int(np.argmax(stops))  # the first
+    return points[:, k], k + model.arrival_tick, bool(hits[k])
+
+
+def execute(task: Any, movements: list[Movement]) -> tuple[int, str, int, float]:
+    """Reward, hands, corrections made, and travel of the arms not chosen, from hit to hit, in rad.
+    Raises ValueError where a movement breaks a rule or takes other ticks than are stored."""
+    check_rules(task, movements)
+    q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
+    for goal in range(1, len(task.goals) + 1):
+        own, before = [movement for movement in movements if movement.goal == goal], q
+        _, _, hit = make(task, q, own[0]._replace(kind="planned", target=q))  # where it stands
+        for movement in own:
+            which, is_corrective = f"movement {movement.order}", movement.kind == "corrective"
+            if hit and (is_corrective or movement is not own[0]):
+                # Nothing is to be done. A movement of no ticks to where it is names the hand.
+                is_none = len(own) == 1 and not movement.ticks and (movement.target == q).all()
+                need(is_none, f"{which} is made after goal {goal} is hit")
+                continue
+            q, ticks, hit = make(task, q, movement)
+            need(ticks == movement.ticks, f"{which} takes {ticks} ticks, not {movement.ticks}")
+            reward, corrections = reward - ticks, corrections + is_corrective
+        need(hit, f"goal {goal} is not hit")
+        hands += own[0].hand[0].upper()
+        other = task.arms["right" if own[0].hand == "left" else "left"][0]
+        travel += math.dist(q[other], before[other])
+    return reward, hands, corrections, travel
+
+
+def check_rules(task: Any, movements: list[Movement]) -> None:
+    """Raises ValueError where movements break a rule, whatever comes of them."""
+    goals, way = [movement.goal for movement in movements], [task.q0]
+    hands = sorted({(movement.goal, movement.hand) for movement in movements})
+    need(goals == sorted(goals), f"its goals are out of order: {goals}")
+    need([goal for goal, _ in hands] == [*range(1, len(task.goals) + 1)], "a goal has not one hand")
+    for place, (order, _, hand, kind, ticks, target, waypoints) in enumerate(movements):
+        which, corners = f"movement {order}", np.array([*waypoints, target])
+        need(order == place, f"movement {place} is missing")
+        need(hand in task.hands, f"{which} uses the {hand} hand, which the task does not have")
+        need(kind in ("learned", "planned", "corrective", "path"), f"{which} is of no known kind")
+        need(type(ticks) is int and ticks >= 0, f"{which} takes {ticks} ticks, which is no count")
+        need(bool(waypoints) == (kind == "path"), f"{which}: a path, and no other, has waypoints")
+        need(np.isfinite(corners).all(), f"{which} has an entry that is no number")
+        need((corners[-2:] == target).all(), f"{which} does not end at its last waypoint")
+        need((corners == task.q0)[:, task.locked].all(), f"{which} moves a locked base")
+        way += [*corners]
+    length = np.sqrt((np.diff(way, axis=0) ** 2).sum(axis=1)).sum()
+    need(length <= 1e6 * task.model.step, "it has over a million steps")
+
+
+class Report(NamedTuple):
+    """What was found."""
+
+    runs: int  # checked
+    movements: int  # executed
+    wrong: list[str]  # what differs, a sentence each
+    unchecked: list[str]  # what was not checked, a sentence each
+
+
+def verify(folder: Path) -> Report:
+    """Check all runs of a folder, asked for last or not. sqlite3.Error: it cannot be read."""
+    place = (folder / "runs.sqlite").resolve().as_uri()
+    with closing(sqlite3.connect(f"{place}?mode=ro", uri=True)) as db:
+        db.row_factory = sqlite3.Row
+        return check_all(db)
+
+
+def check_all(db: sqlite3.Connection) -> Report:
+    """Check the runs one by one, and that none is better than another proves possible."""
+    wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
+    for table in ("movements", "waypoints", "learning"):
+        query = f"SELECT count(*) FROM {table} WHERE result NOT IN (SELECT id FROM results)"
+        if lost := db.execute(query).fetchone()[0]:
+            wrong.append(f"{lost} rows of table {table} are of no run.")
+    runs = movements = unsolved = 0
+    rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
+    query = "SELECT *, results.id AS own FROM results LEFT JOIN settings ON settings.id = setting"
+    for row in db.execute(query):
+        run, same, bound = row["run_id"], (row["definition"], row["model"]), row["proven_bound"]
+        where, runs, unsolved = f"Run {run}", runs + 1, unsolved + (row["status"] != "ok")
+        try:
+            task, chosen = read_task(*same), json.loads(row["parameters"])
+            parts = read_parts(db, row["own"], task.columns)
+            need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
+            for part, own in parts.items():
+                where, movements = f"Run {run}, {part}", movements + len(own)
+                found = execute(task, own) if own else (None, None, None, None)
+                for name, again in zip(COLUMNS[part], found, strict=False):
+                    is_close = name == "other_arm_travel" and own and abs(row[name] - again) <= 1e-9
+                    need(is_close or row[name] == again, f"{name} is {again}, not {row[name]}")
+                rewards[same] += [(found[0], run)] if own else []
+            # A search of fewer movements than the task allows proves nothing of the others.
+            if chosen.get("base", "task") == "task" and chosen.get("other_arm") != "still":
+                bounds[same] += [(int(bound), run)] if bound is not None else []
+        except Exception as problem:  # whatever keeps a run from being executed
+            wrong.append(f"{where}: {problem}.")
+    for same, proofs in bounds.items():
+        bound, proof = min(proofs, default=(0, ""))
+        better = [run for reward, run in rewards[same] if reward > bound]
+        wrong += [f"Run {run} is better than bound {bound} of run {proof}." for run in better]
+    query = "SELECT (SELECT coalesce(sum(runs), 0) FROM cells) - count(*) FROM runs"
+    rest = f"Runs without a solution: {unsolved}; missing runs: {db.execute(query).fetchone()[0]}."
+    return Report(runs, movements, wrong, [*UNCHECKED, rest])
+
+
+def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[Movement]]:
+    """The movements of a run, by the solution that they belong to."""
+    parts: dict[str, list[Movement]] = {part: [] for part in COLUMNS}
+    waypoints = defaultdict[int, list[Array]](list)
+    where = 'WHERE result = ? ORDER BY "order"'
+    query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
+    for order, number, *q in db.execute(query, [run]):
+        need(number == len(waypoints[order]), f"movement {order} lacks a waypoint")
+        waypoints[order].append(np.array(q, dtype=np.float64))
+    query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
+    for part, order, goal, hand, kind, ticks, *q in db.execute(query, [run]):
+        points = waypoints.pop(order, []) if part == "solution" else []
+        parts[part].append(Movement(order, goal, hand, kind, ticks, np.array(q, float), points))
+    need(not waypoints, "it has waypoints of no movement")
+    return parts
+
+
+def main() -> int:
+    """Check the folder that the command names, this one if it names none; say what was found."""
+    folder = Path(*sys.argv[1:])
+    try:
+        report = verify(folder)
+    except sqlite3.Error as error:
+        print(f"{folder} cannot be read: {error}.")
+        return 2
+    print(f"{report.runs} runs checked, {report.movements} movements executed.")
+    print(*report.wrong or ["Nothing differs."], "Not checked:", *report.unchecked, sep="\n")
+    return 1 if report.wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
