@@ -30,7 +30,7 @@ _SPECIAL = {
 
 @dataclass(frozen=True)
 class MethodSource:
-    """A method as a manifest or the registry declares it."""
+    """A method as a plan or the registry declares it."""
 
     id: str
     title: str
@@ -42,7 +42,7 @@ class MethodSource:
 def software(environment: Mapping[str, Any] | None = None) -> Reference:
     """This software; the facts are CITATION.cff's.
 
-    Version and commit are those of a manifest's ``environment``; without one, of this version.
+    Version and commit are those of a study's ``environment``; without one, of this version.
     """
     environment = environment or {}
     note = f"Version {environment.get('coartic') or __version__}"
@@ -82,7 +82,7 @@ def bibliography(
     A comment before an entry names the methods that rest on it. Of methods of others, and of
     built-in ones without a row in ``methods.toml``, there is no more than the citation that they
     declare: it is printed as a comment and as the note of a ``@misc``. With ``analysis`` the
-    works behind statistics and signatures follow. ``environment`` is a manifest's, for
+    works behind statistics and signatures follow. ``environment`` is a study's, for
     :func:`software`.
     """
     known = {**references(), "coartic": software(environment)}

@@ -16,7 +16,7 @@ from coartic.analysis.references import Key
 from coartic.analysis.words import read_beside
 from coartic.learner import conditions
 from coartic.learner.learning import METHOD_PREFIX
-from coartic.runs.record import SEARCH
+from coartic.runs.plan import SEARCH
 from coartic.text import one_line
 
 LEARNER = METHOD_PREFIX

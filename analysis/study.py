@@ -6,19 +6,24 @@ study, in the packages beside this file; :func:`cached` makes such a function co
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, wraps
+from functools import cached_property, lru_cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
 import pandas as pd
 
-from coartic import MotionModel, Task
-from coartic.analysis.results.folder import CellKey, CellRuns, Results, load_results
-from coartic.analysis.results.optima import KnownOptimum, known_optima
+from coartic import MotionModel, NotApplicableError, Task, hand_sequences, parse_task
+from coartic.analysis.cells import CellKey, CellRuns
+from coartic.analysis.optima import KnownOptimum, known_optima
 from coartic.analysis.trajectories import Trajectories, trajectories_of
+from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.motion.initial import ranked_sequences
+from coartic.robot import Array
+from coartic.runs.plan import Plan
+from coartic.runs.store import FILE, open_store
 from coartic.text import counted
 
 Computed = TypeVar("Computed")
@@ -27,51 +32,83 @@ Computed = TypeVar("Computed")
 def load(folder: str | Path) -> Study:
     """Read a results folder.
 
-    Raises CoarticError as :func:`coartic.analysis.results.folder.load_results` does.
+    Raises CoarticError where the folder is not a results folder or is not finished.
     """
-    return Study(load_results(folder_named(folder)))
+    folder = folder_named(folder)
+    with open_store(folder) as store:
+        plan = store.plan()
+        runs = store.frame("runs")
+        if len(runs) < plan.size:
+            raise CoarticError(
+                f"{folder} has {len(runs)} of {counted(plan.size, 'run')}: it was interrupted. "
+                "Repeat the `coartic run` command, which does what is missing."
+            )
+        return Study(folder, plan, store.made_with(), runs)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Study:
     """The stored results of one folder."""
 
-    results: Results
-    _computed: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False)
+    folder: Path
+    plan: Plan
+    """What was asked for."""
+    made_with: dict[str, Any]
+    """Versions, platform, commit, command and date of the last ``coartic run``."""
+    runs: pd.DataFrame
+    """One row a run: rewards, hand sequences, what was spent (docs/results.md)."""
+    _computed: dict[Callable[..., Any], Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
         runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")
-        return f"Study of {self.results.folder}: {runs} of suite {self.suite}, {cells}"
+        return f"Study of {self.folder}: {runs} of suite {self.suite}, {cells}"
 
     @property
     def suite(self) -> str:
         """Name of the suite that was run."""
-        return self.results.manifest.specification.suite
+        return self.plan.suite
 
-    @property
-    def runs(self) -> pd.DataFrame:
-        """One row a run: rewards, hand sequences, what was spent (docs/results.md)."""
-        return self.results.runs
-
-    @property
+    @cached_property
     def tasks(self) -> dict[str, Task]:
         """The tasks as they were run, by name."""
-        return self.results.tasks
+        return {name: parse_task(task, str(self.folder)) for name, task in self.plan.tasks.items()}
 
-    @property
+    @cached_property
     def model(self) -> MotionModel:
         """The constants of movement of all runs."""
-        return self.results.manifest.specification.model
+        return self.plan.model
 
-    @property
+    @cached_property
     def sequences(self) -> pd.DataFrame:
-        """Reward of the corrective process alone with every hand sequence of each task."""
-        return self.results.sequences
+        """The corrective process alone on each task: a row a hand sequence, best first.
+
+        Columns ``task``, ``hands``, ``reward`` (missing where it fails) and ``reason``. Tasks with
+        too many sequences to try are left out.
+        """
+        rows = []
+        for name, task in self.tasks.items():
+            try:
+                ranked = ranked_sequences(task, hand_sequences(task), model=self.model)
+            except NotApplicableError:
+                continue
+            rows += [(name, hands, trial.reward, trial.reason) for hands, trial in ranked]
+        frame = pd.DataFrame(rows, columns=["task", "hands", "reward", "reason"])
+        return frame.astype({"reward": "Int64"})
 
     @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
         """Runs by task and label (method with its variant), in the order of the plan."""
-        return self.results.cells
+        names = ["task", "method", "variant"]
+        groups = self.runs.groupby(names, sort=False).indices if len(self.runs) else {}
+        return {
+            (cell.task, cell.label): CellRuns(
+                cell.task,
+                cell.method,
+                cell.variant,
+                self.runs.iloc[groups.get((cell.task, cell.method, cell.variant), [])],
+            )
+            for cell in self.plan.cells
+        }
 
     @cached_property
     def run_ids(self) -> dict[CellKey, tuple[str, ...]]:
@@ -79,11 +116,22 @@ class Study:
         return {key: tuple(map(str, cell.runs.run_id)) for key, cell in self.cells.items()}
 
     @cached_property
+    def solutions(self) -> pd.DataFrame:
+        """One row a movement of each run's solution."""
+        return self._frame("solutions")
+
+    @cached_property
     def movements(self) -> tuple[dict[str, pd.DataFrame], dict[str, pd.DataFrame]]:
         """Movements of each run's solution, and waypoints of those along a path, by run id."""
-        tables = (self.results.solutions(), self.results.paths())
-        movements, waypoints = (table[table.run_id.isin(self.runs.run_id)] for table in tables)
-        return _by_run(movements), _by_run(waypoints)
+        tables = (self.solutions, self._frame("paths"))
+        own = (table[table.run_id.isin(self.runs.run_id)] for table in tables)
+        movements, waypoints = map(_by_run, own)
+        return movements, waypoints
+
+    def rewards(self) -> Iterator[tuple[str, Array]]:
+        """Runs that made trials, each with the reward of every trial, NaN where it failed."""
+        with open_store(self.folder) as store:
+            yield from store.rewards()
 
     def trajectories(self, task: str, label: str) -> Trajectories:
         """Solutions of a cell, executed again tick by tick, each cell once."""
@@ -101,7 +149,10 @@ class Study:
     @cached_property
     def optima(self) -> dict[tuple[str, str], KnownOptimum]:
         """Best known reward by task and other arm (``"free"``, ``"still"``)."""
-        return known_optima(self.results)
+        return known_optima(self.runs, self.tasks, self.model)
+
+    def _frame(self, view: str) -> pd.DataFrame:
+        return _frame(self.folder, view, (self.folder / FILE).stat().st_mtime_ns)
 
 
 def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]:
@@ -115,6 +166,13 @@ def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]
         return result
 
     return once
+
+
+@lru_cache(maxsize=4)
+def _frame(folder: Path, view: str, _: int) -> pd.DataFrame:
+    """A view of a folder as it was at a time: studies of parts of a folder share it."""
+    with open_store(folder) as store:
+        return store.frame(view)
 
 
 def _by_run(table: pd.DataFrame) -> dict[str, pd.DataFrame]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.claims.judge import claims_table as judged_claims
 from coartic.analysis.comparisons.methods import method_rows
 from coartic.analysis.comparisons.pairs import pairs_table
@@ -36,7 +37,6 @@ from coartic.analysis.methods import (
     name_of,
 )
 from coartic.analysis.published import published_cell, published_initial
-from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.estimates import Inference, mean

@@ -23,7 +23,7 @@ from coartic import (
     initial_hands,
     trajectory,
 )
-from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.cells import CellRuns
 from coartic.errors import NotApplicableError
 from coartic.learner.rows import movements_from
 from coartic.robot import Array

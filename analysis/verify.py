@@ -232,7 +232,7 @@ def check_all(db: sqlite3.Connection) -> Report:
     """Check the runs one by one, and that none is better than another proves possible."""
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
     for table in ("movements", "waypoints", "learning"):
-        query = f"SELECT count(*) FROM {table} WHERE result NOT IN (SELECT id FROM results)"
+        query = f"SELECT count(*) FROM {table} WHERE result_id NOT IN (SELECT id FROM results)"
         if lost := db.execute(query).fetchone()[0]:
             wrong.append(f"{lost} rows of table {table} are of no run.")
     runs = movements = unsolved = 0
@@ -270,7 +270,7 @@ def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list
     """The movements of a run, by the solution that they belong to."""
     parts: dict[str, list[Movement]] = {part: [] for part in COLUMNS}
     waypoints = defaultdict[int, list[Array]](list)
-    where = 'WHERE result = ? ORDER BY "order"'
+    where = 'WHERE result_id = ? ORDER BY "order"'
     query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
     for order, number, *q in db.execute(query, [run]):
         need(number == len(waypoints[order]), f"movement {order} lacks a waypoint")

@@ -14,7 +14,6 @@ to inequality tasks, IEEE Transactions on Robotics. With one row and no limit th
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -23,8 +22,7 @@ from scipy import sparse
 from coartic.errors import CoarticError
 from coartic.robot import Array
 
-SolverName = Literal["clarabel", "daqp", "osqp", "proxqp"]
-Modelling = Literal["cvxpy", "none"]
+SolverName = Literal["clarabel", "daqp"]
 
 DAMPING = 0.01
 """λ, length unit per unit of change: 1e-4 of what level 1 asks is given up where the singular
@@ -37,14 +35,6 @@ SETTINGS: dict[SolverName, dict[str, Any]] = {
     # Tighter than their defaults, which are seen in the changes (up to 1e-5).
     "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "daqp": {},
-    "osqp": {
-        "eps_abs": 1e-9,
-        "eps_rel": 1e-9,
-        "max_iter": 50_000,
-        "adaptive_rho_interval": 50,  # by iterations: by time, results would depend on it
-    },
-    # Its inner iterations never end on some of these programs, unless they are counted.
-    "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000, "max_iter_in": 100},
 }
 
 SLACK = 1e-6
@@ -169,56 +159,10 @@ def _clarabel(program: Program, settings: dict[str, Any]) -> Solved:
     return Solved(status == "Solved", status, np.array(solution.x), solution.iterations)
 
 
-def _osqp(program: Program, settings: dict[str, Any]) -> Solved:
-    import osqp
-
-    hessian, gradient, rows, upper = program
-    solver = osqp.OSQP()
-    solver.setup(
-        sparse.csc_matrix(hessian),
-        gradient,
-        sparse.csc_matrix(rows),
-        np.full(len(rows), -np.inf),
-        upper,
-        **{"verbose": False, "polishing": True, **settings},
-    )
-    found = solver.solve(raise_error=False)
-    optimal = found.info.status_val == osqp.SolverStatus.OSQP_SOLVED
-    return Solved(optimal, found.info.status, found.x, found.info.iter)
-
-
-def _proxqp(program: Program, settings: dict[str, Any]) -> Solved:
-    from proxsuite import proxqp
-
-    hessian, gradient, rows, upper = program
-    solver = proxqp.dense.QP(len(gradient), 0, len(rows))
-    for name, value in settings.items():
-        setattr(solver.settings, name, value)
-    solver.init(hessian, gradient, None, None, rows, np.full(len(rows), -np.inf), upper)
-    solver.solve()
-    found = solver.results
-    optimal = found.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED
-    return Solved(optimal, found.info.status.name, found.x, int(found.info.iter))
-
-
 _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
     "clarabel": _clarabel,
     "daqp": _daqp,
-    "osqp": _osqp,
-    "proxqp": _proxqp,
 }
-
-
-@cache
-def cascade_for(
-    rows: int, joints: int, solver: SolverName, modelling: Modelling = "none"
-) -> Cascade:
-    """The one cascade of this process for such a task, this solver and statement."""
-    if modelling == "none":
-        return Cascade(rows, joints, solver)
-    from coartic.baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
-
-    return ModelledCascade(rows, joints, solver)
 
 
 def damped_projection(

@@ -45,12 +45,13 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from coartic import Task
-from coartic.baselines.cascade import Cascade, CascadeError, Modelling, SolverName, cascade_for
+from coartic.baselines.cascade import Cascade, CascadeError, SolverName
 from coartic.baselines.nullspace_control import (
     FACES,
     Aim,
@@ -74,6 +75,8 @@ CONCURRENT = (
     "decision processes, NIPS; B. Thibodeau, S. Hart, D. Karuppiah, J. Sweeney, O. Brock "
     "(2004), Cascaded filter approach to multi-objective control, ICRA."
 )
+
+Modelling = Literal["cvxpy", "none"]
 
 
 class NullspaceParameters(Parameters):
@@ -301,3 +304,15 @@ class Preshaping(NullspaceQP):
 
 
 METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, KeepVelocity, NextGoal, Preshaping)
+
+
+@cache
+def cascade_for(
+    rows: int, joints: int, solver: SolverName, modelling: Modelling = "none"
+) -> Cascade:
+    """The one cascade of this process for such a task, this solver and statement."""
+    if modelling == "none":
+        return Cascade(rows, joints, solver)
+    from coartic.baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
+
+    return ModelledCascade(rows, joints, solver)

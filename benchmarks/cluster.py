@@ -1,240 +1,119 @@
-"""Runs on a Dask cluster, which may have no workers, lose them, or be lost itself.
-
-Dask waits without end and without a word where nobody performs what it was given. Here the
-scheduler is asked, whenever no answer has come for a while, whether it is there and has
-workers; each of these questions, and the wait for workers, has an end.
-"""
+"""Runs on a Dask cluster: the extra ``coartic[cluster]``."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import logging
+import multiprocessing
 import time
-import warnings
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from coartic import CoarticError
-from coartic.benchmarks.executors import Answer, Job
-from coartic.benchmarks.sandbox import failure, supervise
-from coartic.text import plain
+from coartic.benchmarks.pool import Failure, Local
+from coartic.benchmarks.provenance import environment
+from coartic.benchmarks.registry import brief, current_code
+from coartic.benchmarks.worker import Answer, Job
+from coartic.errors import CoarticError
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-SCHEDULER_S = 30.0
-"""How long a scheduler may take to answer, when it is first called and later, s."""
-WORKERS_S = 600.0
-"""How long a run waits while no worker is connected, s."""
-_ASK_EVERY_S = 2.0  # while no answer comes
-_SAY_EVERY_S = 30.0
-_CLOSE_S = 3.0  # for goodbyes to a scheduler that may be gone
-
-_GOES_ON = "what is done is kept, and the same command goes on from there"
-_HINTS = {
-    "tls": "with TLS, Dask's configuration names the certificates: docs/cluster.md",
-    "ucx": "Dask has no UCX of its own: install distributed-ucxx, or use tcp://host:port",
-}
-_HINT = "give the address that the scheduler prints, such as tcp://127.0.0.1:8786"
+WORKERS_S = 600.0  # that runs wait while no worker is connected
+_ASK_EVERY_S = 2.0
+_GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """An executor: a Dask scheduler, with the project installed there and on its workers.
-
-    ``scheduler_s`` is how long the scheduler may take to answer, ``workers_s`` how long a run
-    waits while no worker is connected, ``say`` is told, line by line, what is waited for. TLS
-    is set up in Dask's own configuration.
-    """
+    """An executor: a Dask scheduler, with this version of coartic on its workers; ``say`` is told
+    what is waited for. TLS is set up in Dask's own configuration."""
 
     def __init__(
-        self,
-        address: str,
-        *,
-        scheduler_s: float = SCHEDULER_S,
-        workers_s: float = WORKERS_S,
-        say: Callable[[str], None] = lambda line: None,
+        self, address: str, *, workers_s: float = WORKERS_S, say: Callable[[str], None] = print
     ) -> None:
-        self.address = address
-        self.shown = plain(address, 200) or "an empty address"
-        self.scheduler_s = scheduler_s
-        self.workers_s = workers_s
-        self.say = say
+        self.address, self.workers_s, self.say = address, workers_s, say
+        self.workers = 1  # it may have any number: lots are as large as methods take them
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[Answer]:
-        """Answers as they come. Runs of a worker that dies are performed by another.
-
-        Raises CoarticError where no scheduler answers at the address, the scheduler is lost,
-        no worker is connected for ``workers_s``, or the workers cannot perform runs.
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+        """The number of each job with its answer, as they come; another worker takes over the
+        jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, it has
+        no workers for a long time, or they have another version.
         """
-        with _without_logging(), asyncio.Runner() as runner:
-            answers = self._answers(jobs)
-            try:
-                while (answer := runner.run(_next(answers))) is not None:
-                    yield answer
-            finally:
-                runner.run(answers.aclose())
-
-    async def _answers(self, jobs: Sequence[Job]) -> AsyncGenerator[Answer, None]:
-        done: asyncio.Queue[Answer | CoarticError] = asyncio.Queue()
-        async with self._connected() as client, contextlib.AsyncExitStack() as cleanup:
-            watch = _Watch(self, client)
-            patience = await watch.ask()
-            futures = [client.submit(supervise, job, pure=False, retries=2) for job in jobs]
-            cleanup.push_async_callback(_briefly, client.cancel, futures)
-            for job, future in zip(jobs, futures, strict=True):
-                task = asyncio.create_task(self._collect(job["run_id"], future, done))
-                cleanup.callback(task.cancel)
-            for _ in jobs:
-                while (answer := await _get(done, patience)) is None:
-                    patience = await watch.ask()
-                if isinstance(answer, CoarticError):
-                    raise answer
-                watch.end_wait()
-                yield answer
-
-    @contextlib.asynccontextmanager
-    async def _connected(self) -> AsyncIterator[Client]:
-        client: Client | None = None
-        self.say(f"calling the Dask scheduler at {self.shown}: {self.scheduler_s:g} s at most")
+        client = self._client()
         try:
-            with warnings.catch_warnings(record=True) as heard:
-                from distributed import Client  # reads the user's Dask configuration
+            from distributed import as_completed
 
-                async with asyncio.timeout(self.scheduler_s):
-                    client = Client(  # type: ignore[no-untyped-call]
-                        self.address,
-                        asynchronous=True,
-                        set_as_default=False,
-                        timeout=0.8 * self.scheduler_s,  # its own error says more than ours
-                    )
-                    await client
-        except Exception as problem:  # Dask's, of many kinds: who answers may be anybody
-            await self._close(client)
-            raise self._unreachable(problem) from None
-        for warning in heard:
-            self.say(f"warning: {plain(str(warning.message))}")
-        try:
-            yield client
+            futures = client.map(_remote, jobs, pure=False, retries=2)
+            numbers = {future.key: number for number, future in enumerate(futures)}
+            answers, waited_since = as_completed(futures, loop=client.loop), None
+            while not answers.is_empty():
+                waited_since = self._check_workers(client, waited_since)
+                deadline = time.monotonic() + _ASK_EVERY_S
+                while not answers.has_ready() and time.monotonic() < deadline:
+                    time.sleep(_ASK_EVERY_S / 100)
+                for future in answers.next_batch(block=False):
+                    yield numbers[future.key], self._answer(future)
         finally:
-            await self._close(client)
+            client.close(timeout=3)
 
-    async def _close(self, client: Client | None) -> None:
-        if client is not None:
-            await _briefly(client.close)
+    def _answer(self, future: Future[Any]) -> Answer | Failure:
+        from distributed import CancelledError, KilledWorker
 
-    async def _collect(
-        self, run_id: str, future: Future[Answer], done: asyncio.Queue[Answer | CoarticError]
-    ) -> None:
-        from distributed import CancelledError
-        from distributed.scheduler import KilledWorker
-
-        answer: Answer | CoarticError
         try:
-            answer = await future
-            if not isinstance(answer, dict) or answer.get("run_id") != run_id:
-                raise TypeError("the answer is not that of the run")
+            return future.result()  # type: ignore[no-any-return]
         except KilledWorker:
-            answer = failure(run_id, "crashed", "every worker that tried this run died", 0.0)
-        except CancelledError:  # by Dask itself, when it loses the scheduler
-            answer = self.lost(ConnectionError("the connection was closed"))
-        except CoarticError as problem:
-            answer = problem
-        except Exception as problem:
-            answer = CoarticError(
-                f"the Dask workers of {self.shown} cannot perform runs: {self._why(problem)}; "
-                "install the same version of coartic on the scheduler and every worker"
-            )
-        done.put_nowait(answer)
+            return Failure("crashed", "every worker that tried this run died", 0.0)
+        except CoarticError:
+            raise
+        except (Exception, CancelledError) as error:
+            if future.status != "error":
+                raise self._lost(error) from None
+            raise CoarticError(f"a Dask worker cannot work: {brief(error)}. {_GOES_ON}") from None
 
-    def _unreachable(self, problem: Exception) -> CoarticError:
-        hint = _HINTS.get(self.address.partition("://")[0], _HINT)
-        return CoarticError(f"no Dask scheduler at {self.shown} ({self._why(problem)}); {hint}")
-
-    def lost(self, problem: Exception) -> CoarticError:
-        """The error for all the ways in which a scheduler that goes away shows."""
-        return CoarticError(
-            f"lost the Dask scheduler at {self.shown} ({self._why(problem)}); {_GOES_ON}"
-        )
-
-    def _why(self, problem: BaseException) -> str:
-        """What went wrong, from the first of a chain of errors."""
-        while problem.__cause__ is not None and not isinstance(problem, TimeoutError):
-            problem = problem.__cause__
-        if isinstance(problem, TimeoutError) and not str(problem):
-            return f"no answer within {self.scheduler_s:g} s"
-        return plain(f"{type(problem).__name__}: {problem}".removesuffix(": "), 300)
-
-
-class _Watch:
-    """Asks the scheduler whether it is there and has workers."""
-
-    def __init__(self, dask: Dask, client: Client) -> None:
-        self._dask, self._client = dask, client
-        self._until: float | None = None  # when the wait for workers ends, if one is on
-        self._say_at = 0.0
-
-    async def ask(self) -> float:
-        """Seconds until the next question. Raises CoarticError where there is no hope."""
+    def _client(self) -> Client:
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
         try:
-            if (scheduler := self._client.scheduler) is None:
-                raise ConnectionError("the connection is closed")
-            async with asyncio.timeout(self._dask.scheduler_s):
-                identity = await scheduler.identity(n_workers=-1)
-        except Exception as problem:
-            raise self._dask.lost(problem) from None
-        if any(worker["status"] == "running" for worker in identity["workers"].values()):
-            self.end_wait()
-            return _ASK_EVERY_S
-        address, now = self._dask.shown, time.monotonic()
-        if self._until is None:
-            self._until, self._say_at = now + self._dask.workers_s, now
-        left = self._until - now
-        if left <= 0:
+            from distributed import Client
+
+            return Client(self.address, set_as_default=False)
+        except ImportError:
+            raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
+        except Exception as error:  # Dask's, of many kinds: who answers may be anybody
             raise CoarticError(
-                f"no Dask worker was connected to {address} for {self._dask.workers_s:g} s; "
-                f"start some with: dask worker {address}; {_GOES_ON}"
+                f"no Dask scheduler at {self.address} ({brief(error)}). Give the address that the "
+                "scheduler prints, such as tcp://127.0.0.1:8786."
+            ) from None
+
+    def _check_workers(self, client: Client, since: float | None) -> float | None:
+        """Since when there are no workers. Raises CoarticError where that is too long."""
+        try:
+            workers = client.scheduler_info()["workers"]
+        except Exception as error:
+            raise self._lost(error) from None
+        if workers:
+            return None
+        if since is None:
+            self.say(f"no Dask worker is connected to {self.address}: waiting for one")
+            return time.monotonic()
+        if time.monotonic() - since > self.workers_s:
+            raise CoarticError(
+                f"no Dask worker was connected to {self.address} for {self.workers_s:g} s; start "
+                f"some with: dask worker {self.address}. {_GOES_ON}"
             )
-        if now >= self._say_at:
-            self._say_at = now + _SAY_EVERY_S
-            self._dask.say(
-                f"no Dask worker is connected to {address}: waiting, {left:.0f} s at most"
-            )
-        return min(_ASK_EVERY_S, left)
+        return since
 
-    def end_wait(self) -> None:
-        """There are workers: the next time that there are none is waited out in full."""
-        if self._until is not None:
-            self._dask.say(f"Dask workers are connected to {self._dask.shown}")
-        self._until = None
+    def _lost(self, error: BaseException) -> CoarticError:
+        return CoarticError(f"lost Dask scheduler {self.address} ({brief(error)}). {_GOES_ON}")
 
 
-async def _next(answers: AsyncIterator[Answer]) -> Answer | None:
-    return await anext(answers, None)
-
-
-async def _get(
-    done: asyncio.Queue[Answer | CoarticError], seconds: float
-) -> Answer | CoarticError | None:
-    """What is done, or None where nothing is for that long."""
-    with contextlib.suppress(TimeoutError):
-        return await asyncio.wait_for(done.get(), seconds)
-    return None
-
-
-async def _briefly(goodbye: Callable[..., Any], *arguments: Any) -> None:
-    """Say goodbye to a scheduler that may not listen any more."""
-    with contextlib.suppress(Exception):
-        async with asyncio.timeout(_CLOSE_S):
-            await goodbye(*arguments)
-
-
-@contextlib.contextmanager
-def _without_logging() -> Iterator[None]:
-    """Dask logs on the terminal what is said here in a sentence, or mended by itself."""
-    before = logging.root.manager.disable
-    logging.disable()
-    try:
-        yield
-    finally:
-        logging.disable(before)
+def _remote(job: Job) -> Answer | Failure:
+    """Perform a job on a worker's machine, in a process that ends with its time limit."""
+    here = current_code(job.where, job.method)
+    if here != job.code:
+        raise CoarticError(
+            f"method {job.method!r} has code {here} on a Dask worker and {job.code} where the "
+            "suite was started; install the same version everywhere"
+        )
+    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
+    ((_, answer),) = Local(1).perform([job])
+    if isinstance(answer, Answer):
+        answer.environment = environment()._asdict()
+    return answer

@@ -1,7 +1,7 @@
 """The conformance kit: what a contributor runs on a new method or task.
 
-Each law is checked by performing runs in processes of their own, with a time limit: one
-that lives through the whole check, and another one. A law that cannot be checked fails;
+Each law is checked on runs with a time limit, in a process that performs them all, and in another
+one. A law that cannot be checked fails;
 it is never skipped silently.
 """
 
@@ -27,15 +27,13 @@ from coartic import (
     load_task,
     parse_task,
 )
-from coartic.benchmarks.harness import record_of
 from coartic.benchmarks.registry import Entry, Registry
-from coartic.benchmarks.reproduce import differences, perform_once
-from coartic.benchmarks.sandbox import Keeper, keeper
-from coartic.benchmarks.specification import Limits, RunSpec, Setting
+from coartic.benchmarks.reproduce import differences, performed
+from coartic.benchmarks.worker import Job, job_of
 from coartic.method import METERED
-from coartic.runs.record import Record
+from coartic.runs.store import Run
 from coartic.tasks.task import checked_task
-from coartic.text import counted, plain
+from coartic.text import counted
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
@@ -59,9 +57,8 @@ def check_method(
     entry: Entry, *, laws: Collection[str] | None = None, tasks: Sequence[Task] | None = None
 ) -> list[Law]:
     """Every law of a method, in order, on the shipped tasks; or some laws, or on other tasks."""
-    with keeper() as own:
-        checks = _MethodChecks(entry, own, tasks or [load_task(name) for name in builtin_tasks()])
-        return list(_run(c for c in checks.laws() if laws is None or c[0] in laws))
+    checks = _MethodChecks(entry, tasks or [load_task(name) for name in builtin_tasks()])
+    return list(_run(c for c in checks.laws() if laws is None or c[0] in laws))
 
 
 def check_task_file(path: Path, known: Registry) -> list[Law]:
@@ -85,9 +82,8 @@ def _run(checks: Iterable[Check]) -> Iterator[Law]:
 
 
 class _MethodChecks:
-    def __init__(self, entry: Entry, own: Keeper, tasks: Sequence[Task]) -> None:
+    def __init__(self, entry: Entry, tasks: Sequence[Task]) -> None:
         self.entry = entry
-        self._keeper = own
         self._tasks = tasks
 
     def laws(self) -> Iterator[Check]:
@@ -103,12 +99,8 @@ class _MethodChecks:
     @cached_property
     def defaults(self) -> dict[str, Any]:
         """Parameters of the check: few trials where the method has trials."""
-        trials = {"trials": CHECK_TRIALS} if "trials" in self.fields else {}
-        return trials | self.entry.declared.quick
-
-    @cached_property
-    def fields(self) -> dict[str, Any]:
-        return dict(self.entry.declared.defaults)
+        trials = {"trials": CHECK_TRIALS} if "trials" in self.entry.defaults else {}
+        return trials | dict(self.entry.method.quick)
 
     @cached_property
     def tasks(self) -> list[Task]:
@@ -117,32 +109,53 @@ class _MethodChecks:
             raise _BrokenError("it applies to none of the shipped tasks, so nothing can be checked")
         return found
 
-    def spec(self, task: Task, seed: int = 1, budget: int | None = None) -> RunSpec:
-        limits = Limits(CHECK_LIMIT_S, budget)
-        return Setting(task, self.entry, tuple(self.defaults.items()), limits).spec(0, seed)
-
-    def record(self, task: Task, seed: int = 1, budget: int | None = None) -> Record:
-        """A run in the process that lives through the whole check."""
-        spec = self.spec(task, seed, budget)
-        return self.perform(spec, spec.job())
-
-    def perform(self, spec: RunSpec, job: dict[str, Any]) -> Record:
-        answer = self._keeper.perform(job)
-        if "failure" in answer:
-            raise _BrokenError(f"{answer['failure']}: {plain(answer['reason'])}")
-        return record_of(answer, spec)
+    def job(self, task: Task, seed: int = 1, budget: int | None = None, **more: Any) -> Job:
+        return job_of(
+            self.entry,
+            task.model_dump(mode="json"),
+            self.entry.complete(self.defaults),
+            (seed,),
+            trial_budget=budget,
+            time_limit_s=CHECK_LIMIT_S,
+            **more,
+        )
 
     @cached_property
-    def first_records(self) -> list[tuple[Task, Record]]:
-        return [(task, self.record(task)) for task in self.tasks]
+    def runs(self) -> dict[tuple[str, str], Run]:
+        """All runs of the check in one process, in this order: by what they are for, and task."""
+        asked: list[tuple[str, Task, Job]] = []
+        asked += [("first", task, self.job(task)) for task in self.tasks]
+        asked += [("again", task, self.job(task)) for task in self.tasks]
+        asked += [("other seed", task, self.job(task, seed=2)) for task in reversed(self.tasks)]
+        asked += [("after others", task, self.job(task)) for task in self.tasks]
+        asked += [("budget", task, self.job(task, budget=_BUDGET)) for task in self.tasks]
+        hopeless = _hopeless(self.tasks[0])
+        if self.entry.why_not(hopeless, self.defaults) is None:
+            asked.append(("hopeless", hopeless, self.job(hopeless, within_reach=False)))
+        made = performed(self.entry, [job for *_, job in asked], [task for _, task, _ in asked])
+        return {(what, task.name): run for (what, task, _), run in zip(asked, made, strict=True)}
+
+    def each(self, what: str) -> Iterator[tuple[str, Run]]:
+        """Runs for something, by task. Raises _BrokenError for one that took too long."""
+        for (own, task), run in self.runs.items():
+            if own == what:
+                if run.status == "timeout":
+                    raise _BrokenError(f"on {task}: {run.row['reason']}")
+                yield task, run
+
+    def compare(self, what: str, how: str) -> None:
+        """Raises _BrokenError where runs for something differ from the first ones."""
+        for task, run in self.each(what):
+            found = differences(self.runs["first", task], run)
+            if found:
+                raise _BrokenError(f"{how.format(task)}: {found[0]}")
 
     def declaration(self) -> str:
-        method = self.entry.declared
+        method = self.entry.method
         for attribute in ("title", "citation"):
             if not getattr(method, attribute).strip():
                 raise _BrokenError(f"{attribute} is empty")
-        told = ", ".join(sorted(method.told)) or "nothing"
-        return f"{method.title}; told: {told}"
+        return f"{method.title}; told: {', '.join(self.entry.told) or 'nothing'}"
 
     def parameters(self) -> str:
         parameters = self.entry.complete({})
@@ -157,16 +170,16 @@ class _MethodChecks:
             pass
         else:
             raise _BrokenError("an unknown parameter is accepted; forbid extra keys")
-        if not self.entry.declared.frozen:
+        if self.entry.method.Parameters.model_config.get("frozen") is not True:
             raise _BrokenError("they can be changed after validation; freeze them")
         return ", ".join(f"{key}={value}" for key, value in parameters.items()) or "none"
 
     def solution(self) -> str:
         rewards = []
-        for task, record in self.first_records:
-            if record.solution is None:
-                raise _BrokenError(f"on {task.name}: {record.status}: {record.reason}")
-            rewards.append(f"{task.name} {record.solution.reward}")
+        for task, run in self.each("first"):
+            if run.status != "ok":
+                raise _BrokenError(f"on {task}: {run.status}: {run.row['reason']}")
+            rewards.append(f"{task} {run.row['reward']}")
         with_what = ", ".join(f"{key}={value}" for key, value in self.defaults.items())
         return (
             "executed and scored on "
@@ -175,67 +188,53 @@ class _MethodChecks:
         )
 
     def determinism(self) -> str:
-        for task, record in self.first_records:
-            found = differences(record, self.record(task))
-            if found:
-                raise _BrokenError(f"same seed on {task.name}, same process: {found[0]}")
-        task, record = self.first_records[-1]
-        found = differences(record, perform_once(self.spec(task)))
+        self.compare("again", "same seed on {}, same process")
+        last = self.tasks[-1]
+        other = next(performed(self.entry, [self.job(last)], [last]))
+        found = differences(self.runs["first", last.name], other)
         if found:
-            raise _BrokenError(f"same seed on {task.name}, another process: {found[0]}")
-        if not self.entry.declared.stochastic:
-            found = differences(record, self.record(task, seed=2))
-            if found:
-                raise _BrokenError(
-                    f"declared not to be stochastic, but another seed on {task.name}: {found[0]}"
-                )
+            raise _BrokenError(f"same seed on {last.name}, another process: {found[0]}")
+        if not self.entry.method.stochastic:
+            self.compare("other seed", "declared not to be stochastic, but another seed on {}")
             return "the same result under any seed, in one process and in another"
         return "same seed, same result, in one process and in another"
 
     def no_hidden_state(self) -> str:
-        for task in reversed(self.tasks):
-            self.record(task, seed=2)
-        for task, record in self.first_records:
-            found = differences(record, self.record(task))
-            if found:
-                raise _BrokenError(f"after other runs, {task.name} with the same seed: {found[0]}")
+        self.compare("after others", "after other runs, {} with the same seed")
         return "other runs in between change nothing"
 
     def limits(self) -> str:
-        for task in self.tasks:
-            record = self.record(task, budget=_BUDGET)
-            trials = 0 if record.meter is None else record.meter.trials
-            if record.status not in ("ok", "infeasible") or trials > _BUDGET:
+        for task, run in self.each("budget"):
+            trials = run.row["trials"] or 0
+            if run.status not in ("ok", "infeasible") or trials > _BUDGET:
                 raise _BrokenError(
-                    f"a budget of {_BUDGET} trials on {task.name}: "
-                    + (record.reason or f"{trials} were made")
+                    f"a budget of {_BUDGET} trials on {task}: "
+                    + (run.row["reason"] or f"{trials} were made")
                 )
         return f"keeps to a budget of {_BUDGET} trials"
 
     def information(self) -> str:
-        declared = {item.value for item in self.entry.declared.told if item in METERED}
+        declared = {item.value for item in self.entry.method.told if item in METERED}
         used: set[str] = set()
-        for task, record in self.first_records:
-            if any(words in record.reason for words in ("does not declare", "own compiled")):
-                raise _BrokenError(f"on {task.name}: {record.reason}")
-            used |= set(record.used)
+        for task, run in self.each("first"):
+            reason = run.row["reason"]
+            if any(words in reason for words in ("does not declare", "own compiled")):
+                raise _BrokenError(f"on {task}: {reason}")
+            used |= set(filter(None, run.row["used"].split(", ")))
         idle = sorted(declared - used)
         if idle:
             raise _BrokenError(f"declared but never used: {', '.join(idle)}")
         return f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
 
     def failure(self) -> str:
-        task = _hopeless(self.tasks[0])
-        if self.entry.why_not(task, self.defaults) is not None:
-            return "says beforehand that it does not apply to a task without a solution"
-        spec = self.spec(task)
-        record = self.perform(spec, {**spec.job(), "reach": False})
-        if record.status not in ("infeasible", "solver-failed"):
-            raise _BrokenError(
-                f"on a task that nobody can complete it gives {record.status} {record.reason}; "
-                "it should give infeasible, with a reason"
-            )
-        return f"a task that nobody can complete gives {record.status}: {record.reason}"
+        for _, run in self.each("hopeless"):
+            if run.status not in ("infeasible", "solver-failed"):
+                raise _BrokenError(
+                    f"on a task that nobody can complete it gives {run.status} "
+                    f"{run.row['reason']}; it should give infeasible, with a reason"
+                )
+            return f"a task that nobody can complete gives {run.status}: {run.row['reason']}"
+        return "says beforehand that it does not apply to a task without a solution"
 
 
 def _hopeless(like: Task) -> Task:

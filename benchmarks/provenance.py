@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import re
@@ -14,60 +13,65 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import psutil
-
 import coartic
+from coartic.learner.learning import threads_for
 from coartic.motion.compiled import PACKAGE, source_fingerprint
-from coartic.runs.record import Environment
+from coartic.runs.plan import hash_of
+from coartic.runs.store import Environment
 from coartic.text import LONGEST_LINE, plain
 
 _LIBRARIES = (
     "casadi",
     "clarabel",
+    "cma",
     "cvxpy",
     "daqp",
-    "dask",
-    "distributed",
-    "filelock",
-    "joblib",
     "llvmlite",
-    "matplotlib",
     "numba",
     "numpy",
-    "osqp",
     "pandas",
-    "proxsuite",
-    "psutil",
-    "pyarrow",
     "pydantic",
-    "rich",
     "scipy",
-    "typer",
 )
+"""Those that results may hang on."""
+THREADS = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+    ),
+    "1",
+)
+"""Environment of a worker. One run, one core: BLAS threads would get in each other's way."""
 
 
-def environment() -> dict[str, Any]:
-    """Versions, platform, commit, date and command of this process."""
-    from joblib import cpu_count
+@cache
+def environment() -> Environment:
+    """With what this process makes results: versions, platform, commit."""
+    packages, commit = _versions(), _commit()
+    python = platform.python_version()
+    return Environment(
+        content={
+            "coartic": coartic.__version__,
+            "model_code": source_fingerprint(),
+            "commit": commit,
+            "python": python,
+            "packages": packages,
+            "platform": plain(platform.platform(), LONGEST_LINE),
+            "processor": plain(_processor(), LONGEST_LINE),
+            "cores": threads_for(-1),
+            "threads": THREADS,
+        },
+        commit=None if commit is None else commit["id"] + "+" * commit["dirty"],
+        packages=hash_of([python, packages])[:8],
+    )
 
-    return {
-        "coartic": coartic.__version__,
-        "model_code": source_fingerprint(),
-        "commit": _commit(),
-        "python": platform.python_version(),
-        "packages": _versions(),
-        "platform": plain(platform.platform(), LONGEST_LINE),
-        "processor": plain(_processor(), LONGEST_LINE),
-        "cores": cpu_count(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": command(),
-        "threads": None,
-    }
 
-
-def surroundings() -> Environment:
-    """:func:`environment`, typed."""
-    return Environment.model_validate_json(json.dumps(environment()))
+def now() -> str:
+    """Date and time, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def command() -> list[str]:
@@ -77,12 +81,12 @@ def command() -> list[str]:
     return [plain(word) for word in (Path(sys.argv[0]).name, *sys.argv[1:])]
 
 
-def process_peak_mb() -> float:
-    """Most memory that this process has had so far, MiB."""
+def process_peak_mb() -> float | None:
+    """Most memory that this process has had so far, MiB; None where the system does not say."""
     try:
         import resource
     except ImportError:  # Windows
-        return float(psutil.Process().memory_info().peak_wset) / 2**20
+        return None
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 

@@ -1,48 +1,40 @@
 """Methods by id: those of this project, of installed plug-ins, and of the user's files.
 
-Methods of this project are classes here. The others are known by what they declare: their
-code is run in sandboxes alone, to describe them and to perform their runs.
+Plug-ins and method files are imported, which runs them.
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import inspect
 import json
+import re
+import sys
 import threading
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from coartic import CoarticError, Task
-from coartic.benchmarks.code_identity import built_in_code, foreign_code
-from coartic.benchmarks.declaration import (
-    Declaration,
-    Foreign,
-    MethodFileError,
-    built_in_methods,
-    completed,
-    declared,
-    reason_against,
-)
-from coartic.benchmarks.sandbox import Failure, Sandbox
-from coartic.inputs import problems_inline, read_text
+from coartic.benchmarks.code_identity import code_of
+from coartic.errors import CoarticError
+from coartic.inputs import problems_inline
 from coartic.learner.learning import METHOD_PREFIX
-from coartic.method import Method
-from coartic.runs import record
-from coartic.runs.record import SEARCH
-from coartic.runs.stored import Values
+from coartic.method import Information, Method
+from coartic.runs.plan import BUILT_IN, SEARCH, DeclaredMethod
+from coartic.tasks.task import Task
 from coartic.text import LONGEST_LINE, did_you_mean, plain
 
 ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)
 """Ids that begin so have a meaning in every table: methods of this project alone have them."""
-QUESTION_LIMIT_S = 60.0
-"""Seconds that a method which is not built in has to say what it is."""
 MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",
@@ -54,61 +46,93 @@ MODULES = (
     "coartic.baselines.optimum",
 )
 """Where this project's methods are, each in its module's ``METHODS``."""
-MODULE_OF = {method.name: module for module in MODULES for method in built_in_methods(module)}
-"""Where each built-in method is, by id."""
-BUILT_IN: tuple[type[Method], ...] = tuple(
-    method for module in MODULES for method in built_in_methods(module)
-)
-CLASSES: Mapping[str, type[Method]] = {method.name: method for method in BUILT_IN}
-"""The built-in methods by id."""
+
+
+class MethodFileError(CoarticError):
+    """A method file or plug-in that cannot be used."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """One method as the harness knows it."""
 
-    declared: Declaration
+    method: type[Method]
     origin: str
     """``built in``, the distribution of a plug-in, or the path of a method file."""
+    where: str
+    """What a worker imports: the name of a module, or the path of a method file."""
     code: str
     """Hash of the code that produces its results."""
-    foreign: Foreign | None = None
-    """Where it comes from; None for a method of this project."""
 
     @property
     def name(self) -> str:
         """Id of the method."""
-        return self.declared.name
+        return self.method.name
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether it is one of this project's methods."""
+        return self.origin == BUILT_IN
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What it is told."""
+        return tuple(sorted(item.value for item in self.method.told))
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """Its parameters; None for one that has no default."""
+        fields = self.method.Parameters.model_fields.items()
+        values = {
+            name: None if field.is_required() else field.get_default(call_default_factory=True)
+            for name, field in fields
+        }
+        plain_values: dict[str, Any] = json.loads(json.dumps(values, default=str))
+        return plain_values
+
+    @property
+    def declared(self) -> DeclaredMethod:
+        """What is kept of it beside its runs."""
+        return DeclaredMethod(
+            title=self.method.title,
+            citation=self.method.citation,
+            told=self.told,
+            secondary=tuple(self.method.secondary),
+            stochastic=self.method.stochastic,
+            defaults=self.defaults,
+            origin=self.origin,
+            code=self.code,
+        )
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters, defaults included; CoarticError names the ones that are wrong."""
-        return _complete(self.foreign, self.name, json.dumps(parameters, sort_keys=True))
+        """All parameters, defaults included, as plain data; CoarticError names the ones that are
+        wrong."""
+        known = self.method.Parameters.model_fields
+        try:
+            built = self.made(parameters).parameters
+            complete: dict[str, Any] = json.loads(json.dumps(built.model_dump(mode="json")))
+        except ValidationError as error:
+            found = problems_inline(error, known)
+            names = ", ".join(known) or "none"
+            raise CoarticError(f"method {self.name!r}: {found}. Its parameters: {names}.") from None
+        return complete
 
-    def most_together(self, parameters: Mapping[str, Any]) -> int:
-        """Runs with parameters, at most, that one process performs side by side."""
-        if self.foreign is not None:
-            return 1
-        method = CLASSES[self.name]
-        return method(method.Parameters(**parameters)).most_together()
+    def made(self, parameters: Mapping[str, Any]) -> Method:
+        """The method with these parameters."""
+        return self.method(self.method.Parameters(**parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
         """Why the method with parameters does not apply to a task; None where it does.
 
-        Raises CoarticError for wrong parameters and for a method that fails to say.
+        Raises CoarticError for wrong parameters.
         """
-        if self.foreign is None:
-            return reason_against(CLASSES[self.name], task, parameters or {})
+        self.complete(parameters or {})
         try:
-            reason = _ask(
-                self.foreign,
-                question="applies",
-                method=self.name,
-                task=task.model_dump(mode="json"),
-                parameters=dict(parameters or {}),
-            )
-        except MethodFileError as error:
-            raise MethodFileError(
-                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: {error}"
+            reason = self.made(parameters or {}).why_not(task)
+        except Exception as error:
+            raise CoarticError(
+                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
+                f"{brief(error)}"
             ) from None
         return None if reason is None else plain(str(reason))
 
@@ -122,48 +146,70 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     A plug-in that cannot be loaded is a warning. Raises MethodFileError for a file that
     cannot be loaded, holds no method, or takes an id that is reserved or already there.
     """
-    found = dict(_built_in())
-
-    def add(foreign: Foreign, origin: str) -> None:
-        origin = plain(origin, LONGEST_LINE)
-        described, code = _described(foreign, origin), foreign_code(foreign)
-        for declaration in described:
-            name = declaration.name
-            if name.startswith(RESERVED):
-                raise MethodFileError(
-                    f"{origin}: method id {name!r} is reserved: ids that begin with "
-                    f"{' or '.join(map(repr, RESERVED))} are this project's"
-                )
-            if name in found:
-                raise MethodFileError(
-                    f"{origin}: method id {name!r} is already taken ({found[name].origin})"
-                )
-            found[name] = Entry(declaration, origin, code, foreign)
-
+    found = dict(built_in())
     for point in metadata.entry_points(group=ENTRY_POINTS):
         origin = f"plug-in {point.dist.name if point.dist else point.value}"
         try:  # a broken plug-in must not take the others with it
-            add(Foreign(kind="installed", where=point.value), origin)
+            _add(found, _installed(point, origin))
         except CoarticError as error:
             warnings.warn(
                 f"{origin}: entry point {point.name!r} cannot be used: {error}", stacklevel=2
             )
-    for path in method_files:
-        add(read_method_file(path), str(path))
+    for path in dict.fromkeys(Path(path).resolve() for path in method_files):
+        _add(found, _from_file(path))
     return found
 
 
 @cache
-def _built_in() -> dict[str, Entry]:
+def built_in() -> Mapping[str, Entry]:
+    """This project's methods by id."""
     return {
-        name: Entry(declared(method), record.BUILT_IN, built_in_code(method.__module__))
-        for name, method in CLASSES.items()
+        method.name: Entry(method, BUILT_IN, name, code_of(_file_of(module)))
+        for name in MODULES
+        for module in [importlib.import_module(name)]
+        for method in module.METHODS
     }
 
 
-def read_method_file(path: Path) -> Foreign:
-    """The text of a method file. Raises MethodFileError where there is none."""
-    return Foreign(kind="file", where=path.name, source=read_text(path, error=MethodFileError))
+def method_at(where: str, name: str) -> type[Method]:
+    """A method by what :attr:`Entry.where` and its id say, as a worker imports it."""
+    module = file_module(Path(where)) if where.endswith(".py") else importlib.import_module(where)
+    for method in [*getattr(module, "METHODS", ()), *_methods_in(module, module.__name__)]:
+        if method.name == name:
+            found: type[Method] = method
+            return found
+    raise MethodFileError(f"{where} defines no method {name!r}")
+
+
+def file_module(path: Path) -> ModuleType:
+    """The module of a method file; what lies beside it can be imported by it."""
+    name = f"coartic_method_{path.stem}"
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def current_code(where: str, name: str) -> str:
+    """Hash of the code of a method that is imported from ``where``."""
+    with _parsing:
+        return _current_code(where, name)
+
+
+_parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
+
+
+@cache
+def _current_code(where: str, name: str) -> str:
+    if where.endswith(".py"):
+        found = {entry.name: entry.code for entry in _from_file(Path(where))}
+        return found.get(name, "none")
+    return code_of(_file_of(importlib.import_module(where)))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
@@ -176,54 +222,128 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
     )
 
 
-@cache
-def _complete(foreign: Foreign | None, name: str, parameters: str) -> dict[str, Any]:
-    given: dict[str, Any] = json.loads(parameters)
-    if foreign is None:
-        return completed(CLASSES[name], given)
-    found = _ask(foreign, question="complete", method=name, parameters=given)
-    try:
-        return _VALUES.validate_python(found)
-    except ValidationError as error:
-        raise MethodFileError(
-            f"method {name!r}: its parameters: {problems_inline(error)}"
-        ) from None
-
-
-@cache
-def _described(foreign: Foreign, origin: str) -> tuple[Declaration, ...]:
-    foreign_code(foreign)  # what is no Python is said without running it
-    try:
-        found = _ask(foreign, question="describe")
-        return tuple(Declaration.model_validate_json(json.dumps(item)) for item in found)
-    except MethodFileError as error:
-        raise MethodFileError(f"{origin}: {error}") from None
-    except (ValidationError, TypeError) as error:
-        raise MethodFileError(f"{origin}: declares no method: {plain(str(error))}") from None
-
-
-_asked: dict[Foreign, Sandbox] = {}
 _MOST_NAMED = 40  # in an error
-_VALUES: TypeAdapter[dict[str, Any]] = TypeAdapter(Values)
-_lock = threading.Lock()
 
 
-def _ask(foreign: Foreign, **question: Any) -> Any:
-    """What a method that is not built in answers, in a process of its own."""
-    with _lock:
-        sandbox = _asked.get(foreign)
-        if sandbox is None or not sandbox.alive:
-            sandbox = _asked[foreign] = Sandbox()
-        answer = sandbox.ask(
-            {**question, "foreign": foreign.model_dump(mode="json")}, QUESTION_LIMIT_S
-        )
-    if isinstance(answer, Failure):
-        raise MethodFileError(f"it gave no answer: {answer.reason}")
+def _add(found: dict[str, Entry], entries: Iterable[Entry]) -> None:
+    for entry in entries:
+        if entry.name.startswith(RESERVED):
+            raise MethodFileError(
+                f"{entry.origin}: method id {entry.name!r} is reserved: ids that begin with "
+                f"{' or '.join(map(repr, RESERVED))} are this project's"
+            )
+        if entry.name in found:
+            raise MethodFileError(
+                f"{entry.origin}: method id {entry.name!r} is already taken "
+                f"({found[entry.name].origin})"
+            )
+        found[entry.name] = entry
+
+
+def _from_file(path: Path) -> Iterator[Entry]:
+    shown = plain(str(path), LONGEST_LINE)
+    if not path.is_file():
+        raise MethodFileError(f"{shown}: there is no such file")
     try:
-        said = json.loads(answer)
-        error, result = said["error"], said["answer"]
-    except (ValueError, RecursionError, TypeError, KeyError):
-        raise MethodFileError("what it answered cannot be read") from None
-    if error is not None:
-        raise MethodFileError(plain(str(error)))
-    return result
+        module = file_module(path)
+    except (Exception, SystemExit) as error:
+        raise MethodFileError(f"{shown}: cannot be imported: {brief(error)}") from None
+    yield from _entries(module, _methods_in(module, module.__name__), shown, str(path))
+
+
+def _installed(point: metadata.EntryPoint, origin: str) -> Iterator[Entry]:
+    try:
+        target = point.load()
+    except (Exception, SystemExit) as error:
+        raise MethodFileError(f"cannot be imported: {brief(error)}") from None
+    if not inspect.isclass(target):
+        yield from _entries(target, _methods_in(target, target.__name__), origin, target.__name__)
+    elif issubclass(target, Method):
+        module = sys.modules[target.__module__]
+        yield from _entries(module, [target], origin, module.__name__)
+    else:
+        raise MethodFileError(f"{target!r} is not a subclass of coartic.method.Method")
+
+
+def _entries(
+    module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
+) -> Iterator[Entry]:
+    found = False
+    for method in methods:
+        found = True
+        check_declaration(method, origin)
+        file = _file_of(module)
+        data = tuple(file.parent / name for name in method.files)
+        try:
+            code = code_of(file, data)
+        except OSError as error:
+            raise MethodFileError(
+                f"{origin}: method {method.name!r} declares a file that cannot be read: "
+                f"{error.filename}"
+            ) from None
+        except (SyntaxError, ValueError) as error:
+            raise MethodFileError(
+                f"{origin}: it imports what is no Python: {brief(error)}"
+            ) from None
+        yield Entry(method, origin, where, code)
+    if not found:
+        unfinished = [
+            f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
+            for value in vars(module).values()
+            if inspect.isclass(value) and issubclass(value, Method) and inspect.isabstract(value)
+            and value is not Method
+        ]  # fmt: skip
+        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
+        raise MethodFileError(f"{origin}: defines no subclass of coartic.method.Method{why}")
+
+
+def check_declaration(method: type[Method], origin: str) -> None:
+    """Raises MethodFileError where a method does not declare what every method does."""
+    where = f"{origin}: {method.__name__}"
+    for attribute in ("name", "title", "citation"):
+        text = getattr(method, attribute, None)
+        if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
+            raise MethodFileError(f"{where}: {attribute} must be a text of one line, not {text!r}")
+    if not _NAME.fullmatch(method.name):
+        raise MethodFileError(
+            f"{where}: name {method.name!r} may have letters, digits, '.', '_', '+', '/' and '-'"
+        )
+    told = getattr(method, "told", None)
+    if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
+        raise MethodFileError(f"{where}: told must be a set of Information, not {told!r}")
+    for attribute, kind, what in (
+        ("stochastic", bool, "True or False"),
+        ("secondary", tuple | list, "a tuple of texts"),
+        ("files", tuple | list, "a tuple of names"),
+    ):
+        if not isinstance(given := getattr(method, attribute), kind):
+            raise MethodFileError(f"{where}: {attribute} must be {what}, not {given!r}")
+    if not inspect.isclass(method.Parameters) or not issubclass(method.Parameters, BaseModel):
+        raise MethodFileError(
+            f"{where}: Parameters must be a subclass of coartic.method.Parameters"
+        )
+
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
+
+
+def brief(error: BaseException) -> str:
+    """An exception in one line."""
+    return plain(f"{type(error).__name__}: {error}")
+
+
+def _methods_in(module: ModuleType, name: str) -> list[type[Method]]:
+    """The methods that a module itself defines, complete ones."""
+    return [
+        value
+        for value in vars(module).values()
+        if inspect.isclass(value)
+        and issubclass(value, Method)
+        and not inspect.isabstract(value)
+        and value.__module__ == name
+    ]
+
+
+def _file_of(module: ModuleType) -> Path:
+    assert module.__file__ is not None
+    return Path(module.__file__)

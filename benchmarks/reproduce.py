@@ -1,98 +1,131 @@
-"""One run again: find its record, perform it anew, compare."""
+"""Runs performed anew, and compared with what is stored of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from coartic import CoarticError, Trajectory, trajectory
-from coartic.benchmarks.harness import record_of
-from coartic.benchmarks.registry import Registry, unknown
-from coartic.benchmarks.sandbox import supervise
-from coartic.benchmarks.specification import Limits, RunSpec, Setting
-from coartic.benchmarks.store import Store
-from coartic.runs.packs import Packs, check_layout
-from coartic.runs.record import Record, RecordError
+from coartic.benchmarks.outcome import kept
+from coartic.benchmarks.pool import Local
+from coartic.benchmarks.registry import Entry, Registry, unknown
+from coartic.benchmarks.worker import Job, job_of
+from coartic.errors import CoarticError
+from coartic.method import Meter
+from coartic.model import MotionModel
+from coartic.motion.solution import Movement
+from coartic.motion.ticks import Trajectory, trajectory
+from coartic.runs.store import FILE, PARTS, Run, StoredRun, open_store
+from coartic.tasks.task import Task
 
 
-def find_record(prefix: str, folder: Path) -> tuple[Store, Record]:
-    """The one record whose id starts with ``prefix``, in a folder or any below it.
+def find_run(prefix: str, folder: Path) -> tuple[Path, StoredRun]:
+    """The one run whose id starts with ``prefix``, in a results folder or any below it, and that
+    folder.
 
-    Raises RecordError where there is none, more than one, or it is damaged or forged.
+    Raises CoarticError where there is none, or more than one.
     """
-    wanted = _safe(prefix)
-    folders = sorted({path.parent for path in folder.glob("**/records") if path.is_dir()})
-    for place in folders:
-        check_layout(place)
-    packs = [(Store(place), Packs(place)) for place in folders]
-    found = [(store, run_id) for store, own in packs for run_id in own if run_id.startswith(wanted)]
-    ids = sorted({run_id for _, run_id in found})
-    if not ids:
-        raise RecordError(f"there is no run {prefix!r} in {folder}. Name another folder with --in.")
-    if len(ids) > 1:
-        shown = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
-        raise RecordError(f"{prefix!r} is the beginning of {len(ids)} runs: {shown}")
-    store = found[0][0]
-    record = store.read(ids[0])
-    record.check()
-    return store, record
-
-
-def trajectory_of(record: Record) -> Trajectory:
-    """The solution of a record tick by tick, from nothing but the record.
-
-    Raises CoarticError where the run has no solution.
-    """
-    if record.solution is None:
+    if not prefix or not set(prefix) <= set("0123456789abcdef-"):
         raise CoarticError(
-            f"run {record.run_id} has no solution to show: {record.status}, {record.reason}"
+            f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c."
         )
-    return trajectory(record.task, record.movements(), record.model)
+    found: dict[str, Path] = {}
+    for path in sorted(folder.rglob(FILE)):
+        with open_store(path.parent) as store:
+            found |= dict.fromkeys(store.ids(prefix), path.parent)
+    if not found:
+        raise CoarticError(
+            f"there is no run {prefix!r} in {folder}. Name another folder with --in."
+        )
+    if len(found) > 1:
+        shown = ", ".join(sorted(found)[:4]) + (", ..." if len(found) > 4 else "")
+        raise CoarticError(f"{prefix!r} is the beginning of {len(found)} runs: {shown}")
+    ((run_id, place),) = found.items()
+    with open_store(place) as store:
+        return place, store.run(run_id)
 
 
-def spec_of(record: Record, known: Registry, limits: Limits) -> RunSpec:
-    """The specification of a record, to be performed by the code that is here now."""
-    if record.method not in known:
-        raise unknown("method", record.method, known)
-    specification = record.specification
-    setting = Setting(
-        task=record.task,
-        entry=known[record.method],
-        parameters=tuple(specification.parameters.items()),
-        limits=Limits(limits.time_s, specification.trial_budget),
-        model=record.model,
+def trajectory_of(stored: StoredRun) -> Trajectory:
+    """The solution of a run tick by tick. Raises CoarticError where it has none."""
+    run = stored.run
+    if "solution" not in run.movements:
+        raise CoarticError(
+            f"run {run.run_id} has no solution to show: {run.status}, {run.row['reason']}"
+        )
+    return trajectory(stored.task, run.movements["solution"], stored.model)
+
+
+def performed(entry: Entry, jobs: Sequence[Job], tasks: Sequence[Task]) -> Iterator[Run]:
+    """Runs of one method, each a job of one seed, in this order, in one process of their own."""
+    answers = dict(Local(1).perform(jobs))
+    for number, (job, task) in enumerate(zip(jobs, tasks, strict=True)):
+        name = {
+            "run_id": "", "suite_seed": 0, "run": 0, "seed": job.seeds[0],
+            "time_limit_s": job.time_limit_s,
+        }  # fmt: skip
+        yield kept([name], answers[number], task, entry, MotionModel(**job.model))[0]
+
+
+def performed_again(stored: StoredRun, known: Registry) -> Run:
+    """A stored run, performed anew by the code that is here now."""
+    if stored.method not in known:
+        raise unknown("method", stored.method, known)
+    entry = known[stored.method]
+    job = job_of(
+        entry,
+        stored.task.model_dump(mode="json"),
+        stored.parameters,
+        (stored.run.row["seed"],),
+        model=stored.model,
+        trial_budget=stored.trial_budget,
+        time_limit_s=stored.run.row["time_limit_s"],
     )
-    return setting.spec(record.run, specification.seed)
+    return next(performed(entry, [job], [stored.task]))
 
 
-def perform_once(spec: RunSpec) -> Record:
-    """The record of one run, performed in a process of its own."""
-    return record_of(supervise(spec.job()), spec)
+def some_again(folder: Path, count: int, known: Registry) -> Iterator[tuple[str, list[str]]]:
+    """Perform ``count`` runs of a folder anew, spread over its cells, those of known methods; the
+    id of each, and in what it differs from what is stored."""
+    with open_store(folder) as store:
+        plan = store.plan()
+        ids = [
+            run_id
+            for cell in plan.cells
+            if cell.method in known and known[cell.method].code == plan.methods[cell.method].code
+            for run_id in plan.run_ids(cell)
+        ]
+        step = max(1, len(ids) // count)
+        chosen = [store.run(run_id) for run_id in ids[::step][:count]]
+    for stored in chosen:
+        yield stored.run.run_id, differences(stored.run, performed_again(stored, known))
 
 
-def differences(a: Record, b: Record) -> list[str]:
-    """In what the results of two records differ; times and surroundings apart."""
-    first, second = a.result(), b.result()
+def differences(a: Run, b: Run) -> list[str]:
+    """In what the results of two runs differ; times and surroundings apart."""
     found = [
-        f"{name}: {_shown(first[name])} against {_shown(second[name])}"
-        for name in ("status", "bound", "details")
-        if first[name] != second[name]
+        f"{name}: {_shown(a.row[name])} against {_shown(b.row[name])}"
+        for name in ("status", "reason", "proven_bound", "details", *Meter.COUNTS)
+        if a.row[name] != b.row[name]
     ]
-    if a.reason != b.reason:
-        found.append(f"reason: {a.reason!r} against {b.reason!r}")
-    for name in ("solution", "initial", "replay"):
-        if first[name] != second[name]:
-            found.append(f"{name}: {_score(first[name])} against {_score(second[name])}")
-    ours, theirs = first["meter"] or {}, second["meter"] or {}
-    found += [
-        f"{name}: {ours.get(name)} against {theirs.get(name)}"
-        for name in ours | theirs
-        if ours.get(name) != theirs.get(name)
-    ]
+    for part, prefix in zip(PARTS, ("", "initial_", "replay_"), strict=True):
+        first, second = (_plain(run.movements.get(part, ())) for run in (a, b))
+        if first != second:
+            scores = [
+                f"{run.row[f'{prefix}reward']} with {run.row[f'{prefix}hands']}" for run in (a, b)
+            ]
+            found.append(f"{part}: {scores[0]} against {scores[1]}")
     if a.rewards != b.rewards:
         found.append(f"rewards by trial differ{_first_difference(a.rewards, b.rewards)}")
     return found
+
+
+def _plain(movements: Sequence[Movement]) -> list[Any]:
+    plain = []
+    for own in movements:
+        target = None if own.target is None else own.target.tolist()
+        points = None if own.waypoints is None else own.waypoints.tolist()
+        plain.append((own.goal, own.hand, own.kind, own.ticks, target, points))
+    return plain
 
 
 def _shown(value: Any) -> str:
@@ -100,21 +133,8 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 200 else f"{text[:200]}..."
 
 
-def _score(solution: dict[str, Any] | None) -> str:
-    if solution is None:
-        return "none"
-    movements = len(solution["movements"])
-    return f"{solution['reward']} with {solution['hands']} in {movements} movements"
-
-
 def _first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
     for index, (x, y) in enumerate(zip(a, b, strict=False)):
         if x != y:
             return f", first at trial {index}: {x} against {y}"
     return f": {len(a)} trials against {len(b)}"
-
-
-def _safe(prefix: str) -> str:
-    if not prefix or not set(prefix) <= set("0123456789abcdef-"):
-        raise RecordError(f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c.")
-    return prefix

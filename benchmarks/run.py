@@ -1,49 +1,52 @@
 """Run a suite into a folder, from Python: what ``coartic run`` does, without a terminal.
 
-``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite, performs what the
-folder lacks, and writes its tables, which
-``coartic.analysis.load("results/quick")`` reads.
+``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite and performs what the
+folder lacks; ``coartic.analysis.load("results/quick")`` reads it.
 """
 
 from __future__ import annotations
 
-import contextlib
-import threading
+import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from coartic import CoarticError
-from coartic.benchmarks.executors import Executor, Local
-from coartic.benchmarks.harness import Progress, Watcher, perform_missing
-from coartic.benchmarks.registry import registry
-from coartic.benchmarks.specification import Limits, RunSpec
-from coartic.benchmarks.store import Store
-from coartic.benchmarks.suites import (
-    Cell,
-    CellPlan,
-    Suite,
-    cell_plans,
-    load_suite,
-    manifest_of,
-    select_cells,
-)
-from coartic.benchmarks.tables import (
-    check_results_folder,
-    is_done,
-    statuses,
-    write_tables,
-)
+from coartic import CoarticError, Task
+from coartic.benchmarks.outcome import kept
+from coartic.benchmarks.pool import Executor, Failure, Local
+from coartic.benchmarks.provenance import command, environment, now
+from coartic.benchmarks.registry import Entry, registry
+from coartic.benchmarks.suites import Cell, Suite, load_suite, select_cells
+from coartic.benchmarks.worker import Answer, Job, job_of
 from coartic.files import folder_named
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
-from coartic.runs.packs import Chosen, Packs
-from coartic.runs.record import Record
-from coartic.runs.tables import Manifest
-from coartic.tasks.readings import ChosenReading, load_readings
+from coartic.inputs import MOST_PLANNED, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.runs.plan import (
+    Plan,
+    PlannedCell,
+    hash_of,
+    run_id,
+    run_seed,
+    trials_in,
+    variant_of,
+)
+from coartic.runs.store import Run, Store, writing
+from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
+from coartic.tasks.task import checked_task
 from coartic.text import counted
+
+LEAST_TOGETHER = 8
+"""Runs of a cell that are not divided among workers."""
+_SURE = frozenset({"ok", "infeasible"})  # whoever was beside
+_RETRIED = frozenset({"timeout", "crashed"})
+
+
+def _check_list(name: str, given: object) -> None:
+    """Raises CoarticError for what is no list of names, one text above all."""
+    if isinstance(given, str | Path):
+        raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
+    if not isinstance(given, Sequence) or not all(isinstance(item, str | Path) for item in given):
+        raise CoarticError(f"{name} is {given!r}; it must be a list of names or paths")
 
 
 @dataclass(frozen=True)
@@ -61,24 +64,29 @@ class Selection:
     def __post_init__(self) -> None:
         for name, given in vars(self).items():
             _check_list(name, given)
-            for item in given:
-                _check(f"an item of {name}", item, str | Path, "a name or a path")
-
-
-def _check(name: str, given: object, kind: Any, words: str) -> None:
-    """Raises CoarticError where an argument is not of its kind."""
-    if not isinstance(given, kind) or isinstance(given, bool):
-        raise CoarticError(f"{name} is {given!r}; it must be {words}")
-
-
-def _check_list(name: str, given: object) -> None:
-    """Raises CoarticError for what is no list, one text above all."""
-    if isinstance(given, str | Path):
-        raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
-    _check(name, given, Sequence, "a list")
 
 
 ALL_OF_IT = Selection()
+
+
+@dataclass
+class Progress:
+    """How far a plan is."""
+
+    total: int
+    present: int = 0
+    """Runs that were there before."""
+    stale: int = 0
+    """Runs that were there before, of other code."""
+    done: int = 0
+    """Runs performed now."""
+    failed: int = 0
+    """Of all runs, those that are not ok."""
+
+
+Watcher = Callable[[Progress, str], None]
+"""Called with how far a plan is before the first run and after each, and with what was run: the
+task and the method, empty before the first."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,31 +97,10 @@ class RunReport:
     progress: Progress
     wall_s: float
     """Seconds from the call until the last run was kept, or nothing found to do."""
-    manifest: Manifest
-    """What was asked for."""
-    kept: int
-    """Runs that the folder has a record of, asked for or not."""
-
-    @cached_property
-    def records(self) -> Mapping[str, Record]:
-        """The records of the plan by run id, in its order, each read when it is asked for."""
-        return Chosen(Packs(self.folder), self._ids())
-
-    @property
-    def others(self) -> int:
-        """Runs in the folder that were not asked for: of another suite, of more of this one, or
-        the same ones made by other code."""
-        return self.kept - self.progress.total
-
-    @cached_property
-    def stale(self) -> int:
-        """Runs in the folder that were asked for and are of other code."""
-        return len(Store(self.folder).stale(self._ids())) if self.others else 0
-
-    @property
-    def crashed(self) -> int:
-        """Runs that crashed, now or before."""
-        return statuses(self.folder)["crashed"]
+    crashed: int
+    """Runs that crashed, now or before."""
+    others: int
+    """Runs in the folder that were not asked for."""
 
     def __repr__(self) -> str:
         return self.sentence(self.wall_s)
@@ -121,47 +108,35 @@ class RunReport:
     def sentence(self, seconds: float) -> str:
         """How many runs were made in so many seconds, how many failed, and where they are."""
         progress = self.progress
-        time = (
+        time_taken = (
             f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min {seconds % 60:.0f} s"
         )
         reused = f" ({progress.present} reused)" if progress.present else ""
         failed = f"{progress.failed} failed" if progress.failed else "none failed"
+        unasked = self.others - progress.stale
+        left_out = [
+            f"{counted(count, 'run')} {what}"
+            for count, what in (
+                (progress.stale, "made by a different version of the code"),
+                (unasked, "that this command did not ask for"),
+            )
+            if count > 0
+        ]
+        without = f" (leaving out {' and '.join(left_out)})" if left_out else ""
         return (
-            f"{counted(progress.total, 'run')}{reused} in {time}, {failed}: {self.folder}"
-            f"{self._without}"
+            f"{counted(progress.total, 'run')}{reused} in {time_taken}, {failed}: "
+            f"{self.folder}{without}"
         )
-
-    def _ids(self) -> list[str]:
-        cells = self.manifest.specification.cells
-        return [id_ for cell in cells for id_ in self.manifest.run_ids(cell)]
-
-    @property
-    def _without(self) -> str:
-        """What else the folder keeps: runs that this command did not ask for."""
-        parts, unasked = [], self.others - self.stale
-        if self.stale:
-            parts.append(f"{counted(self.stale, 'run')} made by a different version of the code")
-        if unasked:
-            parts.append(f"{counted(unasked, 'run')} that this command did not ask for")
-        return f" (leaving out {' and '.join(parts)})" if parts else ""
 
 
 @dataclass(frozen=True)
 class SuitePlan:
     """Every run of a suite, ready to be performed into a folder (:func:`plan_suite`)."""
 
-    suite: Suite
-    cells: Sequence[CellPlan] = field(repr=False)
-    runs: int
-    seed: int
-    limits: Limits
-    readings: tuple[ChosenReading, ...] = ()
-    """Those that are not the default."""
-
-    @property
-    def planned(self) -> list[tuple[Cell, RunSpec]]:
-        """Every run, in order."""
-        return [(plan.cell, spec) for plan in self.cells for spec in plan.specs()]
+    plan: Plan
+    entries: dict[str, Entry] = field(repr=False)
+    """Methods by id."""
+    tasks: dict[str, Task] = field(repr=False)
 
     def perform(
         self,
@@ -170,9 +145,9 @@ class SuitePlan:
         executor: Executor | None = None,
         retry_failed: bool = False,
         redo: bool = False,
-        watch: Watcher | None = None,
+        watch: Watcher = lambda progress, what: None,
     ) -> RunReport:
-        """Perform what a results folder lacks, then write its tables.
+        """Perform what a results folder lacks.
 
         ``executor`` is this machine, a process for every core, by default; ``retry_failed`` and
         ``redo`` perform anew what timed out or crashed, or everything; ``watch`` is called before
@@ -180,51 +155,107 @@ class SuitePlan:
 
         A KeyboardInterrupt ends it and keeps what is done; so does whatever else. Called again,
         it goes on from there. Raises CoarticError where something else is in the way in the
-        folder, another suite is at work in it, it cannot be written, or runs keep getting lost.
+        folder, another process is at work in it, or it cannot be written.
         """
-        if executor is not None:
-            _check(
-                "executor",
-                executor,
-                Executor,
-                "one of coartic.benchmarks.executors, as Local(jobs=2)",
-            )
-        folder = folder_named(folder)
-        manifest, clock = self._manifest(), time.perf_counter()
-        check_results_folder(folder)
-        store = Store(folder)
-        with store.locked():
-            watch = watch or (lambda progress, spec: None)
-            if not (retry_failed or redo) and is_done(store, manifest):
-                total = sum(cell.runs for cell in self.cells)
-                failed = total - statuses(folder)["ok"]
-                progress = Progress(total, present=total, failed=failed)
-                watch(progress, None)
-                return RunReport(
-                    folder, progress, time.perf_counter() - clock, manifest, len(store.packs())
-                )
-            threading.Thread(target=_import_early).start()  # while workers begin
-            progress = perform_missing(
-                [spec for cell in self.cells for spec in cell.specs()],
-                store,
-                executor or Local(),
-                retry_failed=retry_failed,
-                redo=redo,
-                watch=watch,
-            )
+        if executor is not None and not isinstance(executor, Executor):
+            raise CoarticError(f"executor is {executor!r}; it must be one, as Local(jobs=2)")
+        folder, clock = folder_named(folder), time.perf_counter()
+        executor = executor or Local()
+        with writing(folder) as store:
+            store.ask(self.plan, environment(), command(), now())
+            progress, missing = self._missing(store, retry_failed, redo)
+            watch(progress, "")
+            for position, run in self._performed(missing, executor, store):
+                cell = self.plan.cells[position]
+                progress.done += 1
+                progress.failed += run.status != "ok"
+                watch(progress, f"{cell.task} {cell.method}")
             wall_s = time.perf_counter() - clock
-            store.drop_superseded()
-            write_tables(store, manifest)
-            return RunReport(folder, progress, wall_s, manifest, len(store.packs()))
+            crashed = store.statuses().get("crashed", 0)
+            return RunReport(folder, progress, wall_s, crashed, store.count() - self.plan.size)
 
-    def _manifest(self) -> Manifest:
-        return manifest_of(self.suite, self.runs, self.seed, self.cells, self.limits, self.readings)
+    def _missing(
+        self, store: Store, retry_failed: bool, redo: bool
+    ) -> tuple[Progress, dict[int, list[int]]]:
+        """What is there, and the numbers of the runs to perform, by the position of the cell."""
+        missing = {p: set(range(cell.runs)) for p, cell in enumerate(self.plan.cells)}
+        progress = Progress(self.plan.size, stale=store.stale())
+        for position, number, status, had_s in store.present() if not redo else ():
+            limit_s = self.plan.time_limit_s
+            longer = had_s is not None and (limit_s is None or limit_s > had_s)
+            again = status in _RETRIED and (retry_failed or (status == "timeout" and longer))
+            if not again:
+                missing[position].discard(number)
+                progress.present += 1
+                progress.failed += status != "ok"
+        return progress, {p: sorted(numbers) for p, numbers in missing.items() if numbers}
 
+    def _performed(
+        self, missing: dict[int, list[int]], executor: Executor, store: Store
+    ) -> Iterator[tuple[int, Run]]:
+        """Each run with the position of its cell, once it is kept."""
+        lots = list(self._lots(missing, executor.workers))
+        while lots:
+            alone: list[tuple[int, list[int]]] = []
+            jobs = [self._job(position, numbers) for position, numbers in lots]
+            for index, answer in executor.perform(jobs):
+                position, numbers = lots[index]
+                runs = self._runs(position, numbers, answer)
+                if len(numbers) > 1:  # one that went wrong beside others may have had it from them
+                    alone += [(position, [r.row["run"]]) for r in runs if r.status not in _SURE]
+                    runs = [run for run in runs if run.status in _SURE]
+                store.write(position, runs)
+                yield from ((position, run) for run in runs)
+            lots = alone
 
-def _import_early() -> None:
-    """What pyarrow imports when the first table is made."""
-    with contextlib.suppress(Exception):  # it is said where it is needed
-        import pandas  # noqa: F401
+    def _lots(self, missing: dict[int, list[int]], workers: int) -> Iterator[tuple[int, list[int]]]:
+        """Runs that are performed side by side; results do not depend on which these are.
+
+        A run beside many takes a fraction of its time alone, so lots are as large as methods take
+        them. Where there are few runs, each worker has its part; the last lots are divided that
+        would not go round.
+        """
+        total = sum(map(len, missing.values()))
+        share = max(math.ceil(total / workers), LEAST_TOGETHER)
+        lots: list[tuple[int, list[int]]] = []
+        for position, numbers in missing.items():
+            cell = self.plan.cells[position]
+            entry = self.entries[cell.method]
+            most = entry.made(cell.complete).most_together() if entry.is_ours else 1
+            lots += [(position, part) for part in _in_parts(numbers, min(most, share))]
+        whole = len(lots) - len(lots) % workers
+        yield from lots[:whole]
+        for position, numbers in lots[whole:]:
+            size = max(math.ceil(len(numbers) * (len(lots) - whole) / workers), LEAST_TOGETHER)
+            yield from ((position, part) for part in _in_parts(numbers, size))
+
+    def _job(self, position: int, numbers: list[int]) -> Job:
+        cell, plan = self.plan.cells[position], self.plan
+        return job_of(
+            self.entries[cell.method],
+            plan.tasks[cell.task],
+            cell.complete,
+            tuple(run_seed(plan.seed, cell.task, number) for number in numbers),
+            model=plan.model,
+            trial_budget=plan.trial_budget,
+            time_limit_s=plan.time_limit_s,
+        )
+
+    def _runs(self, position: int, numbers: list[int], answer: Answer | Failure) -> list[Run]:
+        """The runs of a job as they are kept."""
+        cell, plan = self.plan.cells[position], self.plan
+        asked, code = plan.asked(cell), plan.methods[cell.method].code
+        names = [
+            {
+                "run_id": run_id(asked, plan.seed, number, code),
+                "suite_seed": plan.seed,
+                "run": number,
+                "seed": run_seed(plan.seed, cell.task, number),
+                "time_limit_s": plan.time_limit_s,
+            }
+            for number in numbers
+        ]
+        return kept(names, answer, self.tasks[cell.task], self.entries[cell.method], plan.model)
 
 
 def run_suite(
@@ -237,9 +268,9 @@ def run_suite(
     select: Selection = ALL_OF_IT,
     readings: Sequence[str] = (),
     executor: Executor | None = None,
-    watch: Watcher | None = None,
+    watch: Watcher = lambda progress, what: None,
 ) -> RunReport:
-    """Run what a folder lacks of a suite, and write its tables.
+    """Run what a folder lacks of a suite.
 
     :func:`plan_suite`, then :meth:`SuitePlan.perform`, which have more to choose from.
     """
@@ -254,19 +285,20 @@ def plan_suite(
     trials: int | None = None,
     seed: int = 0,
     select: Selection = ALL_OF_IT,
-    limits: Limits | None = None,
+    time_limit_s: float | None = None,
+    trial_budget: int | None = None,
     readings: Sequence[str] = (),
 ) -> SuitePlan:
     """Every run of a suite: a shipped one by name, a file by path (``.toml``), or a Suite.
 
-    ``runs`` per cell, ``trials`` per run and ``limits`` are the suite's own by default.
+    ``runs`` per cell, ``trials`` per run and the time limit are the suite's own by default.
     ``readings`` of the paper, as ``"ties=right"``, hold in all cells, beside the suite's. Raises
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
-    _check("select", select, Selection, "a Selection, as Selection(tasks=['ascending'])")
+    if not isinstance(select, Selection):
+        raise CoarticError(f"select is {select!r}; it must be a Selection")
     _check_list("readings", readings)
     if not isinstance(suite, Suite):
-        _check("suite", suite, str | Path, "a name, a path or a Suite")
         suite = load_suite(str(suite))
     cells = select_cells(
         suite,
@@ -276,40 +308,98 @@ def plan_suite(
         task_files=[Path(path) for path in select.task_files],
     )
     return plan_cells(
-        suite, cells, runs=runs, trials=trials, seed=seed, limits=limits, readings=readings
+        suite,
+        cells,
+        runs=runs,
+        trials=trials,
+        seed=seed,
+        time_limit_s=time_limit_s,
+        trial_budget=trial_budget,
+        readings=readings,
     )
 
 
 def plan_cells(
     suite: Suite,
-    cells: Sequence[Cell],
+    cells: Iterable[Cell],
     *,
     runs: int | None = None,
     trials: int | None = None,
     seed: int = 0,
-    limits: Limits | None = None,
+    time_limit_s: float | None = None,
+    trial_budget: int | None = None,
     readings: Sequence[str] = (),
 ) -> SuitePlan:
     """As :func:`plan_suite`, of cells made by hand in place of the suite's."""
-    if runs is not None:  # asked for of all cells
-        cells = [replace(cell, runs=None) for cell in cells]
-    runs = suite.runs if runs is None else runs
-    trials = suite.trials if trials is None else trials
-    limits = Limits(suite.time_limit_s) if limits is None else limits
     for name, number, least, most in (
         ("runs", runs, 1, MOST_RUNS),
         ("trials", trials, 1, MOST_TRIALS),
         ("seed", seed, 0, MOST_SEED),
-        ("limits.trials", limits.trials, 1, MOST_TRIALS),
+        ("trial_budget", trial_budget, 1, MOST_TRIALS),
+        ("time_limit_s", time_limit_s, 1e-3, MOST_SECONDS),
     ):
-        if number is not None:
-            _check(name, number, int, f"an int from {least} to {most:_}")
-            if not least <= number <= most:
-                raise CoarticError(f"{name} is {number}; it must be from {least} to {most:_}")
-    if limits.time_s is not None and not 0 < limits.time_s <= MOST_SECONDS:
-        raise CoarticError(
-            f"limits.time_s is {limits.time_s:g}; it must be above 0, at most {MOST_SECONDS:_}"
-        )
+        kind = int | float if name == "time_limit_s" else int
+        if number is None:
+            continue
+        if not isinstance(number, kind) or isinstance(number, bool) or not least <= number <= most:
+            raise CoarticError(f"{name} is {number!r}; it must be from {least} to {most:_}")
     chosen = load_readings([*suite.readings, *readings])
-    plans = cell_plans(cells, runs=runs, seed=seed, trials=trials, limits=limits, chosen=chosen)
-    return SuitePlan(suite, plans, runs, seed, limits, chosen)
+    model, read = model_under(chosen), condition_under(chosen)
+    trials = suite.trials if trials is None else trials
+    planned: list[PlannedCell] = []
+    names: dict[str, PlannedCell] = {}
+    entries: dict[str, Entry] = {}
+    tasks: dict[str, Task] = {}
+    for cell in cells:
+        entry = entries.setdefault(cell.method, cell.entry)
+        name, defaults = cell.task.name, entry.defaults
+        if name not in tasks:
+            tasks[name] = checked_task(task_under(chosen, cell.task), model)
+        own = {key: value for key, value in read.items() if key in defaults}
+        own |= dict(cell.parameters)
+        given = {"trials": trials} if trials is not None and "trials" in defaults else {}
+        complete = entry.complete(given | own)
+        if trials_in(complete) > MOST_TRIALS:
+            raise CoarticError(
+                f"{name} x {cell.label}: {trials_in(complete):_} trials a run; "
+                f"at most {MOST_TRIALS:_} are kept"
+            )
+        # What is asked for of all cells goes before what the suite says of one.
+        count = runs or cell.runs or suite.runs
+        made = PlannedCell(
+            task=name,
+            method=entry.name,
+            variant=variant_of(own, defaults),
+            parameters=own,
+            complete=complete,
+            runs=count if entry.method.stochastic else 1,
+        )
+        first = names.setdefault(hash_of([name, entry.name, complete]), made)
+        if first is not made:
+            raise CoarticError(
+                f"{first.label!r} and {made.label!r} on task {name!r} are the same runs; leave "
+                "one of them out"
+            )
+        planned.append(made)
+    if (count := sum(cell.runs for cell in planned)) > MOST_PLANNED:
+        raise CoarticError(
+            f"{count:_} runs are planned; at most {MOST_PLANNED:_} can be run at once"
+        )
+    plan = Plan(
+        suite=suite.name,
+        seed=seed,
+        runs=runs or suite.runs,
+        trials=max((trials_in(cell.complete) for cell in planned), default=0),
+        readings=tuple(map(str, chosen)),
+        time_limit_s=suite.time_limit_s if time_limit_s is None else time_limit_s,
+        trial_budget=trial_budget,
+        tasks={name: task.model_dump(mode="json") for name, task in tasks.items()},
+        methods={name: entry.declared for name, entry in entries.items()},
+        cells=tuple(planned),
+    )
+    return SuitePlan(plan, entries, tasks)
+
+
+def _in_parts(numbers: list[int], size: int) -> Iterator[list[int]]:
+    for first in range(0, len(numbers), size):
+        yield numbers[first : first + size]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,12 +30,9 @@ from coartic import (
     load_task,
     parse_task,
 )
-from coartic.benchmarks.provenance import surroundings
 from coartic.benchmarks.registry import Entry, Registry, unknown
-from coartic.benchmarks.specification import UNLIMITED, Limits, RunSpec, Setting
 from coartic.inputs import (
     MOST_CELLS,
-    MOST_PLANNED,
     MOST_RUNS,
     MOST_SECONDS,
     MOST_TRIALS,
@@ -45,21 +42,10 @@ from coartic.inputs import (
 )
 from coartic.learner.learning import METHOD_PREFIX
 from coartic.robot import Finite
-from coartic.runs.record import run_seeds
-from coartic.runs.tables import (
-    DeclaredMethod,
-    Manifest,
-    Plan,
-    PlanLimits,
-    PlannedCell,
-    label_of,
-    trials_in,
-    variant_of,
-)
+from coartic.runs.plan import label_of, variant_of
 from coartic.tasks.families import named_by
 from coartic.tasks.members import members, task_of
-from coartic.tasks.readings import ChosenReading, condition_under, model_under, task_under
-from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of, checked_task
+from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
 from coartic.text import Line, plain
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -205,12 +191,12 @@ class Cell:
     @property
     def stochastic(self) -> bool:
         """Whether the seed matters to the method."""
-        return self.entry.declared.stochastic
+        return self.entry.method.stochastic
 
     @property
     def defaults(self) -> dict[str, Any]:
         """The method's parameters with their defaults."""
-        return self.entry.declared.defaults
+        return self.entry.defaults
 
     @property
     def all_parameters(self) -> dict[str, Any]:
@@ -402,73 +388,6 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
     return list(found.values())
 
 
-@dataclass(frozen=True)
-class CellPlan:
-    """A cell and the runs that are asked for of it, which are made when they are needed."""
-
-    cell: Cell
-    setting: Setting
-    runs: int
-    seed: int
-    """The suite's."""
-
-    def specs(self) -> Iterator[RunSpec]:
-        """The runs in order."""
-        return self.setting.specs(run_seeds(self.seed, self.cell.task.name, self.runs))
-
-
-def cell_plans(
-    cells: Sequence[Cell],
-    *,
-    runs: int,
-    seed: int,
-    trials: int | None = None,
-    limits: Limits = UNLIMITED,
-    chosen: Sequence[ChosenReading] = (),
-) -> list[CellPlan]:
-    """What is asked for of every cell; ``runs`` of those that do not say how many.
-
-    ``trials`` goes to methods that have it. So does what is ``chosen`` of an exploration
-    condition.
-
-    Raises CoarticError for wrong parameters, for more than :data:`MOST_PLANNED` runs or
-    :data:`MOST_TRIALS` trials, and where two cells ask for the same runs.
-    """
-    count = sum((cell.runs or runs) if cell.stochastic else 1 for cell in cells)
-    if count > MOST_PLANNED:
-        raise CoarticError(
-            f"{count:_} runs are planned ({len(cells)} cells, {runs:_} runs of each that is "
-            f"stochastic); at most {MOST_PLANNED:_} can be run at once"
-        )
-    plans = []
-    names: dict[str, Cell] = {}
-    model, read = model_under(chosen), condition_under(chosen)
-    for cell in cells:
-        cell = replace(cell, task=task_under(chosen, cell.task))
-        checked_task(cell.task, model)
-        parameters = {k: v for k, v in read.items() if k in cell.defaults} | dict(cell.parameters)
-        cell = replace(cell, parameters=tuple(parameters.items()))
-        if trials is not None and "trials" in cell.defaults:
-            parameters.setdefault("trials", trials)
-        cell.entry.complete(parameters)  # refuse wrong parameters before any run
-        asked = trials_in({**cell.defaults, **parameters})
-        if asked > MOST_TRIALS:
-            raise CoarticError(
-                f"{cell.task.name} x {cell.label}: {asked:_} trials a run; "
-                f"at most {MOST_TRIALS:_} are kept"
-            )
-        setting = Setting(cell.task, cell.entry, tuple(parameters.items()), limits, model)
-        plan = CellPlan(cell, setting, (cell.runs or runs) if cell.stochastic else 1, seed)
-        first = names.setdefault(next(plan.specs()).run_id, cell)
-        if first is not cell:
-            raise CoarticError(
-                f"{first.label!r} and {cell.label!r} on task {cell.task.name!r} are the "
-                "same runs; leave one of them out"
-            )
-        plans.append(plan)
-    return plans
-
-
 def _block_cells(
     suite: Suite, block: _Block, known: Registry, own: Mapping[str, Task]
 ) -> list[Cell]:
@@ -558,58 +477,3 @@ def _exact(value: float) -> str:
     """A number in few digits, or in all of them where few would name another number."""
     short = f"{value:g}"
     return short if float(short) == value else repr(value)
-
-
-def manifest_of(
-    suite: Suite,
-    runs: int,
-    seed: int,
-    plans: Sequence[CellPlan],
-    limits: Limits = UNLIMITED,
-    chosen: Sequence[ChosenReading] = (),
-) -> Manifest:
-    """What is asked for, and with what it is made."""
-    return Manifest(
-        specification=_plan(suite, runs, seed, plans, chosen),
-        limits=PlanLimits(time_s=limits.time_s, trials=limits.trials),
-        environment=surroundings(),
-        records="",  # until they are written
-        tables={},
-    )
-
-
-def _plan(
-    suite: Suite,
-    runs: int,
-    seed: int,
-    plans: Sequence[CellPlan],
-    chosen: Sequence[ChosenReading],
-) -> Plan:
-    complete = [(plan.cell, plan.setting.all_parameters) for plan in plans]
-    return Plan(
-        suite=suite.name,
-        runs=runs,
-        seed=seed,
-        trials=max((trials_in(parameters) for _, parameters in complete), default=0),
-        readings=tuple(map(str, chosen)),
-        tasks={cell.task.name: cell.task.model_dump(mode="json") for cell, _ in complete},
-        methods={
-            cell.method: DeclaredMethod(
-                **cell.entry.declared.model_dump(exclude={"name", "frozen", "quick"}),
-                origin=cell.entry.origin,
-                code=cell.entry.code,
-            )
-            for cell, _ in complete
-        },
-        cells=tuple(
-            PlannedCell(
-                task=cell.task.name,
-                method=cell.method,
-                variant=cell.variant,
-                parameters=dict(cell.parameters),
-                complete=parameters,
-                runs=cell.runs,
-            )
-            for cell, parameters in complete
-        ),
-    )

@@ -1,190 +1,204 @@
-"""The process that methods run in: it describes them, asks them, lets them solve.
+"""What a worker process does: it lets a method solve a task, and states what came of it.
 
-Its guard starts it (:mod:`coartic.benchmarks.guard`). It reads questions and writes answers, one
-JSON line each. It may run code that nobody has read, so nothing that it says is more than a
-statement: what it hands over as a solution is executed and scored elsewhere.
+It may run code that nobody here has read, so its word is no more than that: what it hands over as
+a solution is executed and scored in the parent process, where the method has never been.
 """
 
 from __future__ import annotations
 
-import gc
 import json
-import os
 import time
-from collections.abc import Sequence
-from datetime import UTC, datetime
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from pydantic_core import PydanticSerializationError, to_json
+import numpy as np
 
-from coartic import CoarticError, MotionModel, NotApplicableError, Task, parse_task
-from coartic.benchmarks.code_identity import built_in_code, built_in_sources, foreign_code
-from coartic.benchmarks.declaration import (
-    Foreign,
-    MethodFileError,
-    brief,
-    built_in_methods,
-    completed,
-    declared,
-    methods_of,
-    reason_against,
-)
-from coartic.benchmarks.guard import THREADS
-from coartic.benchmarks.provenance import environment, process_peak_mb
-from coartic.errors import SolutionError
-from coartic.learner.learning import warm_up
+from coartic.benchmarks.provenance import process_peak_mb
+from coartic.benchmarks.registry import Entry, brief, method_at
+from coartic.errors import NotApplicableError, SolutionError
+from coartic.learner.learning import METHOD_PREFIX, warm_up
 from coartic.method import (
     BudgetError,
     Information,
-    Method,
     MethodError,
     Result,
     Session,
     UndeclaredError,
 )
-from coartic.runs.record import SOLUTIONS
-from coartic.runs.scores import PlainMovement
+from coartic.model import PAPER, MotionModel
+from coartic.motion.solution import Movement
+from coartic.runs.store import PARTS
+from coartic.tasks.task import Task, parse_task
 
-_solved_before: set[str] = set()
-
-
-class ForeignCodeError(CoarticError):
-    """This worker would perform the run with other code than was asked for."""
-
-
-def answer(question: dict[str, Any]) -> Any:
-    """What is asked for, as plain data. Raises CoarticError where that cannot be had."""
-    what = question["question"]
-    if what == "prepare":
-        warm_up(parse_task(question["task"], "a job", reach=False), learns=question["learns"])
-        return "ready"
-    if what == "solve":
-        return perform(question)
-    foreign = Foreign(**question["foreign"])
-    if what == "describe":
-        return [declared(method).model_dump(mode="json") for method in _foreign_methods(foreign)]
-    method = _method(question["method"], foreign)
-    if what == "complete":
-        return completed(method, question["parameters"])
-    if what == "applies":
-        task = parse_task(question["task"], "task", reach=False)
-        return reason_against(method, task, question["parameters"])
-    raise CoarticError(f"nobody knows what {what!r} asks for")
+PlainMovement = tuple[int, str, str, list[float] | None, list[list[float]] | None]
+"""Goal, hand, kind, target and waypoints of a movement."""
 
 
-def perform(job: dict[str, Any]) -> dict[str, Any]:
-    """What a method states of each run of a job, and in what time they were made, with what.
+@dataclass(frozen=True)
+class Job:
+    """Runs of one cell that are performed side by side: they differ in their seeds alone."""
 
-    Whatever a method does is an outcome, not an error.
+    task: dict[str, Any]
+    method: str
+    where: str
+    """What is imported: the name of a module, or the path of a method file."""
+    is_ours: bool
+    """Whether the method is one of this project's."""
+    code: str
+    told: tuple[str, ...]
+    parameters: dict[str, Any]
+    model: dict[str, Any]
+    trial_budget: int | None
+    time_limit_s: float | None
+    """For each run."""
+    seeds: tuple[int, ...]
+    within_reach: bool = True
+    """Whether goals out of reach are refused; how methods cope is checked with such."""
 
-    Runs that are performed side by side have equal shares of the time. Raises
-    ForeignCodeError where this process runs other code than the job's.
-    """
-    specification, foreign = job["specification"], job["foreign"]
-    name = specification["method"]
-    method_class = _method_as_asked(name, None if foreign is None else Foreign(**foreign), job)
-    task = parse_task(specification["task"], "specification", reach=job["reach"])
+
+def job_of(
+    entry: Entry,
+    task: dict[str, Any],
+    parameters: dict[str, Any],
+    seeds: tuple[int, ...],
+    *,
+    model: MotionModel = PAPER,
+    trial_budget: int | None = None,
+    time_limit_s: float | None = None,
+    within_reach: bool = True,
+) -> Job:
+    """Runs of a method with all its parameters on a task."""
+    return Job(
+        task=task,
+        method=entry.name,
+        where=entry.where,
+        is_ours=entry.is_ours,
+        code=entry.code,
+        told=entry.told,
+        parameters=parameters,
+        model=model._asdict(),
+        trial_budget=trial_budget,
+        time_limit_s=time_limit_s,
+        seeds=seeds,
+        within_reach=within_reach,
+    )
+
+
+@dataclass
+class Outcome:
+    """What a method states of one run."""
+
+    status: str
+    reason: str = ""
+    parts: dict[str, list[PlainMovement]] = field(default_factory=dict)
+    """Its solution, and of a learner first trial and replay."""
+    bound: int | None = None
+    details: dict[str, Any] = field(default_factory=dict)
+    used: tuple[str, ...] = ()
+    meter: dict[str, Any] = field(default_factory=dict)
+    rewards: list[int | None] = field(default_factory=list)
+
+
+@dataclass
+class Answer:
+    """What a worker states of a job."""
+
+    outcomes: list[Outcome]
+    wall_s: float
+    """Of all runs together."""
+    cpu_s: float
+    warm: bool
+    """Whether the process had run the method before."""
+    process_peak_mb: float | None
+    environment: dict[str, Any] | None = None
+    """Where this is not that of the parent process."""
+
+
+def perform(job: Job) -> Answer:
+    """Perform a job. Whatever the method does is an outcome, not an error."""
+    task = parse_task(job.task, "a job", reach=job.within_reach)
     sessions = [
         Session(
             task,
             seed,
-            map(Information, job["told"]),  # as declared, whatever became of the class since
-            model=MotionModel(**specification["model"]),
-            trial_budget=specification["trial_budget"],
-            trusted=foreign is None,
+            map(Information, job.told),  # as declared, whatever became of the class since
+            model=MotionModel(**job.model),
+            trial_budget=job.trial_budget,
+            trusted=job.is_ours,
         )
-        for seed in job["seeds"]
+        for seed in job.seeds
     ]
-    method = method_class(method_class.Parameters(**specification["parameters"]))
-    warm = name in _solved_before
-    _solved_before.add(name)
+    warm = job.method in _performed
+    _performed.add(job.method)
     wall, cpu = time.perf_counter(), time.process_time()
-    outcomes = _outcomes(method, specification["parameters"], task, sessions)
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    runs, limit_s = len(sessions), job["time_limit_s"]
-    timing = {
-        "wall_s": wall / runs,
-        "cpu_s": cpu / runs,
-        "warm": warm,
-        "together": runs,
-        "process_peak_mb": process_peak_mb(),
-        "time_limit_s": None if limit_s is None else limit_s / runs,
-    }
-    surroundings = {
-        **_environment(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": job["command"],
-    }
-    stated = [
-        {
-            **outcome,
-            "used": sorted(session.used),
-            "meter": session.meter.as_dict(),
-            "rewards": session.rewards,
-        }
-        for session, outcome in zip(sessions, outcomes, strict=True)
-    ]
-    return {"timing": timing, "environment": surroundings, "runs": stated}
-
-
-def _method_as_asked(name: str, foreign: Foreign | None, job: dict[str, Any]) -> type[Method]:
-    """The method of a job, with the job's code. Raises ForeignCodeError otherwise."""
     try:
-        method = _method(name, foreign, job.get("module"))
-        if foreign is None and job["sources"] == built_in_sources(job["code"]):
-            return method  # to the letter what the job's code was made of
-        code = built_in_code(method.__module__) if foreign is None else _foreign_code(foreign)
-    except CoarticError as error:
-        raise ForeignCodeError(f"method {name!r}: {error}") from None
-    if code != job["code"]:
-        raise ForeignCodeError(
-            f"method {name!r} has code {code} here and {job['code']} where the suite was "
-            "started; install the same version everywhere"
-        )
-    return method
-
-
-def _outcomes(
-    method: Method, parameters: dict[str, Any], task: Task, sessions: Sequence[Session]
-) -> list[dict[str, Any]]:
-    """Status, reason, and the result as plain data where there is one, of each session."""
-
-    def results() -> Sequence[Result | MethodError]:
-        reason_not = reason_against(type(method), task, parameters)
-        if reason_not is not None:
-            raise MethodError("infeasible", reason_not)
-        if len(sessions) == 1:
-            return [method.solve(sessions[0])]
-        return method.solve_together(sessions)
-
-    try:
-        found = results()
+        results = _results(job, task, sessions)
     except BaseException as error:
-        return [_outcome(error, session) for session in sessions]
-    return [_outcome(result, session) for result, session in zip(found, sessions, strict=True)]
+        results = [error] * len(sessions)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    outcomes = [_outcome(*pair) for pair in zip(results, sessions, strict=True)]
+    return Answer(outcomes, wall, cpu, warm, process_peak_mb())
 
 
-def _outcome(result: Any, session: Session) -> dict[str, Any]:
-    status, reason = "ok", ""
-    stated: dict[str, Any] = {}
+def prepare(tasks: Iterable[tuple[dict[str, Any], bool]]) -> None:
+    """Compile the kernels for these tasks, or load them, on no run's clock; of each, whether the
+    learner is run on it."""
+    done = set()
+    for definition, learns in tasks:
+        task = parse_task(definition, "a job", reach=False)
+        if (kernels := (task.robot.most_links, learns)) not in done:
+            done.add(kernels)
+            warm_up(task, learns=learns)
+
+
+def learns(method: str) -> bool:
+    """Whether a method is the learner, which has a kernel of its own."""
+    return method.startswith(METHOD_PREFIX)
+
+
+_performed: set[str] = set()
+_method = cache(method_at)
+
+
+def _results(job: Job, task: Task, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
+    method_class = _method(job.where, job.method)
+    method = method_class(method_class.Parameters(**job.parameters))
+    reason_not = method.why_not(task)
+    if reason_not is not None:
+        raise MethodError("infeasible", str(reason_not))
+    if len(sessions) == 1:
+        return [method.solve(sessions[0])]
+    return method.solve_together(sessions)
+
+
+def _outcome(result: Any, session: Session) -> Outcome:
+    """A result as plain data, or how the run failed."""
+    meter = session.meter.as_dict()
+    own: dict[str, Any] = {
+        "used": tuple(sorted(item.value for item in session.used)),
+        "meter": meter,
+        "rewards": session.rewards,
+    }
     try:
+        if isinstance(result, MethodError):
+            details = _details(result.details)
+            return Outcome(result.outcome, str(result), details=details, **own)
         if isinstance(result, BaseException):
             raise result
-        stated = _stated(result, session)
-    except MethodError as error:
-        status, reason, stated = error.outcome, str(error), {"details": error.details}
+        return Outcome("ok", **own, **_stated(result, session))
     except UndeclaredError as error:
-        status, reason = "crashed", str(error)
+        return Outcome("crashed", str(error), **own)
     except BudgetError as error:
-        status, reason = "crashed", f"the method did not keep to its budget: {error}"
+        reason = f"the method did not keep to its budget: {error}"
+        return Outcome("crashed", reason, **own)
     except (_ResultError, SolutionError) as error:
-        status, reason = "solver-failed", str(error)
+        return Outcome("solver-failed", str(error), **own)
     except NotApplicableError as error:
-        status, reason = "infeasible", str(error)
-    except (Exception, SystemExit, KeyboardInterrupt) as error:
-        status, reason = "crashed", brief(error)
-    return {"status": status, "reason": reason, **stated}
+        return Outcome("infeasible", str(error), **own)
+    except BaseException as error:
+        return Outcome("crashed", brief(error), **own)
 
 
 class _ResultError(ValueError):
@@ -192,80 +206,33 @@ class _ResultError(ValueError):
 
 
 def _stated(result: Any, session: Session) -> dict[str, Any]:
-    """A result as plain data, if it is one."""
     if not isinstance(result, Result):
         raise _ResultError(f"the method returned {type(result).__name__}, not a Result")
-    session.check_solution(tuple(result.solution))
     try:
-        stated = {
-            name: [dict(vars(PlainMovement.of(movement))) for movement in getattr(result, name)]
-            for name in SOLUTIONS
-        }
-        others = {"details": result.details, "bound": result.bound}
-        json.dumps(others, allow_nan=False)
+        session.check_solution(tuple(result.solution))
+        parts = {part: [_plain(movement) for movement in getattr(result, part)] for part in PARTS}
+        details = _details(result.details)
+        bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise _ResultError(f"the method's result cannot be kept: {brief(error)}") from None
-    return {**stated, **others}
+    return {
+        "parts": {part: made for part, made in parts.items() if made},
+        "details": details,
+        "bound": bound,
+    }
 
 
-@cache
-def _environment() -> dict[str, Any]:
-    return {**environment(), "threads": {name: os.environ.get(name) for name in THREADS}}
+def _details(given: Any) -> dict[str, Any]:
+    """As plain data."""
+    return dict(json.loads(json.dumps(given, allow_nan=False)))
 
 
-@cache
-def _foreign_methods(foreign: Foreign) -> list[type[Method]]:
-    return methods_of(foreign)
-
-
-@cache
-def _foreign_code(foreign: Foreign) -> str:
-    return foreign_code(foreign)
-
-
-def _method(name: str, foreign: Foreign | None, module: str | None = None) -> type[Method]:
-    """Of this project's methods those of one module alone are imported."""
-    if foreign is not None:
-        methods, missing = _foreign_methods(foreign), f"{foreign.where} defines no method {name!r}"
-    elif module is not None:
-        methods, missing = [*built_in_methods(module)], "it is not installed on this worker"
-    else:
-        methods, missing = [], "another version asks for it; install the same everywhere"
-    for method in methods:
-        if method.name == name:
-            return method
-    raise MethodFileError(missing)
-
-
-def main() -> None:
-    """Answer questions until the input ends."""
-    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a method prints is not an answer
-    with open(os.devnull, "rb") as nothing:
-        os.dup2(nothing.fileno(), 0)  # and what it reads is not a question
-    answers.write(f"{os.getpid()}\n".encode())
-    answers.flush()
-    for line in questions:
-        said: dict[str, Any] = {"error": None, "answer": None}
-        question = json.loads(line)
-        token = question.pop("token")
-        if question["question"] != "prepare" and not gc.isenabled():
-            gc.freeze()  # what was imported and compiled until now
-            gc.enable()
-        try:
-            said["answer"] = answer(question)
-            text = _json(said)
-        except CoarticError as error:
-            other = isinstance(error, ForeignCodeError)
-            text = _json({"error": str(error), "answer": None, "foreign_code": other})
-        except (Exception, SystemExit, KeyboardInterrupt) as error:
-            text = _json({"error": brief(error), "answer": None})
-        answers.write(token.encode() + b" " + text + b"\n")
-        answers.flush()
-
-
-def _json(said: dict[str, Any]) -> bytes:
-    try:
-        return to_json(said)  # a tenth of the time of what comes next
-    except PydanticSerializationError:  # half a character, say
-        return json.dumps(said, allow_nan=False).encode()
+def _plain(movement: Movement) -> PlainMovement:
+    target, waypoints = movement.target, movement.waypoints
+    return (
+        int(movement.goal),
+        str(movement.hand),
+        str(movement.kind),
+        None if target is None else np.asarray(target, dtype=np.float64).tolist(),
+        None if waypoints is None else np.asarray(waypoints, dtype=np.float64).tolist(),
+    )

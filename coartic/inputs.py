@@ -3,13 +3,9 @@ may ask for."""
 
 from __future__ import annotations
 
-import io
-import os
 import re
-import stat
 import tomllib
 from collections.abc import Callable, Iterable
-from io import BufferedReader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,65 +32,25 @@ MOST_SEED = 2**63 - 1
 
 _SHOWN = 20  # problems of one file
 _BRIEF = 80  # characters of a value in a sentence
-# A key of many parts takes the parser time in the square of their number.
-_DEEP_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 
 
-def read_text(
-    path: str | Path, most: int = MOST_BYTES, *, error: type[CoarticError] = CoarticError
-) -> str:
-    """The text of a regular file of at most ``most`` bytes in UTF-8, with ``\\n`` as line end.
-
-    Raises ``error`` for anything else: no pipe is waited for, no device read without end.
-    """
-    content = read_bytes(path, most, error=error)
-    try:  # Notepad's mark, too
-        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig").read()
-    except UnicodeDecodeError:
-        raise error(f"{plain(str(path))}: is not a text file in UTF-8") from None
-
-
-def read_bytes(path: str | Path, most: int, *, error: type[CoarticError] = CoarticError) -> bytes:
-    """The content of a regular file of at most ``most`` bytes; raises ``error`` otherwise."""
-    shown = plain(str(path))
-    with open_regular(path, error=error) as file:
-        try:
-            size = min(os.fstat(file.fileno()).st_size, most)
-            content = file.read(size + 1)  # room for ``most`` would be made at once
-            if len(content) > size:  # it grew meanwhile
-                content += file.read(most + 1 - len(content))
-        except OSError as failure:
-            raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
-    if len(content) > most:
-        raise error(f"{shown}: is longer than {most:_} bytes, the most that is read")
-    return content
-
-
-def open_regular(path: str | Path, *, error: type[CoarticError] = CoarticError) -> BufferedReader:
-    """A regular file, open to be read, and to be closed; raises ``error`` for anything else."""
+def read_text(path: str | Path, *, error: type[CoarticError] = CoarticError) -> str:
+    """The text of a file in UTF-8. Raises ``error`` where there is none, or it is very long."""
     shown = plain(str(path))
     try:
-        file = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
-    except OSError as failure:
-        raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
-    except ValueError:  # what no file can be named
-        raise error(f"{shown}: is not the name of a file") from None
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-        file.close()
-        raise error(f"{shown}: is not a regular file")
-    return file
-
-
-def _open_at_once(path: str, flags: int) -> int:
-    """A pipe without a writer would block."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+        if Path(path).stat().st_size > MOST_BYTES:
+            raise error(f"{shown}: is longer than {MOST_BYTES:_} bytes, the most that is read")
+        return Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise error(f"{shown}: is not a text file in UTF-8") from None
+    except (OSError, ValueError) as failure:
+        why = getattr(failure, "strerror", None) or failure
+        raise error(f"{shown}: cannot be read: {why}") from None
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
     """The content of a TOML file. Raises ``error`` for one that cannot be used."""
     text, shown = read_text(path, error=error), plain(str(path))
-    if _DEEP_KEY.search(text):
-        raise error(f"{shown}: is not used: a key has more than 32 dotted parts")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as failure:  # TOMLDecodeError is a ValueError

@@ -424,6 +424,8 @@ class Method(ABC):
     stochastic: ClassVar[bool] = True
     """Whether the seed matters; the others are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
+    files: ClassVar[tuple[str, ...]] = ()
+    """Data files that it reads, beside the file that defines it: they count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check in seconds, where the defaults take longer than that."""
 

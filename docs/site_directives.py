@@ -141,7 +141,7 @@ def fields(module: str, owner: str, but: str = "") -> Iterator[str]:
 
 def parameters() -> Iterator[str]:
     """The parameters of every built-in method; methods that share them stand together."""
-    from coartic.benchmarks.registry import CLASSES
+    from coartic.benchmarks.registry import built_in
     from coartic.learner.conditions import ExplorationCondition
     from coartic.learner.method import DualProcessParameters
     from coartic.tasks.readings import readings
@@ -153,8 +153,8 @@ def parameters() -> Iterator[str]:
         if reading.part == "condition"
     }
     shared: dict[Any, list[str]] = {}
-    for name, method in CLASSES.items():
-        shared.setdefault(method.Parameters, []).append(f"`{name}`")
+    for name, entry in built_in().items():
+        shared.setdefault(entry.method.Parameters, []).append(f"`{name}`")
     for kind, names in shared.items():
         meanings = meanings_of(kind)
         if issubclass(kind, DualProcessParameters):

@@ -1,8 +1,8 @@
 """Imports point one way only, and kinematics has one home."""
 
 import ast
+import graphlib
 import importlib
-import json
 import os
 import pkgutil
 import re
@@ -11,9 +11,7 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 
-import psutil
 import pytest
 
 from tests.support.forks import apart, forget
@@ -64,6 +62,39 @@ def test_imports_point_one_way(path):
         assert not any(name.startswith("coartic.cli") for name in imported(path))
 
 
+def module_of(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = parts if parts[0] == "coartic" else ("coartic", *parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def statements(tree):
+    """All of a tree that is run at some time."""
+    for node in ast.iter_child_nodes(tree):
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield node
+            yield from statements(node)
+
+
+def test_no_imports_go_round_in_circles():
+    """Those within functions count as well."""
+    modules = {module_of(path): path for path in sources()}
+    imports = {}
+    for module, path in modules.items():
+        names = set()
+        for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                full = {f"{node.module}.{alias.name}" for alias in node.names}
+                names |= {name if name in modules else node.module for name in full}
+        imports[module] = names & {*modules} - {module}
+    try:
+        graphlib.TopologicalSorter(imports).prepare()
+    except graphlib.CycleError as error:
+        raise AssertionError(" <- ".join(error.args[1])) from None
+
+
 STATISTICS = [path for path in sources() if path.parent == ROOT / "analysis" / "statistics"]
 
 
@@ -83,13 +114,15 @@ def test_the_command_line_uses_all_it_sits_on():
 
 
 FRESH = """
-import gc, sys
+import gc, sys, time
 gc.disable()  # all is imported
+began = time.perf_counter()
 import coartic
+assert time.perf_counter() - began < 0.1, "slow"
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
 from coartic.benchmarks.worker import _method
-assert _method("dual-process/EC1", None, "coartic.learner.method").name == "dual-process/EC1"
-assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.registry"} & set(sys.modules)
+assert _method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
+assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
 print("worker", flush=True)
 from coartic import *
 from pkgutil import iter_modules
@@ -125,8 +158,7 @@ def test_help_needs_no_compiler():
 
 
 def test_one_kinematic_module():
-    """No cosine or sine is taken outside the robot and the functions handed to it, but by the
-    check of results, which imports neither."""
+    """No cosine or sine is taken outside the robot, the functions handed to it, and the referee."""
     home = {"coartic/robot.py", "coartic/motion/trigonometry.py", "analysis/verify.py"}
     pattern = re.compile(r"\b(np|numpy|math|casadi|ca|cs)\.(cos|sin|tan|exp)\(|\b(cosine|sine)\(")
     for path in sources():
@@ -154,14 +186,14 @@ def everything():
 
 
 def without_posix(out):
-    """Modules are imported, a suite is planned, a record kept and read; in a process of its own,
+    """Modules are imported, a suite is planned, performed and read; in a process of its own,
     which imports all libraries or has them from this one."""
     everything()  # with all the libraries, which know by themselves where they are
     forget("coartic", "tests")
     for name in ("fcntl", "grp", "pwd", "resource", "termios"):
         sys.modules[name] = None
     for module, names in (
-        (os, "fork getuid geteuid killpg setsid uname fchmod O_DIRECTORY O_NOFOLLOW"),
+        (os, "fork getuid geteuid killpg setsid uname fchmod sched_getaffinity O_DIRECTORY"),
         (signal, "SIGKILL SIGHUP SIGSTOP SIGALRM"),
     ):
         for name in names.split():
@@ -169,26 +201,15 @@ def without_posix(out):
                 delattr(module, name)
     everything()
 
-    from coartic.analysis.results.folder import load_results
-    from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.run import plan_cells, plan_suite
-    from coartic.benchmarks.suites import load_suite, select_cells
-    from coartic.benchmarks.worker import perform
+    from coartic.analysis.study import load
+    from coartic.benchmarks.run import plan_suite
+    from tests.support.suites import InProcess
 
-    class Here:
-        def perform(self, jobs):
-            for job in jobs:
-                said = {"error": None, "answer": perform(job)}
-                yield {"run_id": job["run_id"], "outcome": json.dumps(said)}
-
-    psutil.Process.memory_info = lambda process: SimpleNamespace(peak_wset=2**20)
-    suite = load_suite("quick")
-    cells = select_cells(suite, registry())
-    assert len(plan_suite(suite, runs=2, trials=5).planned) > len(cells)
-    report = plan_cells(suite, cells[:1], runs=1, trials=5).perform(out, executor=Here())
-    (record,) = report.records.values()
-    assert record.timing.process_peak_mb == 1.0
-    assert load_results(report.folder).runs.reward.tolist() == [record.solution.reward]
+    suite = plan_suite("quick", runs=2, trials=5)
+    assert suite.perform(out, executor=InProcess()).progress.failed == 0
+    runs = load(out).runs
+    assert len(runs) == suite.plan.size
+    assert runs.process_peak_mb.isna().all()
 
 
 def test_nothing_needs_what_posix_alone_has(tmp_path):

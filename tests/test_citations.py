@@ -2,7 +2,9 @@
 
 import inspect
 import re
+import sqlite3
 import unicodedata
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,17 +13,17 @@ from coartic import CoarticError, load_task
 from coartic.analysis.citations import PAPER, MethodSource, behind_analysis, bibliography, software
 from coartic.analysis.methods import KNOWN_METHODS, KnownMethod
 from coartic.analysis.references import parse, references
-from coartic.analysis.results.laws import read_manifest
 from coartic.analysis.signatures.register import REGISTER
-from coartic.benchmarks.registry import BUILT_IN, registry
+from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.suites import Cell
-from coartic.runs.record import Commit
+from coartic.runs.store import FILE
 from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
 
 ROOT = Path(__file__).parent.parent
 BIB = references()
 ANALYSIS = behind_analysis()
+BUILT_IN = [entry.method for entry in built_in().values()]
 GOOD = """@article{a2000,
   author = {A, B.},
   title = {C},
@@ -195,11 +197,10 @@ def test_command(tmp_path, monkeypatch, capsys):
         for name in ("corrective-alone/given", "test/good")
     ]
     run_and_write(tmp_path / "results", cells, runs=1)
-    manifest = read_manifest(tmp_path / "results")
-    commit = Commit(id="0123456789abcdef", dirty=False)
-    environment = manifest.environment.model_copy(update={"commit": commit})
-    manifest = manifest.model_copy(update={"environment": environment})
-    (tmp_path / "results" / "manifest.json").write_text(manifest.text(), encoding="utf-8")
+    commit = '{"id": "0123456789abcdef", "dirty": false}'
+    with closing(sqlite3.connect(tmp_path / "results" / FILE, isolation_level=None)) as plain_sql:
+        change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
+        plain_sql.execute(change, (commit,))
     code, text, _ = call(monkeypatch, capsys, "cite", tmp_path / "results")
     assert code == 0
     assert ", commit 0123456789abcdef}," in text
@@ -216,7 +217,3 @@ def test_command(tmp_path, monkeypatch, capsys):
         code, out, error = call(monkeypatch, capsys, "cite", *arguments)
         assert (code, out) == (2, "")
         assert words in error
-    (tmp_path / "results" / "manifest.json").write_text("{", encoding="utf-8")
-    code, _, error = call(monkeypatch, capsys, "cite", tmp_path / "results")
-    assert code == 2
-    assert "it cannot be read as JSON" in error

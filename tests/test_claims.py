@@ -1,6 +1,7 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,6 @@ from coartic.analysis.claims.ensemble import held_by
 from coartic.analysis.claims.general import shortest_reach
 from coartic.analysis.claims.judge import by_tests, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
-from coartic.analysis.results.folder import Results
 from coartic.analysis.signatures.context import context_dependence, dependence_below
 from coartic.analysis.signatures.subtasks import isolated_reach, served
 from coartic.analysis.statistics.estimates import Inference
@@ -23,11 +23,14 @@ from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
 from coartic.benchmarks.suites import Cell
-from tests.support.made_up import MadeUp, manifest_for, replanned, row
+from tests.support.made_up import MadeUp, plan_for, row, study_of
 from tests.support.strategies import as_released, changed
 from tests.support.suites import KNOWN, InProcess, run_and_write
 
-NOTHING = Results(None, manifest_for([]), pd.DataFrame(), pd.DataFrame())
+
+def nothing():
+    """A study of a folder without runs."""
+    return Study(Path("none"), plan_for([]), {}, pd.DataFrame())
 
 
 def test(p):
@@ -56,7 +59,7 @@ def judge_planted(monkeypatch, *pairs):
         named = claim.model_copy(update={"id": f"planted-{number}"})
         monkeypatch.setattr(judge, "JUDGES", {**judge.JUDGES, named.id: decide})
         claims.append(named)
-    return judge.judge(Study(NOTHING), claims)
+    return judge.judge(nothing(), claims)
 
 
 test.__test__ = False
@@ -97,7 +100,7 @@ def test_most_admissible_goals_decide(monkeypatch):
     claim, decide = planted(True, 0.001, fitted=True)
     for name, verdict in (("ec4-mixed", "not supported"), ("arm-coarticulation", "supported")):
         monkeypatch.setitem(judge.JUDGES, name, decide)
-        (entry,) = judge.judge(Study(NOTHING), [claim.model_copy(update={"id": name})])
+        (entry,) = judge.judge(nothing(), [claim.model_copy(update={"id": name})])
         assert entry.verdict == verdict
 
 
@@ -156,7 +159,7 @@ SEQUENCES = {
 }
 
 
-def planted_results(rows, tmp_path, sequences=SEQUENCES, tasks=()):
+def planted_study(rows, sequences=SEQUENCES, tasks=()):
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     own = {task.name: task for task in tasks}
     known = {
@@ -167,7 +170,7 @@ def planted_results(rows, tmp_path, sequences=SEQUENCES, tasks=()):
         for task, rewards in sequences.items()
         for hands, reward in rewards.items()
     ]
-    return Results(tmp_path, manifest_for(known.values(), runs), runs, pd.DataFrame(table))
+    return MadeUp(study_of(runs, list(known.values())), sequences=pd.DataFrame(table))
 
 
 def verdict_of(claim, study):
@@ -311,8 +314,8 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
         ("ec4-mixed", learner(T2, "EC4", WORSE, "RLRR", -357), "not supported"),
     ],
 )  # fmt: skip
-def test_judges_on_planted_runs(claim, rows, verdict, tmp_path):
-    judged = verdict_of(claim, Study(planted_results(rows, tmp_path)))
+def test_judges_on_planted_runs(claim, rows, verdict):
+    judged = verdict_of(claim, planted_study(rows))
     assert judged.verdict == verdict, judged.evidence
 
 
@@ -328,14 +331,14 @@ def seven(replays):
     ]
 
 
-def test_learning_that_does_not_last_is_not_supported(tmp_path):
+def test_learning_that_does_not_last_is_not_supported():
     """The best of all trials is never below the first; what is kept may be."""
     for replays, verdict in (
         ([9, 10, 11, 12], "supported"),
         ([-9, -10, -11, -12], "not supported"),
         ([-9, 10, -11, 12], "undecided"),
     ):
-        study = Study(planted_results(seven(replays), tmp_path))
+        study = planted_study(seven(replays))
         for which in ("one", "two"):
             assert verdict_of(f"learning-improves-{which}-armed", study).verdict == verdict
 
@@ -354,8 +357,8 @@ def test_learning_that_does_not_last_is_not_supported(tmp_path):
         ),
     ],
 )
-def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words, tmp_path):
-    judged = verdict_of("ec3-alternates", Study(planted_results(rows, tmp_path)))
+def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words):
+    judged = verdict_of("ec3-alternates", planted_study(rows))
     assert judged.verdict == "undecided"
     assert words in judged.evidence
 
@@ -372,24 +375,24 @@ def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words, tmp_path)
         ("ec3-departs", T2, {"RRRR": -350, "LLLL": -360}, "not supported"),
     ],
 )
-def test_judges_on_planted_sequences(claim, task, rewards, verdict, tmp_path):
+def test_judges_on_planted_sequences(claim, task, rewards, verdict):
     rows = learner(task, "EC3", MIDDLE, "RRRR")
-    study = Study(planted_results(rows, tmp_path, {task: rewards}))
+    study = planted_study(rows, {task: rewards})
     assert verdict_of(claim, study).verdict == verdict
 
 
-def test_the_base_reverses_where_goals_lie_back_and_forth(tmp_path):
+def test_the_base_reverses_where_goals_lie_back_and_forth():
     rows = learner(T1, "EC3", MIDDLE)
-    judged = verdict_of("initial-base-reverses", Study(planted_results(rows, tmp_path)))
+    judged = verdict_of("initial-base-reverses", planted_study(rows))
     assert judged.verdict == "supported"
     assert judged.entry.verdict == "used to choose the goals"
     assert judged.run_ids == ()
     forth = changed(T1, goals=[[4.0, 2.0], [6.0, 2.0], [8.0, 2.0], [10.0, 2.0]])
-    study = Study(planted_results(rows, tmp_path, tasks=[forth]))
+    study = planted_study(rows, tasks=[forth])
     assert verdict_of("initial-base-reverses", study).verdict == "not supported"
 
 
-def test_corrections_early_and_late(tmp_path):
+def test_corrections_early_and_late():
     """Counts of runs differ around a drift that is there in some of the cells, or in none."""
     for drift, verdict in ((40, "supported"), (-40, "not supported"), (0, "undecided")):
         rows = [
@@ -400,7 +403,7 @@ def test_corrections_early_and_late(tmp_path):
             }
             for k, entry in enumerate(seven([9, 10, 11, 12, 13]))
         ]
-        study = Study(planted_results(rows, tmp_path))
+        study = planted_study(rows)
         for which in ("one", "two"):
             judged = verdict_of(f"corrections-{which}-armed", study)
             assert judged.verdict == verdict
@@ -415,7 +418,7 @@ def ensured(failed=0):
     ]
 
 
-def test_a_failed_trial_or_sequence_is_found(tmp_path):
+def test_a_failed_trial_or_sequence_is_found():
     every = {"ascending": {"RRR": -319}, "descending": {"RRR": -333}, **SEQUENCES}
     lacking = {**every, "descending": {"RRR": None}}
     for failed, sequences, one, two in (
@@ -423,7 +426,7 @@ def test_a_failed_trial_or_sequence_is_found(tmp_path):
         (1, every, "not supported", "supported"),
         (0, lacking, "not supported", "supported"),
     ):
-        study = Study(planted_results(ensured(failed), tmp_path, sequences))
+        study = planted_study(ensured(failed), sequences)
         assert verdict_of("corrective-ensures-one-armed", study).verdict == one
         assert verdict_of("corrective-ensures-two-armed", study).verdict == two
 
@@ -457,9 +460,9 @@ def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
     """
     monkeypatch.setattr(general, "STARTS", 2)
     claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
-    shipped = Study(planted_results(seven([9, 10, 11]), tmp_path))
+    shipped = planted_study(seven([9, 10, 11]))
     assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2
-    study = Study(planted_results(seven([9, 10, 11]), tmp_path, tasks=[as_released(T2)]))
+    study = planted_study(seven([9, 10, 11]), tasks=[as_released(T2)])
     assert verdict_of(claims[0], study).verdict == "supported"
     two = verdict_of(claims[1], study)
     assert two.verdict == "not supported"
@@ -517,21 +520,18 @@ JUST = {"squared-changes": -302, "acceleration": -300, "jerk": -300}
         ),
     ],
 )
-def test_judges_beside_planted_plans(claim, rows, verdict, tmp_path):
-    study = Study(planted_results(rows, tmp_path))
+def test_judges_beside_planted_plans(claim, rows, verdict):
+    study = planted_study(rows)
     for which in ("one", "two"):
         judged = verdict_of(f"{claim}-{which}-armed", study)
         assert judged.verdict == verdict, judged.evidence
 
 
-def with_paths(results, paths, **parts):
-    """A study whose solutions are planted: runs by task and label."""
-    tasks = Study(results).tasks
-    trajectories = {
-        (task, label): Trajectories(tasks[task], label, "", tuple(runs))
-        for (task, label), runs in paths.items()
-    }
-    return MadeUp(results, _executed=trajectories, **parts)
+def with_paths(study, paths):
+    """Plant the solutions of a study: runs by task and label."""
+    for (task, label), runs in paths.items():
+        study._executed[task, label] = Trajectories(study.tasks[task], label, "", tuple(runs))
+    return study
 
 
 def at(q):
@@ -541,7 +541,7 @@ def at(q):
 @pytest.mark.parametrize(
     ("share", "verdict"), [(0.2, "supported"), (0.7, "not supported"), (1.2, "not supported")]
 )
-def test_resemblance_is_half_the_initial_distance(share, verdict, tmp_path):
+def test_resemblance_is_half_the_initial_distance(share, verdict):
     rows, paths = [], {}
     for task in ("ascending", "descending"):
         rows += learner(task, "EC1", [-300] * 9, "RRR")
@@ -552,7 +552,7 @@ def test_resemblance_is_half_the_initial_distance(share, verdict, tmp_path):
         paths[task, "dual-process/EC1"] = [
             at(planned + (share + 0.01 * k) * (initial - planned)) for k in range(-4, 5)
         ]
-    study = with_paths(planted_results(rows, tmp_path), paths)
+    study = with_paths(planted_study(rows), paths)
     judged = verdict_of("resembles-squared-changes", study)
     assert judged.verdict == verdict
     assert judged.evidence.count(f"learned solutions {share:.2f} [") == 2
@@ -567,7 +567,7 @@ def test_resemblance_is_half_the_initial_distance(share, verdict, tmp_path):
         (as_released(T1), "right", "RRLR", "not supported"),
     ],
 )
-def test_hands_that_serve_other_goals(task, quicker, hands, verdict, tmp_path):
+def test_hands_that_serve_other_goals(task, quicker, hands, verdict):
     """Of two-armed task 1, from whose start one hand is quicker at goal 1, by its goals either."""
     first = {h: corrective_trial(task, h).ticks_by_goal()[0] for h in ("LLLL", "RRRR")}
     assert min(first, key=first.get)[0] == quicker[0].upper()
@@ -575,7 +575,7 @@ def test_hands_that_serve_other_goals(task, quicker, hands, verdict, tmp_path):
     labels = ["EC3", "EC4"]
     rows = [entry for label in labels for entry in learner(T1, label, MIDDLE, hands)]
     paths = {(T1, f"dual-process/{label}"): [run] * 8 for label in labels}
-    study = with_paths(planted_results(rows, tmp_path, tasks=[task]), paths)
+    study = with_paths(planted_study(rows, tasks=[task]), paths)
     judged = verdict_of("hand-coarticulation", study)
     assert judged.verdict == verdict, judged.evidence
 
@@ -591,7 +591,7 @@ def waiting(part, task):
 @pytest.mark.parametrize(
     ("part", "verdict"), [(0.5, "supported"), (-0.5, "not supported"), (0.0, "undecided")]
 )
-def test_the_other_arm_gets_ready(part, verdict, tmp_path):
+def test_the_other_arm_gets_ready(part, verdict):
     """Against 0, not against condition 3, whose arm is as near without having moved."""
     spread = 0.01 * np.array([-4, -3, -2, -1, 1, 2, 3, 4])
     task = load_task(T1)
@@ -600,7 +600,7 @@ def test_the_other_arm_gets_ready(part, verdict, tmp_path):
         (T1, "dual-process/EC3"): [waiting(0.0, task)] * 8,
         (T1, "dual-process/EC4"): [waiting(part + s, task) for s in spread],
     }
-    study = with_paths(planted_results(rows, tmp_path), paths)
+    study = with_paths(planted_study(rows), paths)
     judged = verdict_of("other-arm-coarticulation", study)
     assert judged.verdict == verdict, judged.evidence
     left_at_goal_2 = [
@@ -631,7 +631,7 @@ def timed(task, first, others):
         (6, 20, "not supported"),
     ],
 )
-def test_the_first_movement_is_sacrificed(first, others, verdict, tmp_path):
+def test_the_first_movement_is_sacrificed(first, others, verdict):
     tasks = ("ascending", "descending")
     rows = [entry for task in tasks for entry in learner(task, "EC1", MIDDLE, "RRR")]
     paths = {
@@ -640,9 +640,7 @@ def test_the_first_movement_is_sacrificed(first, others, verdict, tmp_path):
     }
     for runs in paths.values():  # as many as rows
         runs += runs[:2]
-    judged = verdict_of(
-        "first-movement-sacrificed", with_paths(planted_results(rows, tmp_path), paths)
-    )
+    judged = verdict_of("first-movement-sacrificed", with_paths(planted_study(rows), paths))
     assert judged.verdict == verdict, judged.evidence
     both = sum(first + k > 1 and first + k + others < 0 for k in (*SPREAD, *SPREAD[:2]))
     assert judged.evidence.count(f"both in {both} of 8 runs") == 2
@@ -667,28 +665,24 @@ def test_little_dependence_on_context():
         ([1, 2, 1.5, 4], 8, "not supported"),
     ],
 )
-def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict, tmp_path):
+def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict):
     q = np.zeros((4, 10))
     q[:, 0] = xs
     run = SimpleNamespace(execution=SimpleNamespace(configurations=q, hands="RRLR"))
     rows = learner(T1, "EC2", MIDDLE * 2, "RRLR")
     paths = {(T1, "dual-process/EC2"): [run] * runs}
-    assert (
-        verdict_of("no-reversal", with_paths(planted_results(rows, tmp_path), paths)).verdict
-        == verdict
-    )
+    assert verdict_of("no-reversal", with_paths(planted_study(rows), paths)).verdict == verdict
 
 
 class FewStarts(InProcess):
     """Plans are begun from little: how good they are is for the tests of their methods."""
 
     def perform(self, jobs):
-        for job in jobs:
-            given = job["specification"]
-            if "graphs" in given["parameters"]:
-                few = {"graphs": 1, "chains": 1, "noisy_starts": 0, "nodes": 60}
-                given = {**given, "parameters": {**given["parameters"], **few}}
-            yield from super().perform([{**job, "specification": given}])
+        few = {"graphs": 1, "chains": 1, "noisy_starts": 0, "nodes": 60}
+        return super().perform(
+            replace(job, parameters=job.parameters | (few if "graphs" in job.parameters else {}))
+            for job in jobs
+        )
 
 
 @pytest.fixture(scope="module")
@@ -711,9 +705,9 @@ def study(tmp_path_factory):
     ]
     planned = [Cell(load_task(task), KNOWN[method]) for task, method in cells]
     folder = tmp_path_factory.mktemp("claims")
-    results = run_and_write(folder, planned, runs=4, trials=1500, executor=FewStarts())
-    results.runs["trials"] = results.runs.trials.replace(1500, 10_000)  # as long as the paper's
-    return Study(results)
+    study = run_and_write(folder, planned, runs=4, trials=1500, executor=FewStarts())
+    study.runs["trials"] = study.runs.trials.replace(1500, 10_000)  # as long as the paper's
+    return study
 
 
 def test_the_register_on_runs(study):
@@ -738,11 +732,10 @@ def test_the_register_on_runs(study):
 def test_what_else_was_run_changes_no_verdict_on_the_papers_cells(study):
     """The same runs alone, and with other methods beside them, one of them tested against."""
     own = study.runs[study.runs.method.str.startswith("dual-process/")]
-    manifest = study.results.manifest
-    cells = [c for c in manifest.specification.cells if c.method.startswith("dual-process/")]
-    alone = replace(study.results, runs=own, manifest=replanned(manifest, cells=tuple(cells)))
+    cells = [cell for cell in study.plan.cells if cell.method.startswith("dual-process/")]
+    alone = replace(study, runs=own, plan=replace(study.plan, cells=tuple(cells)))
     changed_ones = []
-    for one, other in zip(judge.judged(Study(alone)), judge.judged(study), strict=True):
+    for one, other in zip(judge.judged(alone), judge.judged(study), strict=True):
         if one.claim.beside:
             changed_ones += [one.claim.id] * (one.finding.evidence != other.finding.evidence)
             continue
@@ -772,7 +765,7 @@ def test_a_place_can_be_found_by_a_few_words():
 
 
 def test_the_register_is_the_same_every_time(study):
-    first, second = judge.judged(study), judge.judged(Study(study.results))
+    first, second = judge.judged(study), judge.judged(replace(study))
     for name in ("verdict", "finding", "run_ids"):
         assert [repr(getattr(e, name)) for e in first] == [repr(getattr(e, name)) for e in second]
 
@@ -785,12 +778,11 @@ def test_the_register_is_the_same_every_time(study):
         (["LRLR"] * 18 + ["RRRR"] * 6, "undecided"),
     ],
 )
-def test_the_rail_makes_the_sequence(free, verdict, tmp_path):
+def test_the_rail_makes_the_sequence(free, verdict):
     rows = [*learner(T1, "EC3", MIDDLE * 3), *learner(T1, "EC2", LOW, "RRRR")]
     rows += [*learner(FREE, "EC3", MIDDLE * 3, free), *learner(FREE, "EC2", LOW, "RRRR")]
     free_base = load_task(T1).model_copy(update={"name": FREE, "locked_base": ()})
-    results = planted_results(rows, tmp_path, tasks=[free_base])
-    judged = verdict_of("rail", Study(results))
+    judged = verdict_of("rail", planted_study(rows, tasks=[free_base]))
     assert judged.verdict == verdict, judged.evidence
 
 
@@ -798,17 +790,15 @@ def test_the_rail_makes_the_sequence(free, verdict, tmp_path):
     ("one", "verdict"),
     [(LOW, "supported"), (HIGH, "not supported"), (MIDDLE, "undecided")],
 )
-def test_search_on_two_levels(one, verdict, tmp_path):
+def test_search_on_two_levels(one, verdict):
     rows = [*learner(T1, "EC3", MIDDLE), *learner(T1, "EC1", one)]
     rows += [*learner(T2, "EC3", BETTER, initial=-357), *learner(T2, "EC1", WORSE, initial=-357)]
-    assert (
-        verdict_of("multilevel-search", Study(planted_results(rows, tmp_path))).verdict == verdict
-    )
+    assert verdict_of("multilevel-search", planted_study(rows)).verdict == verdict
 
 
 def test_the_papers_own_p_values():
     """RLRR above RRRR is printed with p < .01; Welch's test on what is printed gives 0.053."""
-    judged = verdict_of("printed-p-values", Study(NOTHING))
+    judged = verdict_of("printed-p-values", nothing())
     assert judged.verdict == "not supported"
     a, b = (-350, 4.2, 9), (-352.7, 2.1, 11)
     p = stats.ttest_ind_from_stats(*a, *b, equal_var=False, alternative="greater").pvalue
@@ -846,7 +836,7 @@ def test_what_a_posture_serves():
 @pytest.mark.parametrize(
     ("part", "verdict"), [(0.3, "supported"), (-0.3, "not supported"), (0.0, "undecided")]
 )
-def test_the_chosen_arm_serves_the_next_goal(part, verdict, tmp_path):
+def test_the_chosen_arm_serves_the_next_goal(part, verdict):
     rows, paths = [], {}
     for task, initial in ((T1, -671), (T2, -357)):
         for condition in ("EC3", "EC4"):
@@ -854,7 +844,7 @@ def test_the_chosen_arm_serves_the_next_goal(part, verdict, tmp_path):
             paths[task, f"dual-process/{condition}"] = [
                 hit_early(part + 0.02 * k, task) for k in (-3, -2, -1, 1, 2, 3, -1, 1)
             ]
-    judged = verdict_of("arm-coarticulation", with_paths(planted_results(rows, tmp_path), paths))
+    judged = verdict_of("arm-coarticulation", with_paths(planted_study(rows), paths))
     assert judged.verdict == verdict, judged.evidence
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from filelock import FileLock
 from numba import njit, types
 
 from coartic.motion import compiled
@@ -102,54 +101,31 @@ def test_machine_code_that_nobody_uses_is_removed(monkeypatch, tmp_path):
     assert {*current.parent.iterdir()} == {current, other}
 
 
-@pytest.fixture
-def order(monkeypatch, tmp_path):
-    """What was called, in order, of two kernels in a cache of their own."""
+@pytest.mark.parametrize("ending", ["nbi", "nbc", "nb?"])
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
+def test_machine_code_that_was_cut_short_is_compiled_anew(tmp_path, ending, share):
+    """By a full disk, say: the index, the code, or both."""
+    ignored = shutil.ignore_patterns("__pycache__", "benchmarks")
+    shutil.copytree(ROOT / "coartic", tmp_path / "coartic", ignore=ignored)
+    (tmp_path / "kernel.py").write_text(KERNEL, encoding="utf-8")
+    assert apart(found, tmp_path) == (5.5, 0)
+    files = list((tmp_path / "coartic" / "__pycache__").rglob(f"*.{ending}"))
+    assert files
+    for path in files:
+        os.truncate(path, int(share * path.stat().st_size))
+    assert [apart(found, tmp_path) for _ in range(2)] == [(5.5, 0), (5.5, 1)]
+
+
+def test_nothing_is_said_where_machine_code_cannot_be_kept(monkeypatch, tmp_path):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
     monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
-    return []
+    monkeypatch.setattr(compiled.FunctionCache, "_save_overload", full)
 
+    @compiled.entry
+    def twice(number):
+        return 2 * number
 
-def both(order):
-    return {name: lambda name=name: order.append(name) for name in ("first", "second")}
-
-
-def test_processes_that_compile_at_once_share_the_work(order, tmp_path):
-    """What another compiles comes last, once it is done there."""
-
-    def second():
-        order.append("second")
-        other.release()  # as another process does when it is done with the first
-
-    with FileLock(tmp_path / "first.lock", thread_local=False) as other:
-        compiled.compile_together({**both(order), "second": second}, "4")
-    assert order == ["second", "first"]
-
-
-def test_what_is_compiled_is_loaded_by_all_at_once(order, tmp_path):
-    compiled.compile_together(both(order), "4")
-    with FileLock(tmp_path / "first.lock"), FileLock(tmp_path / "second.lock"):
-        compiled.compile_together(both(order), "4")
-    assert order == ["first", "second"] * 2
-
-
-def test_nothing_waits_for_a_process_that_is_stuck(order, monkeypatch, tmp_path):
-    """For another number of links, too: there is one index of both."""
-    monkeypatch.setattr(compiled, "_PATIENCE_S", 0.0)
-    compiled.compile_together(both([]), "3")
-    with FileLock(tmp_path / "first.lock"):
-        compiled.compile_together(both(order), "4")
-    assert order == ["second", "first"]
-
-
-@pytest.mark.parametrize("folder", [None, Path("/dev/null")], ids=["nowhere", "no locks"])
-def test_without_locks_everything_is_compiled(monkeypatch, folder):
-    monkeypatch.setattr(compiled, "_cache_folder", lambda: folder)
-    order = []
-    compiled.compile_together(both(order), "4")
-    assert order == ["first", "second"]
-
-    def broken():
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        compiled.compile_together({"broken": broken}, "4")
+    assert twice(3) == 6
+    assert not list(tmp_path.rglob("*.nb?"))

@@ -1,25 +1,22 @@
 """The conformance kit: every built-in method passes, every broken one fails its law."""
 
 import re
-from pathlib import Path
 
 import pytest
 
 from coartic import load_task
-from coartic.analysis.results.optima import entries
+from coartic.analysis.optima import entries
 from coartic.benchmarks import conformance, reproduce
-from coartic.benchmarks import registry as registry_module
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.harness import record_of
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.specification import RunSpec
+from coartic.benchmarks.worker import job_of, perform
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
-from tests.support.suites import InProcess, ask_here, performed, spec_of
+from tests.support.suites import BROKEN, InProcess
+from tests.support.suites import KNOWN as BUILT_IN
 
-BROKEN = Path(__file__).parent / "plugins" / "broken.py"
-BUILT_IN = registry()
 OPTIMUM = {
     entry.task: entry.reward
     for entry in entries()
@@ -64,20 +61,25 @@ TASKS = {
 
 @pytest.fixture(scope="module")
 def known():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(registry_module, "_ask", ask_here)
-        return registry([BROKEN])
+    return registry([BROKEN])
+
+
+class HereAndThere:
+    """The first runs of a method in a process of their own, which takes longest to begin, where
+    they are compared with the one that is performed in this."""
+
+    def __init__(self, jobs):
+        pass
+
+    def perform(self, jobs):
+        apart = jobs[0].is_ours or jobs[0].method in ("test/local", "test/remembers")
+        return (Local(1) if apart and len(jobs) > 1 else InProcess()).perform(jobs)
 
 
 @pytest.fixture(autouse=True)
-def one_sandbox(monkeypatch):
-    """Few trials in few processes. The broken methods share one, as this project's do, and the
-    other process that a result is compared with is this one: a start takes longer than all their
-    runs. That each has one of its own is for tests/test_sandbox.py."""
-    own_job = RunSpec.job
+def few_trials(monkeypatch):
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
-    monkeypatch.setattr(RunSpec, "job", lambda spec: {**own_job(spec), "owner": None})
-    monkeypatch.setattr(reproduce, "supervise", performed)
+    monkeypatch.setattr(reproduce, "Local", HereAndThere)
 
 
 @pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])
@@ -100,13 +102,11 @@ def test_methods_that_keep_every_law(known, name):
 def test_what_a_session_shows_cannot_be_written(known):
     laws = check_method(known["test/forger"], laws=("solution", "information"))
     assert [law.passed for law in laws] == [True, True]
-    (spec,) = spec_of(known, "test/forger")
-    (answer,) = InProcess().perform([spec.job()])
-    record = record_of(answer, spec)
-    assert record.meter.trials == 1
-    assert len(record.rewards) == 1
-    assert record.rewards[0] < 0
-    assert "a method cannot set counter 'trials'" in record.details["said"]
+    task = load_task("ascending").model_dump(mode="json")
+    (outcome,) = perform(job_of(known["test/forger"], task, {}, (0,))).outcomes
+    assert outcome.meter["trials"] == len(outcome.rewards) == 1
+    assert outcome.rewards[0] < 0
+    assert "a method cannot set counter 'trials'" in outcome.details["said"]
 
 
 CASES = [
@@ -123,15 +123,6 @@ CASES = [
     ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
     ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
     ("test/quits", "solution", "on ascending: crashed: SystemExit: 0"),
-    ("test/dies", "solution", "crashed: the worker process ended (exit code 7): last words"),
-    ("test/nothing", "solution", "solver-failed: the method returned NoneType, not a Result"),
-    ("test/nan", "solution", "solver-failed: the method's result cannot be kept"),
-    (
-        "test/wrong-hand",
-        "solution",
-        "solver-failed: task 'ascending', goal 1: the robot",
-    ),
-    ("test/smuggler", "solution", "a planned movement has no waypoints"),
     ("test/unhelpful", "failure", "gives crashed ZeroDivisionError: no goal is that far"),
 ]
 

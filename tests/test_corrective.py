@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct
-from coartic.motion import reference
 from coartic.motion.compiled import entry, joint_chain, joint_lever
 from coartic.motion.corrective import shift_kernel
 from coartic.motion.movement import Goal, largest_square, scratch_for
 from coartic.robot import HANDS
+from tests.support import reference
 from tests.support.strategies import UNEVEN, configurations
 
 ROBOT = Robot()

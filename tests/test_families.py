@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import coartic.tasks.families
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task, parse_task
+from coartic.analysis.study import load
 from coartic.benchmarks.run import Selection, plan_suite, run_suite
 from coartic.inputs import MOST_CELLS
-from coartic.runs.tables import RUNS
 from coartic.tasks.families import (
     CORRECTIVE,
     FAMILY_FOLDER,
@@ -391,31 +391,6 @@ def test_a_family_of_ones_own(tmp_path):
     assert (family.name, family.reach, family.region.x) == ("mine/v1", 4000, (-5000, 5000))
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"goals": "[1, 3]"}, "goals[0] is 1; it must be at least 2"),
-        ({"goals": "[3, 2]"}, "goals: goes from more to less"),
-        ({"links": "[3, 9]"}, "links[1] is 9; it must be at most 8"),
-        ({"apart": "0.1"}, "toml: apart lets goals overlap"),
-        ({"radius": "0.01"}, "radius is not larger than the accuracy of the corrective process"),
-        ({"reach": "4.0001"}, "reach: has more than three decimals"),
-        ({"reach": "-1"}, "reach: should be greater than 0"),
-        ({"within": "1.5"}, "within: should be above 0, at most 1"),
-        ({"clear": "true"}, "clear: should be a number up to 1000"),
-        ({"clear": "nan"}, "clear: should be a number up to 1000"),
-        ({"base": "[]"}, "base has too few entries"),
-        ({"base": '["flying"]'}, "base[0] is 'flying'"),
-        ({"bend": "0.1"}, "bend is an unknown key; did you mean 'bent'?"),
-        ({"name": "x.toml"}, "the name of a family's file is NAME.v1.toml"),
-    ],
-)
-def test_a_family_that_cannot_be_is_refused(tmp_path, changes, words):
-    with pytest.raises(TaskError) as caught:
-        read_family(family_file(tmp_path, **changes))
-    assert words in str(caught.value)
-
-
 def test_a_family_that_cannot_be_met_ends(monkeypatch):
     monkeypatch.setattr("coartic.tasks.families.MOST_ATTEMPTS", 20)
     monkeypatch.setitem(RULES, "overlap", lambda candidate: True)
@@ -444,40 +419,30 @@ SMALL = Selection(
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_small_suite(tmp_path):
-    """Every record holds the whole task, and thereby the hash of the instance's file."""
+    """The folder holds the whole tasks, and thereby the hashes of the instances' files."""
     report = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
     assert (report.progress.done, report.progress.failed) == (10, 0)
     names = names_in("two-armed/v1/i000..i001")
-    hashes = {name: task_hash(instance(name)) for name in names}
-    seen = {(record.task.name, task_hash(record.task)) for record in report.records.values()}
-    assert seen == set(hashes.items())
-    plan = report.manifest.specification
-    assert {n: task_hash(parse_task(t, "manifest")) for n, t in plan.tasks.items()} == hashes
-    runs = load_runs(report.folder)
-    assert set(runs.task) == set(names)
-    assert list(runs.columns) == RUNS.names
+    study = load(tmp_path / "out")
+    assert set(study.runs.task) == set(names)
+    assert {name: task_hash(study.tasks[name]) for name in names} == {
+        name: task_hash(instance(name)) for name in names
+    }
     again = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
     assert (again.progress.present, again.progress.done) == (10, 0)
 
 
-def load_runs(folder):
-    from coartic.analysis.results.folder import load_results
-
-    return load_results(folder).runs
-
-
-def test_a_record_of_another_task_has_another_id():
-    (plan,) = plan_suite("families", runs=1, select=Selection(["two-armed/v1/i016"], ["EC4"])).cells
-    asked = plan.setting.asked
-    moved = asked.model_copy(
-        update={"task": asked.task | {"goals": [[5.064, -0.303], *asked.task["goals"][1:]]}}
-    )
-    assert list(asked.keys([0])) != list(moved.keys([0]))
+def test_a_run_of_another_task_has_another_id():
+    select = Selection(["two-armed/v1/i016"], ["EC4"])
+    plan = plan_suite("families", runs=1, select=select).plan
+    ((name, task),) = plan.tasks.items()
+    moved = replace(plan, tasks={name: task | {"goals": [[5.064, -0.303], *task["goals"][1:]]}})
+    assert plan.run_ids(plan.cells[0]) != moved.run_ids(plan.cells[0])
 
 
 def test_the_shipped_suite():
     suite = plan_suite("families", runs=1)
-    tasks = {plan.cell.task.name: plan.cell.task for plan in suite.cells}
+    tasks = suite.tasks
     assert {task.family for task in tasks.values()} == set(families())
     assert {task.split for task in tasks.values()} == {"test"}
     assert len(tasks) >= 200
@@ -503,12 +468,12 @@ def test_a_goal_of_an_instance_moves(tmp_path):
 def test_an_instance_beside_a_suites_tasks():
     select = Selection(tasks=["two-armed/v1/i003..i004", "two-armed-1"], methods=["EC4"])
     plan = plan_suite("paper", runs=1, select=select)
-    assert [cell.cell.task.name for cell in plan.cells] == [
+    assert [cell.task for cell in plan.plan.cells] == [
         "two-armed-1", "two-armed/v1/i003", "two-armed/v1/i004",
     ]  # fmt: skip
     # The paper's EC1 is for one arm, and comes to the right hand by itself.
     alone = plan_suite("paper", runs=1, select=Selection(tasks=["one-armed/v1/i000"]))
-    assert [cell.cell.method for cell in alone.cells] == ["dual-process/EC1"]
+    assert [cell.method for cell in alone.plan.cells] == ["dual-process/EC1"]
 
 
 def test_command_draws_and_writes_instances(monkeypatch, capsys, tmp_path):

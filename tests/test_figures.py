@@ -27,15 +27,15 @@ from coartic.analysis.figures.style import looks
 from coartic.analysis.figures.tasks import tasks_plot
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.register import signatures
-from coartic.analysis.study import Study
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
+from tests.support.made_up import MadeUp
 from tests.support.suites import KNOWN, run_and_write
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    return Study(run_and_write(tmp_path_factory.mktemp("figures"), runs=4, trials=120))
+    return run_and_write(tmp_path_factory.mktemp("figures"), runs=4, trials=120)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_a_folder_without_the_learner(tmp_path):
     cells = select_cells(
         load_suite("comparison"), KNOWN, tasks=["descending"], methods=["corrective-alone/given"]
     )
-    alone = Study(run_and_write(tmp_path, cells=cells, runs=1))
+    alone = run_and_write(tmp_path, cells=cells, runs=1)
     for name in ("learned-reward", "published", "recruitment", "context", *PAPER):
         with pytest.raises(CoarticError):
             FIGURES[name](alone)
@@ -72,7 +72,7 @@ def test_a_folder_without_the_learner(tmp_path):
 
 
 def test_bars_are_means_of_the_runs(study, figures):
-    runs, plot = study.results.runs, figures["learned-reward"]
+    runs, plot = study.runs, figures["learned-reward"]
     data = plot.data
     assert len(data) == 7  # three conditions and two, each task with its initial solution
     for row in data[data.method != "initial"].itertuples():
@@ -97,13 +97,13 @@ def test_bars_are_means_of_the_runs(study, figures):
 
 def test_configurations_are_those_of_the_stored_run(study, figures):
     plots = [figures[name] for name in PAPER]
-    solutions, paths = study.results.solutions(), study.results.paths()
+    movements, waypoints = study.movements
     for plot in plots:
         for (name, run_id), rows in plot.data.groupby(["task", "run_id"]):
             task = load_task(name)
             if run_id:
-                own = solutions[solutions.run_id == run_id]
-                execution = execute(task, movements_from(task, own, paths))
+                stored = movements_from(task, movements[run_id], waypoints.get(run_id))
+                execution = execute(task, stored)
                 assert run_id not in plot.caption  # which is for reading; the data name it
             else:
                 execution = corrective_trial(task, "R" * len(task.goals))
@@ -146,14 +146,14 @@ def test_common_hand_sequences_are_a_fifth_of_the_runs(tmp_path):
     cells = select_cells(
         load_suite("paper"), KNOWN, tasks=["two-armed-2"], methods=["dual-process/EC3"]
     )
-    planted = Study(run_and_write(tmp_path, cells=cells, runs=12, trials=20))
+    planted = run_and_write(tmp_path, cells=cells, runs=12, trials=20)
     for hands, expected in (
         (["LL"] * 5 + ["RR"] * 4 + ["RL"] * 3, ["LL", "RR"]),
         (["RL"] * 2 + ["LL"] * 10, ["LL"]),
         (["RL"] * 6 + ["LL"] * 6, ["LL", "RL"]),
         ([f"{k}" for k in range(12)], ["0"]),
     ):
-        own = Study(replace(planted.results, runs=planted.results.runs.assign(hands=hands)))
+        own = replace(planted, runs=planted.runs.assign(hands=hands))
         assert common_sequences(own, "two-armed-2", "dual-process/EC3", 2) == expected
 
 
@@ -161,14 +161,10 @@ def test_learning_curves_against_a_loop(study, monkeypatch):
     window = 7
     monkeypatch.setattr(import_module("coartic.analysis.figures.learning_curves"), "WINDOW", window)
     data = learning_curves(study).data
-    learning = study.results.learning()
+    rewards = dict(study.rewards())
     spread = 0
     for key, rows in data.groupby(["task", "method"]):
-        ids = study.cells[key].good.run_id
-        runs = [
-            learning[learning.run_id == run].reward.to_numpy(dtype=float, na_value=np.nan)
-            for run in ids
-        ]
+        runs = [rewards[run_id] for run_id in study.cells[key].good.run_id]
         assert rows.trial.iloc[[0, -1]].tolist() == [1, 120]
         for row in rows.itertuples():
             best = sorted(np.nanmax(run[: row.trial]) for run in runs)
@@ -217,9 +213,7 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     )
     own = study.cells["ascending", "dual-process/EC1"]
     cells = study.cells | {("ascending", label): own for label in labels}
-    results = replace(study.results)
-    results.__dict__["cells"] = cells
-    of = Study(results)
+    of = MadeUp(study, cells=cells)
     of._computed[signatures.__wrapped__] = planted
     plot = context(of, methods=labels)
     data = plot.data.set_index("method").loc[labels]
@@ -240,11 +234,11 @@ def test_published_differences(tmp_path):
     cells = select_cells(
         load_suite("paper"), KNOWN, tasks=["two-armed-1"], methods=["dual-process/EC2"]
     )
-    results = run_and_write(tmp_path, cells=cells, runs=3, trials=60)
-    results.runs["trials"] = 10_000  # planted: the table asks for the paper's length
-    results.runs["hands"] = ["RRRR", "RRRR", "LRLR"]
-    results.runs["reward"] = [-610, -606, -500]
-    data = published(Study(results)).data.set_index("hands")
+    planted = run_and_write(tmp_path, cells=cells, runs=3, trials=60)
+    planted.runs["trials"] = 10_000  # planted: the table asks for the paper's length
+    planted.runs["hands"] = ["RRRR", "RRRR", "LRLR"]
+    planted.runs["reward"] = [-610, -606, -500]
+    data = published(planted).data.set_index("hands")
     assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
     assert data.verdict[""] == "undecided"  # also of a mean over sequences
     assert data.difference["RRRR"] == pytest.approx(1.0)
@@ -261,7 +255,7 @@ def test_variants_of_a_task_are_told_apart():
 
 
 def test_ranking_is_the_mean_gap_of_the_runs(study, figures):
-    runs = study.results.runs
+    runs = study.runs
     for row in figures["ranking"].data.query("task == 'two-armed-1'").itertuples():
         rewards = runs[(runs.task == row.task) & (runs.method == row.method)].reward.astype(float)
         top = study.optima[row.task, "free"].reward

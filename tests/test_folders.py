@@ -7,20 +7,19 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
-from coartic.analysis.study import Study
-from coartic.benchmarks.registry import registry
+from coartic.analysis.study import load
 from coartic.benchmarks.suites import Cell
+from coartic.runs.store import FILE
 from tests.support.commands import call
-from tests.support.suites import run_and_write
+from tests.support.suites import KNOWN, run_and_write
 
-KNOWN = registry()
 LEARNED, ALONE = "dual-process/EC1", "corrective-alone/given"
 CELLS = [Cell(load_task("ascending"), KNOWN[name]) for name in (LEARNED, ALONE)]
 
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
-    return Study(run_and_write(tmp_path_factory.mktemp("first"), CELLS, runs=6, trials=40))
+    return run_and_write(tmp_path_factory.mktemp("first"), CELLS, runs=6, trials=40)
 
 
 def shifted(study, by):
@@ -29,7 +28,7 @@ def shifted(study, by):
     own = runs.method == LEARNED
     runs.loc[own, "reward"] += np.array(by)
     runs.loc[own, "result"] += "-other"
-    return Study(replace(study.results, runs=runs))
+    return replace(study, runs=runs)
 
 
 def of_learner(first, second):
@@ -39,14 +38,14 @@ def of_learner(first, second):
 
 
 def test_the_same_runs_are_identical(first, tmp_path):
-    again = Study(run_and_write(tmp_path, CELLS, runs=6, trials=40))
+    again = run_and_write(tmp_path, CELLS, runs=6, trials=40)
     row = of_learner(first, again)
     assert (row.verdict, row.identical, row.shared, row.difference) == ("identical", 6, 6, 0)
     assert differences(first, again).empty
 
 
 def test_other_seeds_and_trials_are_named(first, tmp_path):
-    other = Study(run_and_write(tmp_path, CELLS, runs=6, trials=30, seed=3))
+    other = run_and_write(tmp_path, CELLS, runs=6, trials=30, seed=3)
     named = differences(first, other).set_index("what")
     assert tuple(named.loc["seed"]) == ("0", "3")
     assert tuple(named.loc["trials"]) == ("40", "30")
@@ -71,7 +70,7 @@ def test_planted_differences_get_their_verdict(first, by, verdict):
 def test_the_command_prints_what_differs(first, tmp_path, monkeypatch, capsys):
     run_and_write(tmp_path / "b", CELLS, runs=6, trials=40, seed=1)
     table = tmp_path / "cells.csv"
-    folders = (first.results.folder, tmp_path / "b")
+    folders = (first.folder, tmp_path / "b")
     code, text, _ = call(monkeypatch, capsys, "compare", *folders, "--out", table)
     assert code == 0
     assert "seed" in text
@@ -79,3 +78,12 @@ def test_the_command_prints_what_differs(first, tmp_path, monkeypatch, capsys):
     assert len(table.read_text().splitlines()) == 3
     with pytest.raises(CoarticError, match="same folder"):
         load_pair(tmp_path / "b", tmp_path / "b")
+
+
+def test_a_damaged_file_is_said(first, tmp_path):
+    """Damaged in its head, where it is noticed at once, or where the runs are."""
+    whole = (first.folder / FILE).read_bytes()
+    for begin, end in ((0, 100), (len(whole) // 4, len(whole))):
+        (tmp_path / FILE).write_bytes(whole[:begin] + b"\xff" * (end - begin) + whole[end:])
+        with pytest.raises(CoarticError, match="is damaged"):
+            load(tmp_path)

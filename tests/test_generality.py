@@ -12,10 +12,9 @@ from coartic.analysis.generality.exploration import budgets, contrasts
 from coartic.analysis.generality.presence import Signs, presence, recruitment, signs
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
-from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import KnownOptimum
+from coartic.analysis.optima import KnownOptimum
 from coartic.tasks.families import names_in
-from tests.support.made_up import MadeUp, manifest_for, row
+from tests.support.made_up import MadeUp, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 COUNT = 5
@@ -39,9 +38,7 @@ def runs_of(name, label, centre, *, hands=None, noise=NOISE, **more):
     ]  # fmt: skip
 
 
-def study_of(
-    tmp_path, centres, *, families=ONE + TWO, split="i", optima=True, count=COUNT, **parts
-):
+def rewarded(centres, *, families=ONE + TWO, split="i", optima=True, count=COUNT):
     """Rewards of conditions by label: a number, or a function of the instance's number."""
     rows, tasks, known = [], [], {}
     for family in families:
@@ -59,15 +56,15 @@ def study_of(
     sequences = pd.DataFrame(
         {"task": task.name, "hands": hands_of(task.name), "reward": ALONE} for task in tasks
     )
-    results = Results(tmp_path, manifest_for(tasks, runs), runs, sequences)
-    return MadeUp(results, **({"optima": known} if optima else {}), **parts)
+    parts = {"sequences": sequences} | ({"optima": known} if optima else {})
+    return MadeUp(study_of(runs, tasks), **parts)
 
 
 RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}
 
 
-def test_gaps_are_between_the_best_known_and_the_bound(tmp_path):
-    instances = sample(study_of(tmp_path, RISING))
+def test_gaps_are_between_the_best_known_and_the_bound():
+    instances = sample(rewarded(RISING))
     name = "two-armed/v1/i000"
     np.testing.assert_allclose(instances.gap(name, EC4).mean(), 40 / 500)
     np.testing.assert_allclose(instances.gap(name, EC4, to_bound=True).mean(), 90 / 450)
@@ -77,22 +74,22 @@ def test_gaps_are_between_the_best_known_and_the_bound(tmp_path):
     assert list(instances.families) == [*ONE, *TWO]
 
 
-def test_a_method_that_beats_the_search_makes_the_best_known(tmp_path):
+def test_a_method_that_beats_the_search_makes_the_best_known():
     """Never a gap below 0, and it is counted."""
-    study = study_of(tmp_path, {**RISING, EC4: lambda n: -480 if n == 2 else -540})
+    study = rewarded({**RISING, EC4: lambda n: -480 if n == 2 else -540})
     instances = sample(study)
     assert instances.references["long/v1/i002"].best == -476
     assert instances.references["long/v1/i002"].searched == BEST
     assert instances.gap("long/v1/i002", EC4).min() == 0
     assert sum(of.best > of.searched for of in instances.references.values()) == 4
-    without = sample(study_of(tmp_path, RISING, optima=False))
+    without = sample(rewarded(RISING, optima=False))
     assert without.references["long/v1/i002"].searched is None
     assert without.gap("long/v1/i002", EC4, to_bound=True) is None
 
 
-def test_planted_contrasts(tmp_path):
+def test_planted_contrasts():
     """EC4 over EC3: 10 of 500 on all instances but the last of each family, where it loses 20."""
-    study = study_of(tmp_path, {**RISING, EC4: lambda n: -540 if n < 4 else -570})
+    study = rewarded({**RISING, EC4: lambda n: -540 if n < 4 else -570})
     found = {(c.first, c.second, c.family): c for c in contrasts(study)}
     mixed = found[EC4, EC3, "aligned/v1"]
     assert mixed.difference.estimate == pytest.approx((4 * 0.02 - 0.04) / 5)
@@ -105,10 +102,10 @@ def test_planted_contrasts(tmp_path):
     assert (EC3, EC2, "one-armed/v1") not in found
 
 
-def test_what_hands_make_of_a_contrast(tmp_path):
+def test_what_hands_make_of_a_contrast():
     """EC2 learns hands with which nobody gets beyond -560, EC4 those of the best known."""
-    study = study_of(tmp_path, RISING)
-    runs = study.results.runs
+    study = rewarded(RISING)
+    runs = study.runs
     of_two = runs.method == EC2
     runs.loc[of_two, "hands"] = [hands_of(task, "L") for task in runs.task[of_two]]
     (found,) = [c for c in contrasts(study) if (c.first, c.second, c.family) == (EC4, EC2, "")]
@@ -116,16 +113,16 @@ def test_what_hands_make_of_a_contrast(tmp_path):
     assert found.hands.estimate == pytest.approx((-536 + 556) / 500)  # the best run of either
 
 
-def test_learning_curves_are_read_at_budgets(tmp_path):
-    study = study_of(tmp_path, {EC3: -540, EC4: -530}, families=TWO[:1])
+def test_learning_curves_are_read_at_budgets():
+    study = rewarded({EC3: -540, EC4: -530}, families=TWO[:1])
     curve = np.concatenate([np.full(1_000, -600.0), np.full(9_000, -540.0)])
     ends = {EC3: 0.0, EC4: 10.0}
-    runs = study.results.runs
+    runs = study.runs
     rewards = {
         str(run): curve + (np.arange(10_000) >= 1_000) * ends[label]
         for run, label in zip(runs.run_id, runs.method, strict=True)
     }
-    object.__setattr__(study.results, "rewards", lambda: rewards.items())
+    object.__setattr__(study, "rewards", lambda: rewards.items())
     found = {(b.label, b.second, b.trials): b.value.estimate for b in budgets(sample(study))}
     assert found[EC3, "", 1_000] == found[EC4, "", 1_000] == pytest.approx(0.2)
     assert found[EC4, "", 10_000] == pytest.approx(0.06)
@@ -159,8 +156,8 @@ def with_signs(study, **values):
     return study
 
 
-def test_presence_and_hands(tmp_path):
-    study = with_signs(study_of(tmp_path, RISING), waiting=0.07)
+def test_presence_and_hands():
+    study = with_signs(rewarded(RISING), waiting=0.07)
     found = {(p.sign, p.label, p.family): p for p in presence(sample(study))}
     waiting = found["other arm", EC4, "long/v1"]
     assert waiting.value.estimate == pytest.approx(0.09)
@@ -183,8 +180,8 @@ def verdicts(study):
     return {entry.claim.id: entry for entry in judge.judged(study)}
 
 
-def test_claims_of_generality(tmp_path):
-    study = with_signs(study_of(tmp_path, {**RISING, EC4: lambda n: -540 - n}))
+def test_claims_of_generality():
+    study = with_signs(rewarded({**RISING, EC4: lambda n: -540 - n}))
     entries = verdicts(study)
     assert set(entries) == {name for name, claim in CLAIMS.items() if claim.families}
     for name in (
@@ -203,12 +200,12 @@ def test_claims_of_generality(tmp_path):
     assert "fewer than 3 instances of one-armed/v1" in jerk.finding.evidence
 
 
-def test_hands_are_learned_where_they_differ_from_the_closest(tmp_path):
+def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
     name = "hand-coarticulation-in-general"
 
     def verdict(more):
-        study = with_signs(study_of(tmp_path, RISING))
+        study = with_signs(rewarded(RISING))
         for (task, label), own in signs(study).items():
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
@@ -220,25 +217,25 @@ def test_hands_are_learned_where_they_differ_from_the_closest(tmp_path):
     ]  # fmt: skip
 
 
-def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general(tmp_path):
-    falling = with_signs(study_of(tmp_path, {**RISING, EC4: lambda n: -570 - n}))
+def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
+    falling = with_signs(rewarded({**RISING, EC4: lambda n: -570 - n}))
     arm, rises, hands = (
         f"{name}-in-general" for name in ("other-arm-pays", "proficiency-rises", "random-hands-pay")
     )
     entries = verdicts(falling)
     assert {entries[name].verdict for name in (arm, rises, hands)} == {"not supported"}
-    mixed = with_signs(study_of(tmp_path, {**RISING, EC4: lambda n: -540 if n % 2 else -560}))
+    mixed = with_signs(rewarded({**RISING, EC4: lambda n: -540 if n % 2 else -560}))
     assert verdicts(mixed)[arm].verdict == "undecided"
 
 
-def test_development_instances_are_not_judged(tmp_path):
-    study = with_signs(study_of(tmp_path, RISING, split="d"))
+def test_development_instances_are_not_judged():
+    study = with_signs(rewarded(RISING, split="d"))
     assert {entry.verdict for entry in judge.judged(study)} == {"undecided"}
 
 
-def test_tables_over_instances(tmp_path):
+def test_tables_over_instances():
     """Means are recomputed from the rewards; many instances are not shown one by one."""
-    study = with_signs(study_of(tmp_path, RISING))
+    study = with_signs(rewarded(RISING))
     assert not one_by_one(study)
     rows = tables.family_gaps(study)
     runs = study.runs[study.runs.method == EC3]

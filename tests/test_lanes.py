@@ -1,7 +1,5 @@
 """Runs side by side: each comes out as it does alone."""
 
-import json
-
 import numpy as np
 import numpy.testing as npt
 import pytest
@@ -9,18 +7,16 @@ from numba import config, njit
 from numba.core.codegen import get_host_cpu_features
 
 from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
-from coartic.benchmarks.harness import _lots, perform_missing, records_of
-from coartic.benchmarks.sandbox import failure
-from coartic.benchmarks.specification import Limits
-from coartic.benchmarks.store import Store
+from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.suites import Cell
 from coartic.motion.compiled import entry
 from coartic.motion.corrective import _errors
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 from coartic.motion.movement import Goal
 from coartic.motion.trigonometry import LARGEST
+from coartic.runs.plan import run_seed
 from tests.support.strategies import UNEVEN
-from tests.support.suites import KNOWN, InProcess, paper_cells, run_specs
+from tests.support.suites import KNOWN, InProcess, planned, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)
 
@@ -134,104 +130,89 @@ def test_the_listing_holds_vector_instructions():
     assert any("cmple" in name for name in on_vectors)  # of the error with the tolerance
 
 
-class Nobody(InProcess):
-    """An executor whose processes end wherever runs are performed side by side."""
+class Watched(InProcess):
+    """An executor that keeps what it was asked."""
 
-    def __init__(self):
-        self.sizes = []
+    def __init__(self, workers=1):
+        self.workers, self.jobs = workers, []
 
     def perform(self, jobs):
-        for job in jobs:
-            self.sizes.append(len(job["seeds"]))
-            if len(job["seeds"]) > 1:
-                yield failure(job["run_id"], "crashed", "exit code 9", 1.0)
-            else:
-                yield from super().perform([job])
+        self.jobs += jobs
+        return super().perform(jobs)
+
+    @property
+    def sizes(self):
+        return [len(job.seeds) for job in self.jobs]
 
 
-def results(store):
-    packs = store.packs()
-    return {run_id: (packs[run_id].result(), packs[run_id].rewards) for run_id in packs}
+class Nobody(Watched):
+    """Its processes end wherever runs are performed side by side."""
+
+    def perform(self, jobs):
+        for number, answer in super().perform(jobs):
+            together = len(jobs[number].seeds) > 1
+            yield number, Failure("crashed", "exit code 9", 1.0) if together else answer
 
 
-def test_what_goes_wrong_side_by_side_is_performed_again_in_parts(tmp_path):
-    cells = paper_cells(tasks=["ascending"], methods=["dual-process/EC1", "corrective-alone/given"])
-    planned = [spec for _, spec in run_specs(cells, runs=LANES + 2, seed=0, trials=3)]
+LEARNER = Cell(load_task("ascending"), KNOWN["dual-process/EC1"])
+ALONE = Cell(load_task("ascending"), KNOWN["corrective-alone/given"])
+
+
+def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
     found = []
-    for number, executor in enumerate((InProcess(), Nobody())):
-        store = Store(tmp_path / str(number))
-        with store.locked():
-            progress = perform_missing(planned, store, executor)
-        assert (progress.done, progress.failed) == (len(planned), 0)
-        found.append(store)
-    assert results(found[0]) == results(found[1])
-    assert sorted(executor.sizes) == [1] * (LANES + 3) + [2] + [9] * 8 + [LANES]
-    beside = {record.timing.together for record in map(found[0].read, found[0].packs())}
-    assert beside == {1, 2, LANES}
-    assert {found[1].read(run_id).timing.together for run_id in found[1].packs()} == {1}
-
-
-def test_side_by_side_has_the_time_of_one():
-    (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
-    limits = Limits(60.0)
-    planned = [spec for _, spec in run_specs([cell], runs=4, seed=0, trials=3, limits=limits)]
-    job = planned[0].setting.job(planned)
-    assert job["run_id"] == planned[0].run_id
-    assert job["seeds"] == [spec.seed for spec in planned]
-    assert json.loads(json.dumps(job)) == job
-    assert job["time_limit_s"] == planned[0].job()["time_limit_s"] == 60.0
+    for number, executor in enumerate((Watched(), Nobody())):
+        options = {"runs": LANES + 2, "trials": 3, "executor": executor}
+        found.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
+    assert (found[0].status == "ok").all()
+    assert found[0].result.tolist() == found[1].result.tolist()
+    assert executor.sizes == [LANES, 2, 1] + [1] * (LANES + 2)
+    assert [set(runs.together) for runs in found] == [{1, 2, LANES}, {1}]
 
 
 def test_long_runs_are_fewer_side_by_side():
-    entry = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])[0].entry
-    assert [entry.most_together({"trials": n}) for n in (10, 10_000, 1_000_000, 10**7)] == [
-        LANES,
-        LANES,
-        4,
-        1,
-    ]
-
-
-def test_few_runs_of_several_cells_are_divided_among_workers():
-    cells = [
-        Cell(load_task("ascending"), KNOWN[name])
-        for name in ("dual-process/EC1", "corrective-alone/given")
-    ]
-    planned = [spec for _, spec in run_specs(cells, runs=20, seed=0, trials=3)]
-    assert [len(lot) for lot in _lots(planned, {}, 2)] == [11, 9, 1]
-    assert [len(lot) for lot in _lots(planned, {planned[3].run_id: 1}, 2)] == [3, 1, 11, 5, 1]
+    made = LEARNER.entry.made
+    most = [made({"trials": n}).most_together() for n in (10, 10_000, 1_000_000, 10**7)]
+    assert most == [LANES, LANES, 4, 1]
 
 
 @pytest.mark.parametrize(
-    ("runs", "workers", "sizes"),
+    ("cells", "runs", "workers", "sizes"),
     [
-        (40, 2, [20, 20]),
-        (20, 8, [8, 8, 4]),
-        (2 * LANES + 20, 2, [LANES, LANES, 10, 10]),
-        (2 * LANES + 3, 2, [LANES, LANES, 3]),
-        (LANES, 1, [LANES]),
+        ([LEARNER], 40, 2, [20, 20]),
+        ([LEARNER], 20, 8, [8, 8, 4]),
+        ([LEARNER], 2 * LANES + 20, 2, [LANES, LANES, 10, 10]),
+        ([LEARNER], 2 * LANES + 3, 2, [LANES, LANES, 3]),
+        ([LEARNER], LANES, 1, [LANES]),
+        ([LEARNER, ALONE], 20, 2, [11, 9, 1]),
     ],
 )
-def test_a_cell_is_divided_among_workers(runs, workers, sizes):
-    (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
-    planned = [spec for _, spec in run_specs([cell], runs=runs, seed=0, trials=3)]
-    lots = list(_lots(planned, {}, workers))
-    assert [len(lot) for lot in lots] == sizes
-    assert [spec for lot in lots for spec in lot] == planned
+def test_runs_are_divided_among_workers(cells, runs, workers, sizes, tmp_path):
+    executor, plan = Watched(workers), planned(cells, runs=runs, trials=3)
+    plan.perform(tmp_path, executor=executor)
+    assert executor.sizes == sizes
+    seeds = [run_seed(0, "ascending", n) for cell in plan.plan.cells for n in range(cell.runs)]
+    assert [seed for job in executor.jobs for seed in job.seeds] == seeds
 
 
-def test_what_is_no_solution_is_that_of_one_run_of_a_lot_alone():
-    """Of runs side by side each is executed by itself."""
-    (cell,) = paper_cells(tasks=["ascending"], methods=["dual-process/EC1"])
-    planned = [spec for _, spec in run_specs([cell], runs=LANES, seed=0, trials=3)]
-    (answer,) = InProcess().perform([planned[0].setting.job(planned)])
-    said = json.loads(answer["outcome"])
-    fifth, seventh = (said["answer"]["runs"][run]["solution"] for run in (5, 7))
-    fifth[0]["target"].pop()
-    seventh[:] = [row for row in seventh if row["goal"] < 3]
-    forged = records_of({**answer, "outcome": json.dumps(said)}, planned)
-    honest = records_of(answer, planned)
-    assert [run for run, record in enumerate(forged) if record.status != "ok"] == [5, 7]
-    assert [record.status for record in (forged[5], forged[7])] == ["solver-failed"] * 2
-    for run, (one, other) in enumerate(zip(forged, honest, strict=True)):
-        assert run in (5, 7) or one.result() == other.result()
+class Forges(InProcess):
+    """Has two of many runs state what is no solution."""
+
+    def perform(self, jobs):
+        for number, answer in super().perform(jobs):
+            if len(answer.outcomes) == LANES:
+                fifth, seventh = (answer.outcomes[run].parts["solution"] for run in (5, 7))
+                fifth[0][3].pop()
+                seventh.pop()
+            yield number, answer
+
+
+def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):
+    """Of runs side by side each is executed by itself; those alone are performed again."""
+    forged, honest = (
+        run_and_write(tmp_path / each.__name__, [LEARNER], runs=LANES, trials=3, executor=each())
+        for each in (Forges, InProcess)
+    )
+    assert forged.runs.result.tolist() == honest.runs.result.tolist()
+    assert (forged.runs.status == "ok").all()
+    again = forged.runs.together == 1
+    assert again[again].index.tolist() == [5, 7]

@@ -25,9 +25,9 @@ from coartic import (
 )
 from coartic.learner.learning import TRIALS
 from coartic.model import PAPER
-from coartic.motion import reference
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
+from tests.support import reference
 from tests.support.strategies import PAPER_CELLS, tiny_task, uneven_task
 
 

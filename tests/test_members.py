@@ -1,6 +1,7 @@
 """Ensembles of reconstructions, and the paper's claims over them."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -17,12 +18,10 @@ from coartic.analysis.reconstruction.specifications import (
     shares,
     specifications,
 )
-from coartic.analysis.results.folder import Results
-from coartic.analysis.study import Study
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.runs.tables import DeclaredMethod
+from coartic.runs.plan import DeclaredMethod
 from coartic.tasks.members import members, members_file, task_of, with_members
-from tests.support.made_up import manifest_for, replanned, row
+from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN
 
 
@@ -86,7 +85,7 @@ def test_figures_of_members_are_complete(ensemble):
         assert distance == pytest.approx(np.sqrt(np.mean(squares)), abs=0.01)
 
 
-def _results(tmp_path, tasks, means, **plan):
+def _study(tasks, means, **plan):
     """Runs of EC3 and EC4 on tasks, the latter better by so many ticks."""
     rng = np.random.default_rng(0)
     rows = []
@@ -99,30 +98,29 @@ def _results(tmp_path, tasks, means, **plan):
                 for k, r in enumerate(rewards)
             ]  # fmt: skip
     frame = pd.DataFrame(rows)
-    manifest = manifest_for(list(map(load_task, tasks)), frame)
     method = DeclaredMethod(
         title="t", citation="", told=(), secondary=(), stochastic=True,
         defaults={"ties": "left", "trials": 10_000}, origin="", code="",
     )  # fmt: skip
     names = ("dual-process/EC3", "dual-process/EC4")
-    manifest = replanned(manifest, methods=dict.fromkeys(names, method), **plan)
-    sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
-    return Results(tmp_path, manifest, frame, sequences)
+    return study_of(
+        frame, list(map(load_task, tasks)), methods=dict.fromkeys(names, method), **plan
+    )
 
 
-def test_claims_are_judged_for_each_member(tmp_path):
+def test_claims_are_judged_for_each_member():
     """For each that is admitted, once: v0.1 is not, F3 has the goals of the default task."""
     names = ["two-armed-1", "two-armed-2", "two-armed-1-m002", "two-armed-1-m003"]
     more = ["two-armed-1-v0.1", "two-armed-1-m001", "two-armed-1-F3"]
     means = (20.0, 20.0, 20.0, -20.0, 20.0, 20.0, 20.0)
-    study = Study(_results(tmp_path, [*names, *more], means))
+    study = _study([*names, *more], means)
     claims = [claim for claim in PAPERS if claim.id == "ec4-beats-ec3"]
     found = judged_specifications([study], claims=claims)
     own = found[found.claim == "ec4-beats-ec3"].set_index("member")
     assert set(own.index) == {"", *names[2:], "two-armed-1-m001"}
     assert own.effect["two-armed-1-m002"] > 0 > own.effect["two-armed-1-m003"]
     assert own.verdict[["", *names[2:]]].tolist() == ["supported", "supported", "not supported"]
-    twice = judged_specifications([study, study], claims=claims)
+    twice = judged_specifications([study, study], claims=claims, jobs=2)
     pd.testing.assert_frame_equal(twice, found)
     counted = shares(found).set_index(["claim", "kind"])
     assert counted.specifications["ec4-beats-ec3", "two-armed-1"] == 3
@@ -133,16 +131,18 @@ def test_claims_are_judged_for_each_member(tmp_path):
     assert len(curve.data) == found.effect.notna().sum()
 
 
-def test_parameters_of_a_reading_are_no_variant(tmp_path):
-    results = _results(tmp_path, ["two-armed-1"], (20.0,), readings=("ties=right",))
-    plan = results.manifest.specification
+def test_parameters_of_a_reading_are_no_variant():
+    study = _study(["two-armed-1"], (20.0,), readings=("ties=right",))
     cells = [
-        cell.model_copy(update={"variant": "ties=right", "parameters": {"ties": "right"}})
-        for cell in plan.cells
+        replace(cell, variant="ties=right", parameters={"ties": "right"})
+        for cell in study.plan.cells
     ]
-    changed = replanned(results.manifest, cells=tuple(cells))
-    runs = results.runs.assign(variant="ties=right")
-    ((spec, seen),) = specifications(Study(Results(tmp_path, changed, runs, results.sequences)))
+    changed = replace(
+        study,
+        plan=replace(study.plan, cells=tuple(cells)),
+        runs=study.runs.assign(variant="ties=right"),
+    )
+    ((spec, seen),) = specifications(changed)
     assert spec.label == "ties=right"
     assert {label for _, label in seen.cells} == {"dual-process/EC3", "dual-process/EC4"}
     assert all(len(cell.runs) == 20 for cell in seen.cells.values())

@@ -8,10 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coartic import PAPER, MotionModel, Robot, move
-from coartic.motion import reference
 from coartic.motion.compiled import entry, joint_chain
 from coartic.motion.movement import clear_steps, follow
 from coartic.robot import HANDS
+from tests.support import reference
 from tests.support.strategies import UNEVEN, configurations
 
 ROBOT = Robot()

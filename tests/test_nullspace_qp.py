@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from pydantic import ValidationError
 from scipy.linalg import null_space
 from scipy.optimize import LinearConstraint, minimize
 
@@ -18,13 +19,18 @@ from coartic.baselines.cascade import (
     SLACK,
     Cascade,
     CascadeError,
-    cascade_for,
     damped_projection,
 )
 from coartic.baselines.corrective_alone import EverySequence
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES, Aim, Controller
-from coartic.baselines.nullspace_qp import METHODS, NextGoal, NullspaceQP, Preshaping
+from coartic.baselines.nullspace_qp import (
+    METHODS,
+    NextGoal,
+    NullspaceQP,
+    Preshaping,
+    cascade_for,
+)
 from coartic.method import MethodError, Session
 from coartic.robot import directions
 from tests.support.strategies import configurations, tiny_task
@@ -218,9 +224,15 @@ def test_with_active_limits_both_levels_are_optimal():
 
 
 def test_a_failed_solve_says_which_and_why(monkeypatch):
-    monkeypatch.setitem(SETTINGS, "proxqp", {"max_iter": 0})
-    with pytest.raises(CascadeError, match="level 1: proxqp"):
-        Cascade(1, 4, "proxqp").solve(np.ones((1, 4)), np.ones(1), np.zeros(4))
+    monkeypatch.setitem(SETTINGS, "clarabel", {"max_iter": 0})
+    with pytest.raises(CascadeError, match="level 1: clarabel"):
+        Cascade(1, 4, "clarabel").solve(np.ones((1, 4)), np.ones(1), np.zeros(4))
+
+
+@pytest.mark.parametrize("solver", ["osqp", "proxqp"])
+def test_a_solver_that_is_not_there_is_refused_in_words(solver):
+    with pytest.raises(ValidationError, match="Input should be 'clarabel' or 'daqp'"):
+        NextGoal.Parameters(solver=solver)
 
 
 def test_a_failed_solve_is_an_outcome(monkeypatch):

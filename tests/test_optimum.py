@@ -1,23 +1,20 @@
 """The optimum: what is shipped holds, and can be found again."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from coartic import builtin_tasks, execute, load_task
-from coartic.analysis.results import optima
-from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import ShippedOptimum, collect, entries, essence
+from coartic.analysis import optima, renew_optima
+from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
-from coartic.learner.rows import movement_rows, movements_from
+from coartic.benchmarks.suites import Cell
+from coartic.learner.rows import movements_from
 from coartic.method import MethodError, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
-from tests.support.made_up import manifest_for
 from tests.support.strategies import changed
+from tests.support.suites import KNOWN, run_and_write
 
 SOLVED = [entry for entry in entries() if entry.reward is not None]
 
@@ -125,24 +122,14 @@ def test_a_hand_that_is_there_already_saves_a_tick():
 
 
 def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
-    task = load_task("ascending")
-    session = Session(task, 0, DynamicProgramming.told, trusted=True)
-    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1, chains=1))
-    execution = execute(task, method.solve(session).solution)
-    runs = pd.DataFrame(
-        [
-            {
-                "run_id": "r1", "task": "ascending", "method": "optimum/dynamic-programming",
-                "status": "ok", "reason": "", "reward": execution.reward, "proven_bound": -280,
-                "hands": execution.hands,
-                "parameters": json.dumps({"other_arm": "free", "base": "task"}),
-            },
-        ]
-    )  # fmt: skip
-    rows = pd.DataFrame(movement_rows(task, execution.movements)).assign(run_id="r1")
-    rows.to_parquet(tmp_path / "solutions.parquet")
-    (entry,) = collect(Results(Path(tmp_path), manifest_for([task]), runs, pd.DataFrame()))
-    assert (entry.reward, entry.bound, entry.run_ids) == (-292, -280, ("r1",))
+    task, few = load_task("ascending"), {"graphs": 1, "chains": 1, "nodes": 60}
+    names = ("optimum/branch-and-bound", "optimum/dynamic-programming")
+    cells = [Cell(task, KNOWN[name], tuple(few.items())) for name in names]
+    study = run_and_write(tmp_path / "results", cells, runs=1)
+    (entry,) = renew_optima.collect(study)
+    assert (entry.reward, entry.bound) == (-292, -292)
+    assert entry.run_ids == tuple(sorted(study.runs.run_id))
+    assert entry.searches == dict.fromkeys(names, -292)
     again = ShippedOptimum.model_validate_json(entry.model_dump_json()).solution
     assert execute(task, movements_from(task, pd.DataFrame(list(again)))).reward == -292
 
@@ -150,11 +137,12 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
 def test_renewing_with_what_is_there_changes_nothing(tmp_path, monkeypatch):
     copy = tmp_path / "optima.json"
     copy.write_bytes(optima.DATA.read_bytes())
-    monkeypatch.setattr(optima, "DATA", copy)
+    for module in (optima, renew_optima):
+        monkeypatch.setattr(module, "DATA", copy)
     before = copy.read_bytes()
     known = entries()
-    assert optima.renew(known[:3]) == len(known) - 3
+    assert renew_optima.renew(known[:3]) == len(known) - 3
     assert copy.read_bytes() == before
     better = known[0].model_copy(update={"reward": -1})
-    optima.renew([better])
+    renew_optima.renew([better])
     assert entries() == [better, *known[1:]]

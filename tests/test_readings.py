@@ -19,7 +19,6 @@ from coartic.learner.conditions import (
     UnknownTarget,
 )
 from coartic.model import PAPER, checked_model
-from coartic.motion import reference
 from coartic.motion.movement import follow, path_points
 from coartic.robot import HANDS, Robot
 from coartic.tasks.catalogue import builtin_tasks, load_task
@@ -33,6 +32,7 @@ from coartic.tasks.readings import (
     task_under,
 )
 from coartic.tasks.task import checked_task
+from tests.support import reference
 from tests.support.strategies import tiny_task, uneven_task
 
 APPLIED = {

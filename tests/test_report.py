@@ -13,7 +13,6 @@ from coartic.analysis.report import numbers, render, sections
 from coartic.analysis.report.build import page, report_files, summary
 from coartic.analysis.report.text import answers
 from coartic.analysis.report.trace import runs_of, tables_of
-from coartic.analysis.study import Study
 from coartic.analysis.tables import TABLES
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
@@ -57,7 +56,7 @@ def recomputed(study, name, row, values):
     if name == "hands":
         return {"runs": len(runs), "ours": mean, "ours_sd": sd}
     if name == "learning":
-        curves = dict(study.results.rewards())
+        curves = dict(study.rewards())
         best = [best_so_far(curves[run], 100) for run in runs.run_id]
         return {"after_100": sum(best) / len(best)}
     if name == "tasks":
@@ -166,14 +165,14 @@ def test_summary_is_the_first_screen(traced):
 def test_few_runs_say_so(tmp_path):
     """One run a cell, and no learner: every answer is true, none is invented."""
     one = select_cells(load_suite("paper"), KNOWN, tasks=["ascending", "descending"])
-    few = Study(run_and_write(tmp_path / "few", cells=one, runs=1, trials=30))
+    few = run_and_write(tmp_path / "few", cells=one, runs=1, trials=30)
     texts = {answer["word"]: answer["text"] for answer in answers(few)}
     assert texts["Coarticulation"].startswith("Too few runs to say")
     assert texts["Paper"].startswith("Too few runs to say")
     alone = select_cells(
         load_suite("comparison"), KNOWN, tasks=["ascending"], methods=["corrective-alone/given"]
     )
-    without = Study(run_and_write(tmp_path / "without", cells=alone, runs=1))
+    without = run_and_write(tmp_path / "without", cells=alone, runs=1)
     for study in (few, without):
         files = report_files(study)
         assert {"report.html", "summary.md", "numbers.tex"} <= set(files)

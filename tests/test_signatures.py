@@ -12,7 +12,6 @@ from scipy import integrate, stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.references import references
-from coartic.analysis.results.folder import Results
 from coartic.analysis.signatures.context import (
     context_dependence,
     context_pairs,
@@ -45,11 +44,10 @@ from coartic.analysis.signatures.subtasks import (
     sacrifices,
 )
 from coartic.analysis.statistics import intervals
-from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from, entropy
 from coartic.learner.rows import movement_rows
 from coartic.motion.solution import other_arm_travel
-from tests.support.made_up import manifest_for
+from tests.support.made_up import MadeUp, study_of
 from tests.support.strategies import as_released, changed, tiny_task
 
 
@@ -312,13 +310,13 @@ def test_p_of_a_sacrifice():
     assert math.isnan(p(first, 5 - first))
 
 
-def test_other_hands_are_no_sacrifice(tmp_path):
+def test_other_hands_are_no_sacrifice():
     """Goal 1 with the slower hand, by the corrective process: nothing is given up."""
     task = as_released("two-armed-1")  # where the left hand is the slower one
     initial, other = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
     assert change_from(other, initial)[0] > 1  # the old comparison took this for a sacrifice
     assert other.ticks < initial.ticks
-    frame = signatures(Study(results(tmp_path, [(task, "every", [other.movements])])))
+    frame = signatures(solved_study([(task, "every", [other.movements])]))
     rows = frame.set_index("signature")
     assert rows.loc["first subtask against initial"].value > 1
     assert rows.loc["first subtask against the same hands"].value == 0
@@ -659,9 +657,9 @@ def test_norm_of_slopes():
 # The driver
 
 
-def results(folder, solved, runs=None):
-    """A results folder of ``(task, method, [movements of each run])``."""
-    rows, movements = [], []
+def solved_study(solved):
+    """A study of ``(task, method, [movements of each run])``."""
+    rows, movements = [], {}
     tasks = {task.name: task for task, _, _ in solved}
     for task, method, solutions in solved:
         for run, solution in enumerate(solutions):
@@ -670,19 +668,15 @@ def results(folder, solved, runs=None):
             rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
                          "status": "ok", "run": run, "reward": execution.reward,
                          "hands": execution.hands})  # fmt: skip
-            movements += [{"run_id": run_id, **r} for r in movement_rows(task, execution.movements)]
+            movements[run_id] = pd.DataFrame(movement_rows(task, execution.movements))
         if not solutions:
             rows.append({"run_id": f"{task.name}-{method}", "task": task.name, "method": method,
                          "variant": "", "status": "infeasible", "run": 0})  # fmt: skip
-    pd.DataFrame(movements).to_parquet(folder / "solutions.parquet")
-    empty = {"run_id": [], "order": [], "waypoint": []}
-    pd.DataFrame(empty).to_parquet(folder / "paths.parquet")
-    frame = pd.DataFrame(rows)
-    sequences = pd.DataFrame({"task": ["none"], "hands": ["R"], "reward": [-1]})
-    return Results(folder, manifest_for(tasks.values(), frame), frame, sequences)
+    study = study_of(pd.DataFrame(rows), list(tasks.values()))
+    return MadeUp(study, movements=(movements, {}))
 
 
-def test_frame_of_two_contexts(tmp_path):
+def test_frame_of_two_contexts():
     """The learner depends on context, the corrective process does not."""
     tasks = [load_task("ascending"), load_task("descending")]
     solved = []
@@ -693,9 +687,8 @@ def test_frame_of_two_contexts(tmp_path):
             (task, "corrective", [corrective_trial(task, "RRR").movements]),
             (task, "failed", []),
         ]
-    folder = results(tmp_path, solved)
-    frame = signatures(Study(folder))
-    assert frame.equals(signatures(Study(folder)))  # nothing is random but by its seed
+    frame = signatures(solved_study(solved))
+    assert frame.equals(signatures(solved_study(solved)))  # nothing is random but by its seed
 
     def one(method, signature):
         rows = frame[(frame.task == "ascending") & (frame.method == method)]
@@ -720,7 +713,7 @@ def test_frame_of_two_contexts(tmp_path):
     assert set(frame.method) == {"learner", "corrective", "failed"}
 
 
-def test_frame_of_a_family(tmp_path):
+def test_frame_of_a_family():
     """The base is lower at goals 1 and 3 by a tenth of goal 2's height: slopes are known."""
     solved = []
     for task in family_of([1.5, 2.0, 2.5]).values():
@@ -728,7 +721,7 @@ def test_frame_of_a_family(tmp_path):
         lower = 0.02 * (height - 2.0)
         targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
         solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
-    frame = signatures(Study(results(tmp_path, solved)))
+    frame = signatures(solved_study(solved))
     slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
     assert set(slopes.moving) == {2}
     norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])
@@ -750,13 +743,13 @@ def test_frame_of_a_family(tmp_path):
     assert contexts.why_not.str.contains("locus slopes").all()
 
 
-def test_frame_has_the_student_interval_of_its_runs(tmp_path):
+def test_frame_has_the_student_interval_of_its_runs():
     """The waiting arm bends by 0, 0.1, 0.2 and more: its travel over runs has a known mean."""
     task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
     bends = (0.0, 0.1, 0.2, 0.5)
     solutions = [planned(posture(1.0, left_4=b), posture(4.0), hands="RL") for b in bends]
     travelled = [execute(task, solution).configurations[0, 5] for solution in solutions]
-    frame = signatures(Study(results(tmp_path, [(task, "planner", solutions)])))
+    frame = signatures(solved_study([(task, "planner", solutions)]))
     row = frame[(frame.signature == "travel of the other arm") & (frame.goal == 1)]
     half = 3.1824463 * np.std(travelled, ddof=1) / 2  # Student's t, 3 degrees of freedom
     mean = np.mean(travelled)

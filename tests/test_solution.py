@@ -1,23 +1,154 @@
 """Executing and scoring solutions, whoever made them."""
 
+import re
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from coartic import (
     PAPER,
     CoarticError,
+    MotionModel,
     Movement,
+    correct,
     corrective_trial,
     execute,
     hand_sequences,
     learn_many,
     load_task,
+    move,
 )
+from coartic.benchmarks.outcome import MOST_STEPS, scored
 from coartic.errors import SolutionError
 from coartic.learner.conditions import load_condition
-from coartic.motion import reference
-from coartic.runs.scores import MOST_STEPS, solved
+from coartic.motion.movement import follow
+from coartic.motion.solution import execute_many, other_arm_travel
+from coartic.tasks.task import hands_of
+from tests.support import reference
 from tests.support.strategies import PAPER_CELLS, tiny_task
+
+
+def one_by_one(task, groups, model):
+    """What ``execute`` says of a solution that keeps the rules, movement after movement."""
+    q, made, reached, reason = np.array(task.q0), [], [], ""
+    spent = dict.fromkeys(("corrections", "iterations", "evaluations"), 0)
+
+    def moved(target, movement, stops):
+        result = move(
+            task.robot, q, target, movement.hand, task.goals[movement.goal - 1], task.radius,
+            stop_on_arrival=stops, model=model,
+        )  # fmt: skip
+        spent["evaluations"] += result.evaluations
+        return result
+
+    for number, movements in enumerate(groups, 1):
+        goal, last = task.goals[number - 1], Movement(number, movements[0].hand, "corrective")
+        hit, before = moved(q, last, True).hit, len(made)
+        for place, movement in enumerate([*movements, last]):
+            target = movement.target
+            if hit and (place > 0 or movement.kind == "corrective"):
+                continue
+            if movement.kind == "path":
+                way = movement.waypoints
+                result = follow(task.robot, q, way, movement.hand, goal, task.radius, model=model)
+                spent["evaluations"] += result.evaluations
+                target = way[-1]
+            elif target is None:
+                found = correct(
+                    task.robot, q, movement.hand, goal, locked_base=task.locked_base, model=model
+                )
+                spent["iterations"] += found.iterations
+                spent["evaluations"] += found.iterations + 1
+                target = found.q
+                if not found.converged:
+                    reason = f"in {found.iterations} iterations"
+                    break
+            if movement.kind != "path":
+                stops = movement.kind != "corrective" or model.corrective_arrival
+                result = moved(target, movement, stops)
+            q, hit = result.q, result.hit
+            spent["corrections"] += movement.kind == "corrective"
+            made.append((number, movement.hand, movement.kind, target.tolist(), result.ticks))
+        reason = reason or ("" if hit else "outside the goal")
+        if reason:
+            break
+        if len(made) == before:
+            made.append((number, last.hand, "corrective", q.tolist(), 0))
+        reached.append(q)
+    return made, np.array(reached).reshape(-1, len(q)), spent, reason
+
+
+MODELS = [
+    PAPER,
+    MotionModel(max_iterations=100),
+    MotionModel(corrective_arrival=True, arrival_tolerance=0.09),
+    MotionModel(whole_last_step=True),
+    MotionModel(first_step=True, arrival_tick=0),
+]
+
+
+@settings(max_examples=40)
+@given(
+    st.sampled_from(["ascending", "two-armed-1", "two-armed-2"]),
+    st.integers(0, 10**6),
+    st.sampled_from(MODELS),
+)
+def test_side_by_side_as_movement_after_movement(name, seed, model):
+    """Of all kinds, near what hits the goals and far from it; some solutions break a rule."""
+    task, rng = load_task(name), np.random.default_rng(seed)
+    locked = ["xy".index(coordinate) for coordinate in task.locked_base]
+
+    def posture(number, alone):
+        q = np.array(alone[number] if number < len(alone) else task.q0)
+        q += rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(len(q))
+        q[locked] = task.q0[locked]
+        return q
+
+    def movement(number, hand, alone):
+        kind = rng.choice(["learned", "planned", "corrective", "path"])
+        if kind == "path":
+            way = [posture(number, alone) for _ in range(rng.integers(1, 4))]
+            return Movement(number + 1, hand, "path", waypoints=np.array(way))
+        found = kind == "corrective" and rng.random() < 0.5
+        return Movement(number + 1, hand, kind, None if found else posture(number, alone))
+
+    asked = []
+    for hands in rng.choice(hand_sequences(task), 6):
+        alone = corrective_trial(task, str(hands), model=model).configurations
+        asked.append(
+            [
+                [movement(number, hand, alone) for _ in range(rng.integers(1, 4))]
+                for number, hand in enumerate(hands_of(str(hands)))
+            ]
+        )
+    solutions = [[movement for group in groups for movement in group] for groups in asked]
+    broken = [solutions[0][:-1], [*solutions[0], "nonsense"], 5, solutions[0][::-1]]
+    found = execute_many(task, [*broken, *solutions], model=model)
+    for solution, error in zip(broken, found, strict=False):
+        if isinstance(error, Exception):  # one movement less may still be a solution
+            with pytest.raises(type(error), match=re.escape(str(error))):
+                execute(task, solution, model=model)
+    assert [type(error) for error in found[1:4]] == [SolutionError, TypeError, SolutionError]
+    for groups, execution in zip(asked, found[len(broken) :], strict=True):
+        made, reached, spent, reason = one_by_one(task, groups, model)
+        assert made == [
+            (m.goal, m.hand, m.kind, m.target.tolist(), m.ticks) for m in execution.movements
+        ]
+        np.testing.assert_array_equal(execution.configurations, reached)
+        assert {name: getattr(execution, name) for name in spent} == spent
+        assert execution.ticks == sum(ticks for *_, ticks in made)
+        assert execution.reason.endswith(reason)
+        assert execution.completed == (not reason)
+
+
+def test_many_of_none():
+    assert execute_many(load_task("ascending"), []) == []
+    with pytest.raises(TypeError, match="is no Task"):
+        execute_many("ascending", [])
+    with pytest.raises(ValueError, match=r"model\.step is 0"):
+        execute_many(load_task("ascending"), [], model=PAPER._replace(step=0.0))
 
 
 @pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
@@ -57,10 +188,10 @@ def test_no_way_is_followed_without_end():
     """Nobody waits for a hand that is sent to the end of the world and back."""
     far = 0.9 * MOST_STEPS * PAPER.step
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
-    assert solved(task, planned(posture(far), posture(far)), PAPER).reward == -192  # on the way
-    back = planned(posture(far), posture(0.0))
-    with pytest.raises(SolutionError, match="1800000 steps; at most 1000000 are allowed"):
-        solved(task, back, PAPER)
+    out, back = planned(posture(far), posture(far)), planned(posture(far), posture(0.0))
+    first, second = scored(task, [out, back], PAPER)
+    assert first.reward == -192  # on the way
+    assert "1800000 steps; at most 1000000 are allowed" in str(second)
 
 
 def test_first_printed_initial_solution_step_by_step():
@@ -186,3 +317,18 @@ def test_solutions_that_break_the_rules(movements, words):
     with pytest.raises(CoarticError) as caught:
         execute(task, movements)
     assert words in str(caught.value)
+
+
+def test_travel_of_the_other_arm_is_summed_in_order():
+    """As Python's own floats are: a library's dot product rounds as the processor likes."""
+    task, rng = load_task("two-armed-1"), np.random.default_rng(0)
+    hands = hands_of("LRRL")
+    reached = task.q0 + rng.normal(0, 1, (4, task.robot.dof))
+    expected, before = 0.0, task.q0.tolist()
+    for hand, q in zip(hands, reached.tolist(), strict=True):
+        joints = task.robot.joints("left" if hand == "right" else "right")
+        square = 0.0
+        for a, b in zip(q[joints], before[joints], strict=True):
+            square += (a - b) ** 2
+        expected, before = expected + square**0.5, q
+    assert other_arm_travel(task, hands, reached) == expected

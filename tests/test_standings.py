@@ -18,9 +18,8 @@ from coartic.analysis.comparisons.standings import (
     leaders,
     standings,
 )
-from coartic.analysis.results.folder import Results
 from coartic.analysis.statistics.across_tasks import gap_share, task_mean
-from tests.support.made_up import MadeUp, fake_results, made_up_optima, manifest_for, row
+from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
 SEQUENCES = pd.DataFrame(
     {
@@ -31,7 +30,7 @@ SEQUENCES = pd.DataFrame(
 )
 
 
-def study(tmp_path, rewards):
+def study(rewards):
     """Runs of methods by task: ``{(task, method): rewards}``."""
     rows = [
         row(method, reward, task=task, run=k, seed=100 + k)
@@ -40,28 +39,27 @@ def study(tmp_path, rewards):
     ]
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     names = list(dict.fromkeys(runs.task))
-    manifest = manifest_for([load_task(name) for name in names], runs)
-    results = Results(tmp_path, manifest, runs, SEQUENCES)
-    return MadeUp(results, optima=made_up_optima(*names))
+    made_up = study_of(runs, [load_task(name) for name in names])
+    return MadeUp(made_up, sequences=SEQUENCES, optima=made_up_optima(*names))
 
 
-def test_gaps_of_a_results_folder(tmp_path):
+def test_gaps_of_a_results_folder():
     """The initial solution of two-armed-1 is among its sequences."""
     assert gap_share([-300, -303], -300).tolist() == [0, 0.01]
     runs = {
         "run": [0, 1], "seed": [7, 8], "status": ["ok", "infeasible"], "reason": ["", "planted"],
         "reward": [-520, None], "hands": ["RRLR", None], "initial_reward": [-675, None],
     }  # fmt: skip
-    results = fake_results(tmp_path, runs)
+    results = fake_study(runs)
     optima = made_up_optima("two-armed-1")
-    seen = MadeUp(replace(results, sequences=SEQUENCES), optima=optima)
+    seen = MadeUp(results, sequences=SEQUENCES, optima=optima)
     optimum = optima["two-armed-1", "free"].reward
     assert ends(seen) == {"two-armed-1": (-675.0, optimum)}
     first, second = gaps(seen).gap
     assert first == pytest.approx((optimum + 520) / -optimum)
     assert math.isnan(second)
     missed = {("two-armed-1", "free"): replace(optima["two-armed-1", "free"], reward=-680)}
-    below = MadeUp(seen.results, optima=missed)  # below the initial solution
+    below = MadeUp(results, sequences=SEQUENCES, optima=missed)  # below the initial solution
     assert gaps(below).empty
 
 
@@ -83,8 +81,8 @@ CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
        ("two-armed-1", "cma-es/bandit"): [-466, -467, -468, -466]}  # fmt: skip
 
 
-def test_the_learners_conditions_stand_together(tmp_path):
-    found = standings(study(tmp_path, LEARNER | CMA))
+def test_the_learners_conditions_stand_together():
+    found = standings(study(LEARNER | CMA))
     over = found[found.task == ALL_TASKS]
     assert over.method.tolist() == ["cma-es/bandit", "dual-process (EC1, EC4)"]
     by_task = [(301.5 - 292) / 292, (481.5 - 465) / 465]
@@ -94,9 +92,9 @@ def test_the_learners_conditions_stand_together(tmp_path):
     assert (over.gap < over.high).all()
 
 
-def test_a_rank_counts_algorithms(tmp_path):
+def test_a_rank_counts_algorithms():
     every = {(task, "cma-es/every"): own for (task, _), own in CMA.items()}
-    seen = study(tmp_path, LEARNER | CMA | every)
+    seen = study(LEARNER | CMA | every)
     rows = leaders(seen, BY_TRIAL)
     assert rows.algorithm.tolist() == ["CMA-ES", "learner"]
     assert math.isnan(rows.p[0])
@@ -128,11 +126,11 @@ def test_crossings_by_brute_force():
     assert math.isnan(Targets([spends[0][:2]]).crossing(0.5).low)  # too few runs
 
 
-def test_targets_are_evenly_spaced_rewards(tmp_path):
+def test_targets_are_evenly_spaced_rewards():
     """A run that goes half of the way has reached half of the targets."""
     half = -319 + (319 - 292) / 2
-    seen = study(tmp_path, {("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
-    vars(seen.results)["rewards"] = lambda: iter(())
+    seen = study({("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
+    vars(seen)["rewards"] = lambda: iter(())
     found = targets(seen)["ascending", "posture-based/two-goals", "trials"]
     assert found.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
     assert found.crossing(0.25).budget == 10  # trials of the made-up row

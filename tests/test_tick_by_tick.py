@@ -14,7 +14,7 @@ from coartic import (
     trajectory,
 )
 from coartic.errors import SolutionError
-from coartic.motion.reference import move as reference_move
+from tests.support.reference import move as reference_move
 from tests.support.strategies import PAPER_CELLS, configurations, tiny_task, uneven_task
 
 

@@ -103,7 +103,7 @@ def test_nothing_is_wrong_with_what_was_not_edited(whole):
 
 def of(run, part="solution", order=0):
     own = f"(SELECT id FROM results WHERE run = {run})"
-    return f"""WHERE result = {own} AND part = '{part}' AND "order" = {order}"""
+    return f"""WHERE result_id = {own} AND part = '{part}' AND "order" = {order}"""
 
 
 STANDING = "base_x = 0, base_y = 0, right_1 = 0, right_2 = 0, right_3 = 0, right_4 = 0, ticks = 1"

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from coartic import CoarticError
-from coartic.analysis.results.folder import CellRuns
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
 from coartic.analysis.statistics.estimates import FEWEST, difference_of_means, paired_by_seed
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
@@ -132,30 +132,29 @@ def _remarks(a: CellRuns, b: CellRuns) -> str:
 
 
 def _facts(study: Study) -> dict[str, str]:
-    manifest = study.results.manifest
-    plan, limits, environment = manifest.specification, manifest.limits, manifest.environment
-    commit = environment.commit
+    plan, made = study.plan, study.made_with
+    commit = made["commit"]
     facts = {
         "suite": plan.suite,
         "seed": plan.seed,
         "runs a cell": plan.runs,
         "trials": plan.trials,
-        "time limit (s)": limits.time_s,
-        "trial budget": limits.trials,
+        "time limit (s)": plan.time_limit_s,
+        "trial budget": plan.trial_budget,
         "runs": len(study.runs),
-        "coartic": environment.coartic,
-        "commit": commit and commit.id[:12] + " with changes" * commit.dirty,
-        "code of the model": environment.model_code,
-        "Python": environment.python,
-        "platform": environment.platform,
-        "processor": environment.processor,
-        "cores": environment.cores,
+        "coartic": made["coartic"],
+        "commit": commit and commit["id"][:12] + " with changes" * commit["dirty"],
+        "code of the model": made["model_code"],
+        "Python": made["python"],
+        "platform": made["platform"],
+        "processor": made["processor"],
+        "cores": made["cores"],
     }
     return {name: "–" if value is None else str(value) for name, value in facts.items()}
 
 
 def _tasks(study: Study) -> dict[str, str]:
-    tasks = study.results.manifest.specification.tasks
+    tasks = study.plan.tasks
     hashes = {}
     for name, task in tasks.items():
         definition = {key: task[key] for key in task if key not in _WORDS}
@@ -165,9 +164,9 @@ def _tasks(study: Study) -> dict[str, str]:
 
 
 def _codes(study: Study) -> dict[str, str]:
-    methods = study.results.manifest.specification.methods
+    methods = study.plan.methods
     return {name: method.code for name, method in methods.items()}
 
 
 def _libraries(study: Study) -> dict[str, str]:
-    return dict(study.results.manifest.environment.packages)
+    return dict(study.made_with["packages"])

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.results.folder import CellIdentity, CellKey, CellRuns
-from coartic.analysis.results.optima import locks_base
+from coartic.analysis.cells import CellIdentity, CellKey, CellRuns
+from coartic.analysis.optima import locks_base
 from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import tally
 from coartic.method import Information
 from coartic.robot import Array
-from coartic.runs.record import SEARCH
+from coartic.runs.plan import SEARCH
 
 TOLD = {
     Information.GOALS: "G",

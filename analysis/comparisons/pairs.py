@@ -23,9 +23,9 @@ from typing import Any
 
 import pandas as pd
 
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.comparisons.methods import method_rows
 from coartic.analysis.methods import LEARNER, is_search
-from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.statistics.estimates import (
     difference_of_means,
     paired_by_seed,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import (
     RUNS,
@@ -12,7 +13,6 @@ from coartic.analysis.published import (
     Summary,
     published_cell,
 )
-from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.statistics.equivalence import Equivalence, difference
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.comparisons.methods import numbers, solve_times
-from coartic.analysis.results.folder import CellRuns
-from coartic.analysis.results.optima import locks_base
+from coartic.analysis.optima import locks_base
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
 SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
-"""What can be spent: columns of ``runs.parquet``; ``solve_s`` is wall time in s."""
+"""What can be spent: columns of ``runs``; ``solve_s`` is wall time in s."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     a learner without its corrective process spends most of them on its first trial. Times
     are those of :func:`coartic.analysis.comparisons.methods.solve_times`: without building.
     """
-    trials_of = dict(study.results.rewards())
+    trials_of = dict(study.rewards())
     found = {}
     for cell in study.cells.values():
         runs = cell.runs

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coartic import CoarticError
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import main_methods
-from coartic.analysis.results.folder import CellRuns
 from coartic.analysis.study import Study
 from coartic.text import did_you_mean
 
@@ -56,4 +56,4 @@ def solved(study: Study, task: str, label: str) -> CellRuns:
 
 def missing(study: Study, what: str) -> CoarticError:
     """The error of a figure that the folder's runs do not allow."""
-    return CoarticError(f"{study.results.folder}: {what}")
+    return CoarticError(f"{study.folder}: {what}")

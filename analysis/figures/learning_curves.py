@@ -30,7 +30,7 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
     By default the learner's conditions, hill climbing and CMA-ES. Raises CoarticError where
     there is nothing to draw.
     """
-    lengths = {run: len(rewards) for run, rewards in study.results.rewards()}
+    lengths = {run: len(rewards) for run, rewards in study.rewards()}
     found = [
         _Curves(name, label, runs, min(lengths[run] for run in runs))
         for name in study.tasks
@@ -38,7 +38,7 @@ def learning_curves(study: Study, *, methods: Sequence[str] | None = None) -> Pl
         if has(study, name, label) and (runs := _learning(study, name, label, lengths))
     ]
     of_run = {run: curves for curves in found for run in curves.runs}
-    for run, rewards in study.results.rewards():
+    for run, rewards in study.rewards():
         if run in of_run:
             of_run[run].add(rewards)
     parts = [curves.table() for curves in found]

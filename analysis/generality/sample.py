@@ -9,12 +9,12 @@ from functools import cached_property
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.results.optima import locks_base
+from coartic.analysis.optima import locks_base
 from coartic.analysis.statistics.across_tasks import gap_share
 from coartic.analysis.statistics.instances import Runs, Scores
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
-from coartic.runs.record import SEARCH
+from coartic.runs.plan import SEARCH
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""

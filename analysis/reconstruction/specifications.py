@@ -11,19 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
 
 from coartic.analysis.claims.judge import Judged, by_tests, judge, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, Claim
+from coartic.analysis.processes import processes
 from coartic.analysis.reconstruction.constraints import sequences_of, try_sequences
 from coartic.analysis.reconstruction.reconstruct import search_for
-from coartic.analysis.results.folder import Results
 from coartic.analysis.study import Study
-from coartic.runs.tables import variant_of
+from coartic.runs.plan import variant_of
 from coartic.tasks.members import task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
 
@@ -54,24 +54,22 @@ def specifications(study: Study) -> Iterator[tuple[Assumptions, Study]]:
     Members that are not admitted are none of them, nor are those with goals that another one has.
     Beside a member of one task are the default goals of the others, where the folder has them.
     """
-    plan = study.results.manifest.specification
+    plan = study.plan
     own = {name: task_of(name) for name in plan.tasks}
     members = {name: own[name] or "" for name in _admitted(study)}
     plain = tuple(name for name, task in own.items() if task is None)
     if plain:
-        view = _seen_as(study.results, {name: name for name in plain})
-        yield Assumptions(plan.readings, "", ""), Study(view)
+        yield Assumptions(plan.readings, "", ""), _seen_as(study, {name: name for name in plain})
     default = {task: task if task in own else f"{task}-m001" for task in with_members()}
     for name, task in members.items():
         others = {at: t for t, at in default.items() if t != task and at in own}
-        view = _seen_as(study.results, {name: task} | others)
-        yield Assumptions(plan.readings, task, name), Study(view)
+        yield Assumptions(plan.readings, task, name), _seen_as(study, {name: task} | others)
 
 
 def _admitted(study: Study) -> Iterator[str]:
     """Members in a folder that meet every constraint, the first of those with the same goals."""
     for task in with_members():
-        names = [name for name in study.results.manifest.specification.tasks
+        names = [name for name in study.plan.tasks
                  if task_of(name) == task]  # fmt: skip
         known = {study.tasks[name].goals: name for name in reversed(names)}
         if not known:
@@ -85,12 +83,12 @@ def _admitted(study: Study) -> Iterator[str]:
         yield from (name for name in names if name in kept)
 
 
-def _seen_as(results: Results, names: Mapping[str, str]) -> Results:
-    """A folder with some of its tasks alone, by other names.
+def _seen_as(study: Study, names: Mapping[str, str]) -> Study:
+    """A study of some of its tasks alone, by other names.
 
     Parameters of the learner that the folder's readings set are no variants.
     """
-    plan = results.manifest.specification
+    plan = study.plan
     fields = condition_under(load_readings(plan.readings))
     cells, variants = [], {}
     for cell in plan.cells:
@@ -101,18 +99,15 @@ def _seen_as(results: Results, names: Mapping[str, str]) -> Results:
         }
         variant = variant_of(parameters, plan.methods[cell.method].defaults)
         variants[cell.task, cell.method, cell.variant] = variant
-        changed = {"task": names[cell.task], "variant": variant, "parameters": parameters}
-        cells.append(cell.model_copy(update=changed))
-    runs = results.runs[results.runs.task.isin(list(names))].copy()
+        task = names[cell.task]
+        cells.append(replace(cell, task=task, variant=variant, parameters=parameters))
+    runs = study.runs[study.runs.task.isin(list(names))].copy()
     keys = zip(runs.task, runs.method, runs.variant, strict=True)
     runs["variant"] = pd.Series([variants[key] for key in keys], runs.index, "string")
     runs["task"] = runs.task.map(names).astype(runs.task.dtype)
-    sequences = results.sequences[results.sequences.task.isin(list(names))].copy()
-    sequences["task"] = sequences.task.map(names).astype(sequences.task.dtype)
     tasks = {new: {**plan.tasks[name], "name": new} for name, new in names.items()}
-    changed_plan = plan.model_copy(update={"tasks": tasks, "cells": tuple(cells)})
-    manifest = results.manifest.model_copy(update={"specification": changed_plan})
-    return replace(results, manifest=manifest, runs=runs, sequences=sequences)
+    seen = replace(plan, tasks=tasks, cells=tuple(cells))
+    return Study(study.folder, seen, study.made_with, runs)
 
 
 def judged_specifications(
@@ -134,21 +129,22 @@ def judged_specifications(
     rows: list[dict[str, Any]] = []
     wanted = [claim.id for claim in claims]
     views = (view for study in studies for view in specifications(study))
-    distinct = {spec: seen.results for spec, seen in views}  # a folder may be named twice
-    work = (delayed(_judged)(spec, results, wanted) for spec, results in distinct.items())
-    for spec, found, own in Parallel(jobs, return_as="generator")(work):
-        rows += found
-        known |= {(spec.task, name) for name in own}
-        progress(spec)
+    distinct = dict(views)  # a folder may be named twice
+    with processes(jobs, len(distinct)) as do:
+        for spec, found, own in do(_judged, distinct, distinct.values(), repeat(wanted)):
+            rows += found
+            known |= {(spec.task, name) for name in own}
+            progress(spec)
     kept = [row for row in rows if (row["task"], row["claim"]) in known]
     return pd.DataFrame(kept, columns=list(COLUMNS))
 
 
 def _judged(
-    spec: Assumptions, results: Results, claims: Collection[str]
+    spec: Assumptions, seen: Study, claims: Collection[str]
 ) -> tuple[Assumptions, list[dict[str, Any]], list[str]]:
     """Rows of a specification, and the claims that its own runs can judge."""
-    seen, rows, known = Study(results), [], []
+    rows: list[dict[str, Any]] = []
+    known: list[str] = []
     own = set(seen.runs.run_id[seen.runs.task == spec.task] if spec.task else seen.runs.run_id)
     wanted = [CLAIMS[name] for name in claims]
     if spec.task:  # what the default goals of the other task do is no matter of a member's

@@ -13,8 +13,6 @@ from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
 
-from markupsafe import Markup
-
 from coartic import CoarticError
 from coartic.analysis import tables
 from coartic.analysis.claims.ensemble import held_in_words
@@ -31,7 +29,7 @@ from coartic.analysis.report.text import answers, environment
 from coartic.analysis.study import Study
 from coartic.analysis.tables import TABLES
 from coartic.analysis.words import number
-from coartic.files import REPORT, check_folder, publish
+from coartic.files import check_folder, publish
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
 SEARCHED = 12
@@ -78,15 +76,15 @@ def write_report(
     ``begin`` is called when all is made and nothing written. Raises CoarticError where the folder
     holds the results themselves or anything that no report wrote.
     """
-    if Path(os.path.realpath(study.results.folder)).is_relative_to(os.path.realpath(folder)):
+    if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
             f"{folder} holds the results themselves, or lies above them. Give the report a folder "
             "of its own."
         )
-    check_folder(folder, owner=REPORT, alone=True)
+    check_folder(folder, ["report.html"])
     files = report_files(study, for_paper=for_paper)
     begin()
-    publish(folder, files, owner=REPORT, alone=True)
+    publish(folder, files)
     return list(files)
 
 
@@ -100,9 +98,9 @@ def page(study: Study, sections: list[Filled]) -> str:
     return template.render(
         title=_title(study),
         description=" ".join(answer["text"] for answer in answers(study)),
-        styles=Markup((here / "page.css").read_text(encoding="utf-8")),
-        script=Markup(script),
-        player=Markup(player.replace("<", "\\u003c")),
+        styles=(here / "page.css").read_text(encoding="utf-8"),
+        script=script,
+        player=player.replace("<", "\\u003c"),
         answers=answers(study),
         sections=[_for_page(part) for part in sections],
         claims=_claims(study),
@@ -148,7 +146,7 @@ def _table(part: Filled) -> dict[str, Any] | None:
     return {
         "id": section.table,
         "caption": section.caption,
-        "html": Markup(html_table(part.table, section.table, section.caption)),
+        "html": html_table(part.table, section.table, section.caption),
         "searched": len(part.table) > SEARCHED,
         "example": f"'{part.table.index[0]}'",
     }
@@ -160,7 +158,7 @@ def _figure(plot: Plot) -> dict[str, Any]:
         "id": plot.id,
         "title": plot.title,
         "caption": plot.caption,
-        "svg": Markup(svg_for_page(plot)),
+        "svg": svg_for_page(plot),
         "wide": points > _WIDE,
         "width": f"{_MAGNIFIED * points / 12:.0f}",
     }

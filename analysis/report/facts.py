@@ -70,7 +70,7 @@ def coarticulation(study: Study) -> Coarticulation | None:
     if goal is None:
         return None
     method = study.cells[goal.tasks[0].name, goal.method].method
-    tested = study.results.manifest.specification.methods[method].stochastic
+    tested = study.plan.methods[method].stochastic
     return Coarticulation(goal, name_of(goal.method), sum(map(len, goal.postures)), tested)
 
 
@@ -392,7 +392,7 @@ def more_exploration(study: Study) -> list[dict[str, Any]]:
 @cached
 def limits(study: Study) -> dict[str, Any]:
     """What the results cannot show, as far as it depends on the folder."""
-    runs, plan = study.runs, study.results.manifest.specification
+    runs, plan = study.runs, study.plan
     failed = runs[runs.status != "ok"]
     reasons = Counter(map(str, failed.reason.dropna()))
     learners = [cell for (_, label), cell in study.cells.items() if label.startswith(LEARNER)]
@@ -427,26 +427,26 @@ def limits(study: Study) -> dict[str, Any]:
         "side_by_side": bool(runs.together.fillna(1).max() > 1) if "together" in runs else False,
         "commits": len(commits),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
-        "processor": study.results.manifest.environment.processor,
-        "cores": study.results.manifest.environment.cores,
+        "processor": study.made_with["processor"],
+        "cores": study.made_with["cores"],
     }
 
 
 @cached
 def made(study: Study) -> dict[str, Any]:
     """Which runs, how many, made with what and when."""
-    plan, environment = study.results.manifest.specification, study.results.manifest.environment
+    plan, made_with = study.plan, study.made_with
     return {
         "suite": plan.suite,
-        "folder": study.results.folder,
+        "folder": study.folder,
         "runs": len(study.runs),
         "failed": int((study.runs.status != "ok").sum()),
         "tasks": len(study.tasks),
         "methods": len({label for _, label in study.cells}),
         "trials": plan.trials,
         "seed": plan.seed,
-        "version": environment.coartic,
-        "commit": environment.commit.id[:12] if environment.commit else "",
-        "date": environment.date[:10],
+        "version": made_with["coartic"],
+        "commit": made_with["commit"]["id"][:12] if made_with["commit"] else "",
+        "date": made_with["date"][:10],
         "most_runs": int(pd.Series([len(c.runs) for c in study.cells.values()]).max() or 0),
     }

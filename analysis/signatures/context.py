@@ -16,7 +16,7 @@ from itertools import combinations, takewhile
 import numpy as np
 
 from coartic import Task
-from coartic.analysis.results.optima import KEPT
+from coartic.analysis.optima import KEPT
 from coartic.analysis.signatures.permutation import divisions, p_values
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
 from coartic.analysis.statistics.spread import mean

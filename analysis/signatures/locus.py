@@ -20,7 +20,7 @@ from scipy import stats
 from scipy.cluster.hierarchy import DisjointSet
 
 from coartic import Task
-from coartic.analysis.results.optima import KEPT
+from coartic.analysis.optima import KEPT
 from coartic.analysis.signatures.permutation import orders, p_values
 from coartic.analysis.statistics.intervals import Interval, student
 from coartic.analysis.statistics.spread import mean

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
 from coartic.analysis.references import Key
 from coartic.analysis.statistics.intervals import Interval
-from coartic.runs.tables import label_of
+from coartic.runs.plan import label_of
 
 NO_RUN = "no run has a solution"
 ONE_HAND = "the task has one hand"

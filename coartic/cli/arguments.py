@@ -45,9 +45,9 @@ def _tasks() -> Iterable[str]:
 
 def _methods() -> Iterable[str]:
     from coartic import CONDITIONS, VARIANTS
-    from coartic.benchmarks.registry import CLASSES
+    from coartic.benchmarks.registry import built_in
 
-    return [*CONDITIONS, *VARIANTS, *CLASSES]
+    return [*CONDITIONS, *VARIANTS, *built_in()]
 
 
 def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:

@@ -50,7 +50,7 @@ def draw(
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
         files |= {"tasks.svg": picture(plot, ".svg")}
-        publish(out, files, owner="draw", alone=False)
+        publish(out, files)
     say(f"{out}: {counted(len(chosen), 'task')}.")
 
 
@@ -76,7 +76,7 @@ def animate(
     """Make a film of a run, alone or beside another one."""
     from coartic.analysis.figures.animation import Panel, animate, check_output
     from coartic.analysis.methods import name_of
-    from coartic.benchmarks.reproduce import find_record, trajectory_of
+    from coartic.benchmarks.reproduce import find_run, trajectory_of
 
     check_output(out, replace=replace)
     if speed is not None and not speed > 0:
@@ -85,12 +85,12 @@ def animate(
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     panels = []
     for name in (run_id,) if other is None else (run_id, other):
-        _, record = find_record(name, folder)
-        found = trajectory_of(record)
-        title = one_line(f"{found.task.label}: {name_of(record.method)}, run {record.run}")
+        _, stored = find_run(name, folder)
+        found, number = trajectory_of(stored), stored.run.row["run"]
+        title = one_line(f"{found.task.label}: {name_of(stored.method)}, run {number}")
         panels.append(Panel(title, found))
     if initial:
-        panels.insert(0, _initial_panel(panels[0].trajectory.task, record.model))
+        panels.insert(0, _initial_panel(panels[0].trajectory.task, stored.model))
     timed = animate(panels, out, speed=speed, width=width, replace=replace)
     say(f"{out}: {len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second.")
 

@@ -70,7 +70,7 @@ def readings(
         ),
     )
     table = judged_table(judged)
-    publish(folder, {"readings.csv": _csv(table)}, owner="paper", alone=False)
+    publish(folder, {"readings.csv": _csv(table)})
     show_frame(table[["readings", "log likelihood", "p", "verdict"]])
     say(f"Written: {folder / 'readings.csv'}")
 
@@ -100,7 +100,7 @@ def goals(
     out = _folder(folder, names)
     found = reconstruct(search, effort=Effort(members=members, runs=runs), report=say)
     tables = zip(names, (found.members, found.tried), strict=True)
-    publish(out, {name: _csv(table) for name, table in tables}, owner="paper", alone=False)
+    publish(out, {name: _csv(table) for name, table in tables})
     say(
         f"The nearest set lies {found.nearest.distance:.2f} standard errors from the printed "
         "results."
@@ -133,7 +133,7 @@ def results(
     columns = ["figure", "task", "printed", "sd", "ours", "our_sd", "runs", "verdict"]
     show_frame(table[columns].map(_short))
     if folder is not None:
-        publish(folder, {"printed.csv": _csv(table)}, owner="paper", alone=False)
+        publish(folder, {"printed.csv": _csv(table)})
         say(f"Written: {folder / 'printed.csv'}")
 
 
@@ -172,7 +172,7 @@ def claims(
     if table.effect.notna().any():
         figures.append(specification_curve(table))
     files |= {f"{plot.id}{kind}": picture(plot, kind) for plot in figures for kind in FORMATS}
-    publish(folder, files, owner="paper", alone=False)
+    publish(folder, files)
     show_frame(counted)
     say(f"Written: {folder}")
 
@@ -180,7 +180,7 @@ def claims(
 def _folder(name: str, files: Sequence[str], what: str = "--out") -> Path:
     """A folder in which the command may write its files, looked at before the work is done."""
     folder = folder_named(name, what)
-    check_folder(folder, owner="paper", alone=False, names=files)
+    check_folder(folder, files)
     return folder
 
 

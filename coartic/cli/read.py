@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,7 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
+from coartic.cli.arguments import at_least
 from coartic.cli.terminal import if_interrupted, say, say_pairs, show_frame, writing
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -118,17 +120,39 @@ def compare(
         say("--out FILE.csv writes all cells.")
 
 
-def verify(folder: given.Results) -> None:
+def verify(
+    folder: given.Results,
+    again: Annotated[
+        int, typer.Option(parser=at_least(0), metavar="N", help="Also perform N runs again.")
+    ] = 0,
+    method_file: given.MethodFiles = None,
+) -> None:
     """Execute every stored solution again and compare."""
-    from coartic.analysis.results.folder import load_results
+    from coartic.analysis.verify import verify
+    from coartic.runs.store import open_store
 
-    results = load_results(folder)
-    runs, cells = counted(len(results.runs), "run"), counted(len(results.cells), "cell")
+    with open_store(folder):  # or it says what is the matter
+        report = verify(folder)
     say(
-        f"{folder}: the solutions of {runs} in {cells} were executed again; "
-        "each gets its stored reward."
+        f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
+        *(report.wrong or ["Nothing differs."]),
+        "Not checked:",
+        *(f"- {words}" for words in report.unchecked),
     )
-    say("`coartic reproduce RUN` also repeats how a solution was found.")
+    different = bool(report.wrong)
+    if again:
+        from coartic.benchmarks.registry import registry
+        from coartic.benchmarks.reproduce import some_again
+
+        known, count = registry(method_file or []), 0
+        for run_id, found in some_again(folder, again, known):
+            count += 1
+            for difference in found:
+                say(f"Run {run_id}, performed again: {difference}")
+                different = True
+        say(f"{counted(count, 'run')} performed again.")
+    if different:
+        sys.exit(1)
 
 
 def cite(
@@ -144,24 +168,20 @@ def cite(
 ) -> None:
     """Print what to cite, as BibTeX."""
     from coartic.analysis.citations import MethodSource, bibliography
-    from coartic.benchmarks.registry import CLASSES
-    from coartic.runs.record import BUILT_IN
+    from coartic.benchmarks.registry import built_in
+    from coartic.runs.plan import BUILT_IN
+    from coartic.runs.store import open_store
 
-    environment = None
-    if folder is None:
-        methods = [
-            MethodSource(item.name, item.title, item.citation, True) for item in CLASSES.values()
-        ]
-    else:
-        from coartic.analysis.results.folder import load_results  # and pandas
-
-        manifest = load_results(folder).manifest
-        environment = manifest.environment.model_dump(mode="json")
-        methods = [
-            MethodSource(name, item.title, item.citation, item.origin == BUILT_IN)
-            for name, item in manifest.specification.methods.items()
-        ]
-    text = bibliography(methods, analysis=analysis, environment=environment)
+    made_with = None
+    declared = {name: entry.declared for name, entry in built_in().items()}
+    if folder is not None:
+        with open_store(folder) as store:
+            declared, made_with = store.plan().methods, store.made_with()
+    methods = [
+        MethodSource(name, method.title, method.citation, method.origin == BUILT_IN)
+        for name, method in declared.items()
+    ]
+    text = bibliography(methods, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))
 
 

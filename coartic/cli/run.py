@@ -18,11 +18,11 @@ from coartic.text import counted, did_you_mean
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
-    from coartic.benchmarks.executors import Executor
+    from coartic.benchmarks.pool import Executor
     from coartic.benchmarks.registry import Entry, Registry
     from coartic.benchmarks.run import RunReport
     from coartic.cli.terminal import Display
-    from coartic.runs.record import Record
+    from coartic.runs.store import Run
 
 
 def run(
@@ -48,7 +48,6 @@ def run(
     If it is interrupted, repeat the command; it resumes where it stopped.
     """
     from coartic.benchmarks.run import Selection, plan_suite
-    from coartic.benchmarks.specification import Limits
     from coartic.benchmarks.suites import load_suite
 
     check_numbers(jobs, time_limit)
@@ -56,9 +55,16 @@ def run(
     out = folder_named(folder or f"results/{chosen.name}", "--out")
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
-    limits = Limits(time_limit or chosen.time_limit_s, trial_budget)
-    planned = partial(plan_suite, runs=runs, trials=trials, seed=seed, readings=reading or ())
-    plan = planned(chosen, select=select, limits=limits)
+    plan = plan_suite(
+        chosen,
+        runs=runs,
+        trials=trials,
+        seed=seed,
+        select=select,
+        time_limit_s=time_limit,
+        trial_budget=trial_budget,
+        readings=reading or (),
+    )
     started = time.monotonic()
     with performing(chosen.name, out) as display:
         executor = _executor(jobs, scheduler, display)
@@ -72,7 +78,7 @@ def run(
 
 def _executor(jobs: int, scheduler: str | None, display: Display) -> Executor:
     from coartic.benchmarks.cluster import Dask
-    from coartic.benchmarks.executors import Local
+    from coartic.benchmarks.pool import Local
 
     return Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
 
@@ -80,13 +86,10 @@ def _executor(jobs: int, scheduler: str | None, display: Display) -> Executor:
 def _conclude(report: RunReport, seconds: float) -> None:
     """What ran, the four answers, and the next command."""
     from coartic.analysis.report.text import answers
-    from coartic.analysis.results.folder import made_here
-    from coartic.analysis.study import Study
+    from coartic.analysis.study import load
 
     say(report.sentence(seconds))
-    pairs = [
-        (answer["word"], answer["text"]) for answer in answers(Study(made_here(report.folder)))
-    ]
+    pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
 
 
@@ -169,16 +172,16 @@ def _method_details(entry: Entry) -> Iterator[tuple[str, str]]:
     from coartic import builtin_tasks, load_task
     from coartic.tasks.readings import readings
 
-    declared = entry.declared
+    method = entry.method
     read = {each.field for each in readings()}
-    parameters = [f"{k}={v}" for k, v in declared.defaults.items() if k not in read]
+    parameters = [f"{k}={v}" for k, v in entry.defaults.items() if k not in read]
     tasks = [name for name in builtin_tasks() if entry.why_not(load_task(name)) is None]
-    yield "Method", f"{declared.name}: {declared.title}"
-    yield "Told", ", ".join(sorted(declared.told))
+    yield "Method", f"{method.name}: {method.title}"
+    yield "Told", ", ".join(entry.told)
     yield "Parameters", ", ".join(parameters) or "none"
     yield "Tasks", ", ".join(tasks) or "none of the four"
-    yield "Runs", "differ by seed" if declared.stochastic else "are all the same"
-    yield "Cites", declared.citation or "nothing"
+    yield "Runs", "differ by seed" if method.stochastic else "are all the same"
+    yield "Cites", method.citation or "nothing"
 
 
 def reproduce(
@@ -188,40 +191,32 @@ def reproduce(
 ) -> None:
     """Perform a run again and say whether the result is identical."""
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.reproduce import differences, find_record, perform_once, spec_of
-    from coartic.benchmarks.specification import Limits
+    from coartic.benchmarks.reproduce import differences, find_run, performed_again
 
-    _, record = find_record(run_id, folder)
-    limits = Limits(record.timing.time_limit_s, None)
-    spec = spec_of(record, registry(method_file or []), limits)
+    _, stored = find_run(run_id, folder)
+    run, known = stored.run, registry(method_file or [])
     say_pairs(
         [
-            ("Run", f"{record.run_id}: {spec.method} on {spec.task.name}, run {spec.run}"),
-            ("Seed", str(record.specification.seed)),
-            (
-                "Parameters",
-                ", ".join(f"{k}={v}" for k, v in record.specification.parameters.items()),
-            ),
-            ("Result", _result(record)),
+            ("Run", f"{run.run_id}: {stored.method} on {stored.task.name}, run {run.row['run']}"),
+            ("Seed", str(run.row["seed"])),
+            ("Parameters", ", ".join(f"{k}={v}" for k, v in stored.parameters.items())),
+            ("Result", _result(run)),
         ]
     )
-    again = perform_once(spec)
-    if record.code != again.code:
-        say(
-            f"Another version of the code made the run ({record.code[:12]}; this is "
-            f"{again.code[:12]})."
-        )
-    found = differences(record, again)
+    again, code = performed_again(stored, known), known[stored.method].code
+    if code != stored.code:
+        say(f"Another version of the code made the run ({stored.code}; this is {code}).")
+    found = differences(run, again)
     if found:
         say("Performed again, it is different:", *(f"- {difference}" for difference in found))
         sys.exit(1)
     say("Performed again: identical.")
 
 
-def _result(record: Record) -> str:
-    if record.solution is None:
-        return f"{record.status}: {record.reason}"
-    return f"reward {record.solution.reward}, hands {record.solution.hands}"
+def _result(run: Run) -> str:
+    if run.status != "ok":
+        return f"{run.status}: {run.row['reason']}"
+    return f"reward {run.row['reward']}, hands {run.row['hands']}"
 
 
 def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None:

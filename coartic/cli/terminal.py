@@ -8,7 +8,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
-    from coartic.benchmarks.harness import Progress
-    from coartic.benchmarks.specification import RunSpec
+    from coartic.benchmarks.run import Progress
 
 READABLE = 24  # characters that a column of text needs
 WIDTH = 80  # columns where the output is not a terminal, and COLUMNS is not set
@@ -99,13 +98,10 @@ def performing(suite: str, folder: Path) -> Iterator[Display]:
 
 
 def _end_workers() -> None:
-    """Ends joblib's processes, which outlive a process that a signal ends."""
-    import psutil
+    import multiprocessing
 
-    for child in psutil.Process().children(recursive=True):
-        with suppress(psutil.Error):
-            if any("loky" in word for word in child.cmdline()):
-                child.kill()
+    for child in multiprocessing.active_children():
+        child.kill()
 
 
 def if_interrupted(sentence: str) -> None:
@@ -205,28 +201,26 @@ class Display:
         """Leave the terminal as it was."""
         self._bar.stop()
 
-    def update(self, progress: Progress, spec: RunSpec | None) -> None:
-        """Show how far the plan is."""
-        self._show(progress, spec)
+    def update(self, progress: Progress, what: str) -> None:
+        """Show how far the plan is, and what was run last."""
+        self._show(progress, what)
         self._interrupts.check()
 
-    def _show(self, progress: Progress, spec: RunSpec | None) -> None:
+    def _show(self, progress: Progress, what: str) -> None:
         self.done = progress.done
-        if spec is None:
-            for damage in progress.damaged:
-                self.line(f"{damage.reason}; the affected runs will be repeated.")
+        if not what:
             if progress.stale:
-                count = counted(len(progress.stale), "record")
+                count = counted(progress.stale, "run")
                 self.line(f"Ignoring {count} made by a different version of the code.")
             if progress.present:
                 total = counted(progress.total, "run")
                 self.line(f"{progress.present} of {total} are already there.")
         if self._console.is_terminal:
-            self._live(progress, spec)
+            self._live(progress, what)
         else:
             self._plain(progress)
 
-    def _live(self, progress: Progress, spec: RunSpec | None) -> None:
+    def _live(self, progress: Progress, what: str) -> None:
         if self._task is None:
             if progress.present == progress.total:
                 return
@@ -234,9 +228,7 @@ class Display:
             self._task = self._bar.add_task(
                 one_line(self._suite), total=progress.total - progress.present, failed=0
             )
-        words = "starting workers (the first time compiles)"
-        if spec is not None:
-            words = f"{spec.task.name} {spec.method}"
+        words = what or "starting workers (the first time compiles)"
         self._bar.update(
             self._task,
             completed=progress.done,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +29,7 @@ from coartic.learner.kernel import (
     work_for,
 )
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.compiled import addresses, compile_together
+from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import InitialSearch, search_initial_hands
 from coartic.motion.lanes import LANES
@@ -223,7 +224,7 @@ def learn_many(
     checked_model(model, radius=task.radius)
     search = search_initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(map(_checked_seed, seeds))
-    threads = _threads(jobs)
+    threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
@@ -253,12 +254,13 @@ def _checked_seed(seed: Any) -> int:
     return int(seed)
 
 
-def _threads(jobs: int) -> int:
-    if jobs == 1:
-        return 1
-    from joblib import effective_n_jobs
-
-    return int(effective_n_jobs(jobs))
+def threads_for(jobs: int) -> int:
+    """A number of threads or processes as it is asked for: -1 for one a core."""
+    if jobs > 0:
+        return jobs
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 class _Learning:
@@ -344,20 +346,12 @@ def warm_up(task: Task, *, learns: bool = True) -> None:
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
-
-    def learner() -> None:
+    if learns:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
         _compile_for(task, condition, PAPER, InitialSearch(hands))
-
-    def movements() -> None:
-        move(task.robot, task.q0, task.q0, hand, goal, task.radius)
-        correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
-        make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
-
-    kernels = {"learner": learner, "movements": movements}
-    if not learns:
-        del kernels["learner"]
-    compile_together(kernels, str(task.robot.most_links))
+    move(task.robot, task.q0, task.q0, hand, goal, task.radius)
+    correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
+    make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
 
 
 def _compile_for(

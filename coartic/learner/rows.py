@@ -62,9 +62,9 @@ def movement_rows(task: Task, movements: Iterable[Movement]) -> list[dict[str, A
 def movements_from(
     task: Task, rows: pd.DataFrame, paths: pd.DataFrame | None = None
 ) -> tuple[Movement, ...]:
-    """The movements of one run, read back from its rows of ``solutions.parquet``.
+    """The movements of one run, read back from its rows of ``solutions``.
 
-    ``paths`` holds the run's rows of ``paths.parquet``, for movements of kind ``path``.
+    ``paths`` holds the run's rows of ``paths``, for movements of kind ``path``.
     """
     names = list(task.robot.joint_names)
     rows = rows.sort_values("order")
@@ -75,7 +75,7 @@ def movements_from(
         waypoints = None
         if kind == "path":
             if paths is None:
-                raise ValueError("a movement of kind 'path' needs the rows of paths.parquet")
+                raise ValueError("a movement of kind 'path' needs its waypoints")
             own = paths[paths["order"] == order].sort_values("waypoint")
             waypoints = own[names].to_numpy(dtype=np.float64)
         movements.append(Movement(int(goal), hand, kind, target, int(ticks), waypoints))

@@ -20,9 +20,9 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from filelock import FileLock, Timeout
 from numba import njit, types
 from numba.core import cgutils
+from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -31,7 +31,6 @@ from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0
-_PATIENCE_S = 120.0  # with a process that compiles a kernel, on a slow machine
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -121,49 +120,39 @@ def _for_any_number(dispatcher: Any) -> Any:
     return dispatcher
 
 
+class _Kept(FunctionCache):
+    """Machine code on disk. A file that cannot be read, such as one that a full disk has cut
+    short, is dropped, and what cannot be kept is compiled again in the next process."""
+
+    def load_overload(self, *asked: Any) -> Any:
+        try:
+            return super().load_overload(*asked)
+        except Exception:  # an unpickler may say anything
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, *made: Any) -> None:
+        with contextlib.suppress(Exception):
+            super().save_overload(*made)
+
+
 def entry(function: F) -> F:
-    """Compile a function that Python calls, and keep its machine code on disk."""
-    folder = _cache_folder()
-    if folder is None:
-        uncached: F = njit(**_OPTIONS)(function)
-        return uncached
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder)
-    try:
-        compiled: F = njit(**_OPTIONS, cache=True)(function)
-    finally:
-        numba.config.CACHE_DIR = before
-    return compiled
+    """Compile a function that Python calls, and keep its machine code on disk.
 
-
-def compile_together(kernels: Mapping[str, Callable[[], object]], variant: str) -> None:
-    """Call kernels for the first time, by name; processes that begin at once share the work.
-
-    What another compiles now comes last, and is loaded once it is done there. ``variant`` says
-    what they are compiled for: a lock is of a name, as Numba has one index of all its variants.
+    Processes that compile it at the same time each do so; the last one's files stay.
     """
-    folder, deadline = _cache_folder(), time.monotonic() + _PATIENCE_S
-    waiting = dict(kernels)
-    done = {name: folder / f"{name}-{variant}.done" for name in kernels if folder is not None}
-    for name in [name for name, mark in done.items() if mark.exists()]:
-        waiting.pop(name)()
-    for patient in (False, True) if done else ():
-        for name in list(waiting):
-            lock = FileLock(done[name].with_name(f"{name}.lock"))
-            try:
-                lock.acquire(timeout=max(0.0, deadline - time.monotonic()) if patient else 0.0)
-            except Timeout:
-                continue
-            except (OSError, NotImplementedError):  # no locks here, and nothing to share
-                pass
-            try:
-                waiting.pop(name)()
-                with contextlib.suppress(OSError):
-                    done[name].touch()
-            finally:
-                lock.release()
-    for call in waiting.values():
-        call()
+    compiled: Any = njit(**_OPTIONS)(function)
+    folder = _cache_folder()
+    if folder is not None:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(folder)
+        try:
+            compiled._cache = _Kept(function)
+        finally:
+            numba.config.CACHE_DIR = before
+    kernel: F = compiled
+    return kernel
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from coartic.errors import LOADED, NotApplicableError, need
 from coartic.model import PAPER, MotionModel
-from coartic.motion.solution import Execution, Movement, execute
+from coartic.motion.solution import Execution, Movement, execute, execute_many
 from coartic.robot import HANDS, Hand
 from coartic.tasks.task import Task, hands_of, letters_of
 
@@ -24,10 +24,11 @@ MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 
 def corrective_trial(task: Task, hands: str, *, model: MotionModel = PAPER) -> Execution:
     """One trial by the corrective process alone, with the given hands (``"RRRR"``)."""
-    movements = [
-        Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)
-    ]
-    return execute(task, movements, model=model)
+    return execute(task, _by_correction(hands), model=model)
+
+
+def _by_correction(hands: str) -> list[Movement]:
+    return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
 
 
 def hand_sequences(task: Task, hands: Iterable[Hand] | None = None) -> list[str]:
@@ -70,7 +71,13 @@ def ranked_sequences(
         reward = entry[1].reward
         return math.inf if reward is None else -reward, changes_of_hand(entry[0])
 
-    trials = [(hands, corrective_trial(task, hands, model=model)) for hands in sequences]
+    each = list(sequences)
+    trials: list[tuple[str, Execution]] = []
+    made = execute_many(task, map(_by_correction, each), model=model)
+    for hands, trial in zip(each, made, strict=True):
+        if isinstance(trial, Exception):
+            raise trial
+        trials.append((hands, trial))
     return sorted(trials, key=rank)
 
 

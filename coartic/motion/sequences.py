@@ -1,25 +1,22 @@
 """What the corrective process alone gives, for many sets of goals and hand sequences.
 
 The rules are those of :func:`coartic.motion.initial.corrective_trial`. Meant for searches over
-where goals may be: what two trials begin with, goal and hand by goal and hand, is computed once
-if one follows the other, so that sequences of hands and grids of goals cost little more than
-the movements in which they differ.
+where goals may be: what trials begin with, goal and hand by goal and hand, is computed once,
+so that sequences of hands and grids of goals cost little more than the movements in which they
+differ.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.compiled import entry, fill_row, inner
-from coartic.motion.corrective import correct_lanes
-from coartic.motion.lanes import board, depart, lanes_for, runs_for
-from coartic.motion.movement import LARGEST, Goal, move_lanes
-from coartic.motion.problem import arm_of, problem_of
+from coartic.motion.movement import LARGEST, configuration
+from coartic.motion.reach import reach_unchecked
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of
 
@@ -33,77 +30,15 @@ class CorrectiveTrials(NamedTuple):
     """Configuration when each goal was hit, shape ``(N, S, G, dof)``; NaN after a failure."""
 
 
-class _Path(NamedTuple):
-    """A trial as far as it has come: before each goal, and at the end."""
-
-    q: Any  # (G + 1, dof)
-    ticks: Any  # (G + 1,), NaN after a failure
-    hand: Any  # (G,) by which a goal was hit; -1 before the first trial
-    goal: Any  # (G, 2)
-
-
-@inner
-def _hit(g: int, problem: Any, path: Any, lanes: Any, runs: Any) -> None:
-    """From before goal ``g`` of a path to after it."""
-    goal = Goal(path.goal[g, 0], path.goal[g, 1], problem.radius)
-    arm, run = arm_of(problem, path.hand[g]), runs[0]
-    path.ticks[g + 1] = path.ticks[g]
-    fill_row(run.q, path.q[g])
-    fill_row(run.target, path.q[g])
-    if not math.isnan(path.ticks[g]):
-        # A movement to where the robot is tells whether it stands in the goal already.
-        depart(lanes.at, 0, 0, run.q, run.target, arm)
-        move_lanes(lanes, 1, goal, False, problem.model, runs)
-        if not run.hit:
-            board(lanes.at, 0, 0, run.q, arm)
-            correct_lanes(lanes, 1, goal, problem.corrector, problem.model, runs)
-            if run.converged:
-                depart(lanes.at, 0, 0, run.q, run.target, arm)
-                stops = problem.model.corrective_arrival
-                move_lanes(lanes, 1, goal, stops, problem.model, runs)
-                path.ticks[g + 1] += run.ticks
-            if not run.hit:
-                path.ticks[g + 1] = math.nan
-    fill_row(path.q[g + 1], run.q)
-    if math.isnan(path.ticks[g + 1]):
-        path.q[g + 1, :] = math.nan
-
-
-@entry
-def _try_all(
-    goals: Any,
-    codes: Any,
-    problem: Any,
-    rewards: Any,
-    reached: Any,
-    path: Any,
-    lanes: Any,
-    runs: Any,
-) -> None:
-    length = goals.shape[1]
-    for number in range(len(goals)):
-        for sequence in range(len(codes)):
-            same = True
-            for g in range(length):
-                x, y = goals[number, g]
-                hand = codes[sequence, g]
-                same &= (path.hand[g] == hand) & (path.goal[g, 0] == x) & (path.goal[g, 1] == y)
-                if not same:
-                    path.hand[g], path.goal[g, 0], path.goal[g, 1] = hand, x, y
-                    _hit(g, problem, path, lanes, runs)
-                fill_row(reached[number, sequence, g], path.q[g + 1])
-            rewards[number, sequence] = -path.ticks[length]
-
-
 def corrective_trials(
     task: Task, sequences: Sequence[str], goals: Array, *, model: MotionModel = PAPER
 ) -> CorrectiveTrials:
     """Trials by the corrective process alone, with each hand sequence, at each set of goals.
 
     ``goals`` has shape ``(N, G, 2)``, length unit; those of the task itself do not matter, all
-    else of it does. Sequences (``"RRLR"``) in alphabetical order and sets of goals that begin
-    as the one before are cheap. Raises ValueError for a wrong shape, for figures that are
-    not finite or beyond ``LARGEST``, and for hands the robot does not have.
+    else of it does. Sequences (``"RRLR"``) and sets of goals that begin alike are cheap. Raises
+    ValueError for a wrong shape, for figures that are not finite or beyond ``LARGEST``, and for
+    hands the robot does not have.
     """
     checked_model(model, radius=task.radius)
     places = np.array(goals, dtype=np.float64)
@@ -116,22 +51,43 @@ def corrective_trials(
             raise ValueError(
                 f"hands {hands!r} do not fit {places.shape[1]} goals of task {task.name!r}"
             )
-    shape = (len(places), len(sequences), places.shape[1])
-    made = CorrectiveTrials(np.empty(shape[:2]), np.empty((*shape, task.robot.dof)))
-    path = _Path(
-        q=np.tile(np.array(task.q0), (shape[2] + 1, 1)),
-        ticks=np.zeros(shape[2] + 1),
-        hand=np.full(shape[2], -1),
-        goal=np.zeros((shape[2], 2)),
+    sets, goals_each, _ = places.shape
+    codes = np.array([[HANDS.index(hand) for hand in hands_of(hands)] for hands in sequences])
+    hand = np.tile(codes.astype(np.int64).reshape(-1, goals_each), (sets, 1))
+    goal = np.repeat(places, len(sequences), axis=0)
+    reached = np.empty((len(hand), goals_each, task.robot.dof))
+    # What the trials have begun with, goal by goal, and which of these beginnings each has.
+    q, ticks = configuration(task.robot, task.q0)[None], np.zeros(1)
+    whose = np.zeros(len(hand), dtype=np.int64)
+    for g in range(goals_each):
+        first, longer = _alike(hand[:, g], goal[:, g, 0], goal[:, g, 1], whose)
+        q, ticks = q[whose[first]], ticks[whose[first]]
+        going = ~np.isnan(ticks)
+        chosen = first[going]
+        made = reach_unchecked(
+            task.robot,
+            q[going],
+            hand[chosen, g],
+            goal[chosen, g],
+            task.radius,
+            locked_base=task.locked_base,
+            model=model,
+        )
+        q[going] = np.where(made.hit[:, None], made.q, np.nan)
+        ticks[going] += np.where(made.hit, made.ticks, np.nan)
+        whose = longer
+        reached[:, g] = q[whose]
+    shape = (sets, len(sequences))
+    return CorrectiveTrials(
+        -ticks[whose].reshape(shape), reached.reshape(*shape, *reached.shape[1:])
     )
-    codes = [[HANDS.index(hand) for hand in hands_of(hands)] for hands in sequences]
-    _try_all(
-        places,
-        np.array(codes, dtype=np.int64).reshape(shape[1:]),
-        problem_of(task, model),
-        *made,
-        path,
-        lanes_for(task.robot),
-        runs_for(1, task.robot),
-    )
-    return made
+
+
+def _alike(*keys: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The first of those whose keys are all equal, and, of each, which of these it is like."""
+    order = np.lexsort(keys)
+    new = np.ones(len(order), dtype=np.bool_)
+    new[1:] = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)
+    like = np.empty_like(order)
+    like[order] = np.cumsum(new) - 1
+    return order[new], like

@@ -16,8 +16,6 @@ import math
 import numpy as np
 from numba import njit
 
-import coartic.motion.llvm  # noqa: F401
-
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 
 # π/2 in parts: the two leading ones have 33 significant bits each.

@@ -22,6 +22,7 @@ import numpy as np
 
 from coartic.errors import CoarticError
 from coartic.method import Meter
+from coartic.model import MotionModel
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
@@ -102,12 +103,12 @@ CREATE TABLE settings (id INTEGER PRIMARY KEY, asked TEXT NOT NULL, code TEXT NO
 CREATE TABLE results (id INTEGER PRIMARY KEY,
     {", ".join(f"{name} {kind}" for name, kind in RESULTS.items())},
     UNIQUE (setting, suite_seed, run));
-CREATE TABLE movements (result INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
+CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
     goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL, ticks INTEGER NOT NULL,
-    PRIMARY KEY (result, part, "order")) WITHOUT ROWID;
-CREATE TABLE waypoints (result INTEGER NOT NULL, "order" INTEGER NOT NULL,
-    waypoint INTEGER NOT NULL, PRIMARY KEY (result, "order", waypoint)) WITHOUT ROWID;
-CREATE TABLE learning (result INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
+    PRIMARY KEY (result_id, part, "order")) WITHOUT ROWID;
+CREATE TABLE waypoints (result_id INTEGER NOT NULL, "order" INTEGER NOT NULL,
+    waypoint INTEGER NOT NULL, PRIMARY KEY (result_id, "order", waypoint)) WITHOUT ROWID;
+CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
 PRAGMA application_id = {_APPLICATION};
 PRAGMA user_version = {FORMAT};
 """
@@ -126,15 +127,15 @@ CREATE VIEW runs AS SELECT run_id, (SELECT name FROM suite) AS suite, settings.t
     {_ASKED_FOR} JOIN environments ON environments.id = results.environment
     ORDER BY cells.position, results.run;
 CREATE VIEW solutions AS SELECT results.run_id, movements.* {_ASKED_FOR}
-    JOIN movements ON movements.result = results.id AND part = 'solution'
+    JOIN movements ON movements.result_id = results.id AND part = 'solution'
     ORDER BY cells.position, results.run, "order";
 CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
-    JOIN waypoints ON waypoints.result = results.id
+    JOIN waypoints ON waypoints.result_id = results.id
     ORDER BY cells.position, results.run, "order", waypoint;
 """
 
-_MOVEMENT = ("result", "part", "order", "goal", "hand", "kind", "ticks")
-_WAYPOINT = ("result", "order", "waypoint")
+_MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
+_WAYPOINT = ("result_id", "order", "waypoint")
 PARTS = ("solution", "initial", "replay")
 """What is kept of a run: its solution, the first trial of a learner, and one noiseless greedy
 trial with what it has learned."""
@@ -181,7 +182,7 @@ class StoredRun(NamedTuple):
     task: Task
     method: str
     parameters: dict[str, Any]
-    model: dict[str, Any]
+    model: MotionModel
     trial_budget: int | None
     code: str
 
@@ -195,6 +196,15 @@ class Store:
         self._cells: list[tuple[int, tuple[str, ...]]] = []  # setting, and joints in their order
         self._settings: dict[tuple[str, str], int] = {}
         self._environments: dict[str, int] = {}
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        self._db.close()
+        if isinstance(error, sqlite3.DatabaseError | zlib.error):
+            with _explained(self.folder):
+                raise error
 
     # What was asked for.
 
@@ -363,7 +373,7 @@ class Store:
                         points = [] if own.waypoints is None else own.waypoints.tolist()
                         waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
                 if run.rewards:
-                    self._insert("learning", {"result": result, "rewards": _packed(run.rewards)})
+                    self._insert("learning", {"result_id": result, "rewards": _packed(run.rewards)})
             self._insert_many("movements", (*_MOVEMENT, *joints), movements)
             self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
 
@@ -379,7 +389,7 @@ class Store:
         assert setting is not None
         assert made is not None
         task = parse_task(json.loads(setting["definition"]), str(self.folder))
-        blob = self._one("SELECT rewards FROM learning WHERE result = ?", row["id"])
+        blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         own = {name: row[name] for name in RESULTS if name not in ("setting", "environment")}
         run = Run(
             own,
@@ -396,7 +406,7 @@ class Store:
             task,
             setting["method"],
             json.loads(setting["parameters"]),
-            json.loads(setting["model"]),
+            MotionModel(**json.loads(setting["model"])),
             setting["trial_budget"],
             setting["code"],
         )
@@ -421,13 +431,13 @@ class Store:
                 for name, column in zip(names, columns, strict=True)
             },
         )
-        return frame.drop(columns=[name for name in ("result", "part") if name in frame])
+        return frame.drop(columns=[name for name in ("result_id", "part") if name in frame])
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""
         rows = self._db.execute(
-            f"SELECT run_id, rewards {_ASKED_FOR} JOIN learning ON learning.result = results.id "
+            f"SELECT run_id, rewards {_ASKED_FOR} JOIN learning ON learning.result_id = results.id "
             "ORDER BY cells.position, results.run"
         )
         for run_id, blob in rows:
@@ -443,10 +453,12 @@ class Store:
             with self._db:
                 self._db.execute("BEGIN")
                 yield
-        except sqlite3.OperationalError as error:
+        except BaseException as error:
             self._environments.clear()
             self._settings.clear()
-            raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
+            if isinstance(error, sqlite3.OperationalError):
+                raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
+            raise
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
         names = ", ".join(f'"{name}"' for name in row)
@@ -498,7 +510,7 @@ class Store:
         row = self._one("SELECT id FROM results WHERE run_id = ?", run_id)
         if row is not None:
             for table in ("movements", "waypoints", "learning"):
-                self._db.execute(f"DELETE FROM {table} WHERE result = ?", (row["id"],))
+                self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (row["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (row["id"],))
 
     def _movements(self, result: int, part: str, task: Task) -> tuple[Movement, ...]:
@@ -506,11 +518,11 @@ class Store:
         points: dict[int, list[list[float]]] = {}
         if part == "solution":
             for row in self._db.execute(
-                'SELECT * FROM waypoints WHERE result = ? ORDER BY "order", waypoint', (result,)
+                'SELECT * FROM waypoints WHERE result_id = ? ORDER BY "order", waypoint', (result,)
             ):
                 points.setdefault(row["order"], []).append([row[joint] for joint in joints])
         rows = self._db.execute(
-            'SELECT * FROM movements WHERE result = ? AND part = ? ORDER BY "order"',
+            'SELECT * FROM movements WHERE result_id = ? AND part = ? ORDER BY "order"',
             (result, part),
         )
         return tuple(
@@ -538,8 +550,7 @@ def open_store(folder: Path) -> Store:
     if not path.is_file():
         _check_older(folder)
         raise CoarticError(f"{folder} is not a results folder: it has no {FILE}")
-    with _explained(folder):
-        connection = _connect(f"{path.resolve().as_uri()}?mode=rw", timeout_s=2.0)
+    with _explained(folder), _opened(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
         connection.execute("PRAGMA query_only = ON")
         if not _is_ours(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
@@ -558,23 +569,17 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    with _explained(folder):
-        connection = _connect(str(folder / FILE), timeout_s=0.0)
-        try:
-            # No write-ahead log: it is unsafe on network disks.
-            connection.execute("PRAGMA journal_mode = DELETE")
-            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-            connection.execute("BEGIN EXCLUSIVE")
-            connection.execute("COMMIT")
-            if not _is_ours(connection, folder):
-                connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
-        except BaseException:
-            connection.close()
-            raise
-    try:
-        yield Store(folder, connection)
-    finally:
-        connection.close()
+    with _explained(folder), _opened(str(folder / FILE), 0.0) as connection:
+        _is_ours(connection, folder)  # or it is left as it is
+        # No write-ahead log: it is unsafe on network disks.
+        connection.execute("PRAGMA journal_mode = DELETE")
+        connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+        connection.execute("BEGIN EXCLUSIVE")
+        connection.execute("COMMIT")
+        if not _is_ours(connection, folder):
+            connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
+    with Store(folder, connection) as store:
+        yield store
 
 
 def check_place(folder: Path) -> None:
@@ -605,6 +610,17 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
     return connection
 
 
+@contextmanager
+def _opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+    """A connection that stays open, unless something is wrong with it."""
+    connection = _connect(where, timeout_s)
+    try:
+        yield connection
+    except BaseException:
+        connection.close()
+        raise
+
+
 def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
     """Whether the file has our tables; False for an empty one."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
@@ -626,7 +642,7 @@ def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
 
 @contextmanager
 def _explained(folder: Path) -> Iterator[None]:
-    """What SQLite says when a file is opened, in words."""
+    """What SQLite says of a file, in words."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -635,8 +651,8 @@ def _explained(folder: Path) -> Iterator[None]:
                 f"another `coartic run` is at work in {folder}; wait for it, or choose another "
                 "folder"
             ) from None
-        raise CoarticError(f"cannot open {folder / FILE}: {error}") from None
-    except sqlite3.DatabaseError as error:
+        raise CoarticError(f"cannot use {folder / FILE}: {error}") from None
+    except (sqlite3.DatabaseError, zlib.error) as error:
         raise CoarticError(
             f"{folder / FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
             "command, or restore a copy."
@@ -658,11 +674,11 @@ def _unpacked(blob: bytes) -> list[int | None]:
 
 
 _TEXTS = {name for name, kind in RESULTS.items() if kind.startswith("TEXT")} | {
-    *("suite", "task", "method", "variant", "label"),
+    *("suite", "task", "method", "variant", "label", "part"),
     *("told", "parameters", "commit", "code", "packages", "hand", "kind"),
 }
 _WHOLE = {name for name, kind in RESULTS.items() if kind.startswith("INTEGER")} | {
-    *("order", "goal", "ticks", "waypoint"),
+    *("result_id", "order", "goal", "ticks", "waypoint"),
 }
 _NUMBERS = {name for name, kind in RESULTS.items() if kind == "REAL"}
 

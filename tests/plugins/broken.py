@@ -2,7 +2,6 @@
 
 import itertools
 import random
-import time
 
 from pydantic import ConfigDict
 
@@ -108,14 +107,6 @@ class Unhelpful(Good):
         return Result(by_correction(session))
 
 
-class Sleeps(Good):
-    name = "test/sleeps"
-
-    def solve(self, session):
-        time.sleep(3600)
-        return Result(())
-
-
 class Dies(Good):
     name = "test/dies"
 
@@ -183,20 +174,6 @@ class Quits(Good):
         raise SystemExit(0)
 
 
-class Nothing(Good):
-    name = "test/nothing"
-
-    def solve(self, session):
-        return None
-
-
-class NotANumber(Good):
-    name = "test/nan"
-
-    def solve(self, session):
-        return Result(by_correction(session), {"value": float("nan")})
-
-
 class Pretender(Good):
     """Names its details like the learner's columns."""
 
@@ -204,115 +181,3 @@ class Pretender(Good):
 
     def solve(self, session):
         return Result(by_correction(session), {"replay_reward": -1, "best_trial": "third"})
-
-
-class WrongHand(Good):
-    name = "test/wrong-hand"
-    told = CORRECTIVE | {Information.REWARD_BY_TRIAL}
-
-    def solve(self, session):
-        session.trial([Movement(1, "middle", "corrective")])
-        return Result(())
-
-
-class Smuggler(Good):
-    """Puts waypoints, which move a locked base, where none are looked for."""
-
-    name = "test/smuggler"
-
-    def solve(self, session):
-        q = session.q0
-        away = q.copy()
-        away[1] -= 1.0
-        solution = by_correction(session)
-        first = Movement(1, session.hands[-1], "planned", q, waypoints=[away])
-        return Result((first, *solution))
-
-
-class SegFaults(Good):
-    name = "test/segfaults"
-
-    def solve(self, session):
-        import os
-        import signal
-
-        os.kill(os.getpid(), signal.SIGSEGV)
-        return Result(())
-
-
-class Naps(Good):
-    """Takes a while, in which it can be stopped from outside."""
-
-    name = "test/naps"
-
-    def solve(self, session):
-        time.sleep(0.5)
-        return Result(by_correction(session))
-
-
-class Leaver(Good):
-    """Leaves a process of a session of its own behind."""
-
-    name = "test/leaver"
-
-    def solve(self, session):
-        import os
-
-        if not os.fork():
-            os.setsid()
-            if not os.fork():
-                os.execvp("sleep", ["sleep", "61.7"])
-            os._exit(0)
-        return Result(by_correction(session), {"pid": os.getpid()})
-
-
-class Stayer(Leaver):
-    """Does so, and never returns."""
-
-    name = "test/stayer"
-
-    def solve(self, session):
-        super().solve(session)
-        time.sleep(3600)
-        return Result(())
-
-
-class Chatterbox(Good):
-    """Prints a lot, hands over too much, and then dies."""
-
-    name = "test/chatterbox"
-
-    def solve(self, session):
-        import os
-
-        for _ in range(300):
-            os.write(2, b"\x1b[31m" + b"noise " * 1000 + b"\n")
-        os._exit(3)
-
-
-class Hoarder(Good):
-    name = "test/hoarder"
-
-    def solve(self, session):
-        return Result(by_correction(session), {"all": "x" * 1_200_000})
-
-
-class Stepper(Good):
-    """Takes giant steps, and says so nowhere."""
-
-    name = "test/stepper"
-
-    def solve(self, session):
-        import coartic.benchmarks.harness
-        import coartic.runs.scores
-
-        session.model = session.model._replace(step=1.0)
-        coartic.benchmarks.harness.solved = coartic.runs.scores.solved = None
-        return Result(by_correction(session))
-
-
-class Prover(Good):
-    name = "test/prover"
-
-    def solve(self, session):
-        return Result(by_correction(session), bound=-1)

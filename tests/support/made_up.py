@@ -1,22 +1,28 @@
 """Rows of runs that nobody ran, for what is computed of them."""
 
+from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 
 import pandas as pd
 
 from coartic import load_task
-from coartic.analysis.results.folder import Results
-from coartic.analysis.results.optima import KnownOptimum
+from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.study import Study
-from coartic.runs.record import Commit, Environment
-from coartic.runs.tables import Manifest, Plan, PlanLimits, PlannedCell
+from coartic.runs.plan import Plan, PlannedCell
+
+MADE_WITH = {
+    "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},
+    "python": "3", "packages": {}, "platform": "here", "processor": "one", "cores": 2,
+    "date": "today", "command": [],
+}  # fmt: skip
 
 
 class MadeUp(Study):
-    """A study with some of its parts made up: ``MadeUp(results, signatures=...)``."""
+    """A study with some of its parts made up: ``MadeUp(study, optima=...)``."""
 
-    def __init__(self, results, **parts):
-        super().__init__(results)
+    def __init__(self, study, **parts):
+        super().__init__(study.folder, study.plan, study.made_with, study.runs)
         for name in parts:
             assert isinstance(getattr(Study, name), cached_property)
         vars(self).update(parts)
@@ -52,38 +58,26 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
     }  # fmt: skip
 
 
-def planned(task, method, variant=""):
-    """A cell of a plan."""
-    return PlannedCell(task=task, method=method, variant=variant, parameters={}, complete={})
-
-
-def manifest_for(tasks, runs=None, *, trials=10_000):
-    """A manifest with these tasks and the cells that the rows of runs are of."""
+def plan_for(tasks, runs=None, *, trials=10_000, **more):
+    """A plan with these tasks and the cells that the rows of runs are of."""
     keys = ["task", "method", "variant"]
     rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
     plan = Plan(
-        suite="paper", runs=3, seed=0, trials=trials, methods={}, readings=(),
-        tasks={task.name: task.model_dump(mode="json") for task in tasks},
-        cells=tuple(planned(**row) for row in rows),
+        suite="paper", runs=3, seed=0, trials=trials, methods={}, readings=(), time_limit_s=None,
+        trial_budget=None, tasks={task.name: task.model_dump(mode="json") for task in tasks},
+        cells=tuple(PlannedCell(parameters={}, complete={}, runs=3, **row) for row in rows),
     )  # fmt: skip
-    environment = Environment(
-        coartic="0", model_code="code", commit=Commit(id="abc4567", dirty=True), python="3",
-        packages={}, platform="here", processor="one", cores=2, date="today", command=(),
-        threads=None,
-    )  # fmt: skip
-    limits = PlanLimits(time_s=None, trials=None)
-    return Manifest(
-        specification=plan, limits=limits, environment=environment, records="", tables={}
-    )
+    return replace(plan, **more)
 
 
-def replanned(manifest, **update):
-    """A manifest with another plan, unchecked: there may be no such folder."""
-    plan = manifest.specification.model_copy(update=update)
-    return manifest.model_copy(update={"specification": plan})
+def study_of(runs, tasks, *, folder="made-up", trials=10_000, **more):
+    """A study of rows of runs on tasks."""
+    plan = plan_for(tasks, runs, trials=trials, **more)
+    return Study(Path(folder), plan, MADE_WITH, runs)
 
 
-def fake_results(tmp_path, runs, *, task="two-armed-1", method="dual-process/EC2"):
+def fake_study(runs, *, task="two-armed-1", method="dual-process/EC2"):
+    """A study of one cell, of rows that say no more than what is asked about."""
     frame = pd.DataFrame(runs).assign(
         task=task,
         method=method,
@@ -101,6 +95,4 @@ def fake_results(tmp_path, runs, *, task="two-armed-1", method="dual-process/EC2
         solve_s=0.1, wall_s=0.2, warm=True, together=1, solution_corrections=0, proven_bound=None,
     )  # fmt: skip
     frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
-    sequences = pd.DataFrame({"task": [], "hands": [], "reward": [], "reason": []})
-    manifest = manifest_for([load_task(task)], frame)
-    return Results(tmp_path, manifest, frame, sequences)
+    return study_of(frame, [load_task(task)])

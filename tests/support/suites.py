@@ -1,76 +1,45 @@
 """Suites run into folders, in this process where processes are not what is tested."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
 
-from coartic import CoarticError, load_task
-from coartic.analysis.results.folder import load_results
-from coartic.analysis.results.laws import read_manifest
-from coartic.benchmarks.declaration import MethodFileError, brief
-from coartic.benchmarks.harness import perform_missing
+from coartic import load_task
+from coartic.analysis.study import load
+from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import plan_cells
-from coartic.benchmarks.sandbox import failure
-from coartic.benchmarks.specification import Limits
-from coartic.benchmarks.suites import Cell, cell_plans, load_suite, select_cells
-from coartic.benchmarks.worker import answer, perform
-from coartic.runs.tables import TIMINGS
+from coartic.benchmarks.suites import Cell, load_suite, select_cells
+from coartic.benchmarks.worker import perform
+from coartic.runs.store import TIMINGS
 
 ROOT = Path(__file__).parents[2]
-
-
-KNOWN = registry()
-
-
-def run_specs(cells, **options):
-    """Every run of every cell, in order, as :func:`coartic.benchmarks.suites.cell_plans` has
-    them."""
-    return [(plan.cell, spec) for plan in cell_plans(cells, **options) for spec in plan.specs()]
-
-
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
-
-
-def ask_here(foreign, **question):
-    """As :mod:`coartic.benchmarks.registry` asks a method that is not built in, without a
-    process."""
-    try:
-        return answer({**question, "foreign": foreign.model_dump(mode="json")})
-    except Exception as error:
-        said = str(error) if isinstance(error, CoarticError) else brief(error)
-        raise MethodFileError(said) from None
-
-
-def performed(job):
-    """The answer to a job, without a process for it."""
-    said = {"error": None, "answer": perform(json.loads(json.dumps(job)))}
-    return {"run_id": job["run_id"], "outcome": json.dumps(said)}
+KNOWN = registry()
 
 
 class InProcess:
     """An executor without processes, for tests of everything else."""
 
+    workers = 1
+
     def __init__(self, jobs=1):
         pass
 
     def perform(self, jobs):
-        yield from map(performed, jobs)
+        yield from enumerate(map(perform, jobs))
 
 
 class Failing(InProcess):
-    """An executor that loses the workers of some runs, by their number in the plan."""
+    """An executor that loses the workers of some jobs, by their number."""
 
     def __init__(self, *numbers):
         self.numbers = numbers
 
     def perform(self, jobs):
         for number, job in enumerate(jobs):
-            if number in self.numbers:
-                yield failure(job["run_id"], "crashed", "exit code 9", 1.0)
-            else:
-                yield from super().perform([job])
+            lost = number in self.numbers
+            yield number, Failure("crashed", "exit code 9", 1.0) if lost else perform(job)
 
 
 def paper_cells(**selection):
@@ -84,48 +53,35 @@ def suite_of(tmp_path, *blocks):
     return select_cells(load_suite(str(path)), KNOWN)
 
 
-def perform_plan(specs, store, executor, **options):
-    """Runs without a suite around them."""
-    with store.locked():
-        return perform_missing(specs, store, executor, **options)
-
-
-def run_and_write(folder, cells=None, runs=2, trials=150, seed=0, executor=None, **options):
-    limits = options.pop("limits", Limits(300.0))
-    plan = plan_cells(
+def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial_budget=None):
+    """A plan of some cells, or of those of the paper."""
+    return plan_cells(
         load_suite("paper"),
-        cells or paper_cells(),
+        paper_cells() if cells is None else cells,
         runs=runs,
         trials=trials,
         seed=seed,
-        limits=limits,
+        time_limit_s=time_limit_s,
+        trial_budget=trial_budget,
     )
-    plan.perform(folder, executor=executor or InProcess(), **options)
-    return load_results(folder)
 
 
-def same_tables(a, b):
-    pd.testing.assert_frame_equal(
-        a.runs.drop(columns=list(TIMINGS)), b.runs.drop(columns=list(TIMINGS))
-    )
-    for table in ("solutions", "paths", "learning"):
-        pd.testing.assert_frame_equal(getattr(a, table)(), getattr(b, table)())
-    pd.testing.assert_frame_equal(a.sequences, b.sequences)
+def run_and_write(folder, cells=None, *, executor=None, retry_failed=False, redo=False, **options):
+    """Perform such a plan into a folder; what the folder then says."""
+    plan = planned(cells, **options)
+    executor = executor or InProcess()
+    plan.perform(folder, executor=executor, retry_failed=retry_failed, redo=redo)
+    return load(folder)
 
 
-def spec_of(known, name, limits=Limits(60.0), runs=1):  # noqa: B008
-    cell = Cell(load_task("ascending"), known[name])
-    return [spec for _, spec in run_specs([cell], runs=runs, seed=0, trials=5, limits=limits)]
-
-
-def with_environment(folder):
-    """The folder as if somebody had asked for it by the command line, at home."""
-    manifest = read_manifest(folder)
-    command = ("coartic", "run", "paper", "--out", "/home/somebody/results/x")
-    environment = manifest.environment.model_copy(update={"command": command})
-    manifest = manifest.model_copy(update={"environment": environment})
-    (folder / "manifest.json").write_text(manifest.text(), encoding="utf-8")
-    return load_results(folder)
+def same_results(a, b):
+    """Two studies agree in all but times."""
+    times = [*TIMINGS, "date"]
+    pd.testing.assert_frame_equal(a.runs.drop(columns=times), b.runs.drop(columns=times))
+    pd.testing.assert_frame_equal(a.solutions, b.solutions)
+    for (first, ours), (second, theirs) in zip(a.rewards(), b.rewards(), strict=True):
+        assert first == second
+        assert ours.tolist() == theirs.tolist()
 
 
 def traced_cells():

@@ -1,9 +1,8 @@
 """The model written as the paper prints it: one step at a time, in plain NumPy.
 
-Slow and obvious. Movement, corrective process and learner share the robot's formulas
-with the rest of the package and nothing of its kernels, which are tested against them,
-trial by trial, and timed against them (benchmarks/speed.py); only a policy's initial
-hands are taken over. Draws from its generator in the same order as the learner.
+Slow and obvious. Movement, corrective process and learner share the robot's formulas with the rest
+of the package and nothing of its kernels, which are tested against them, trial by trial; only a
+policy's initial hands are taken over. Draws from its generator in the same order as the learner.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The optimum of each task: the best reward known, what is proven about it, and by which runs.
 
 ``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids and the
-solutions; ``python -m coartic.analysis.results.optima FOLDER`` makes it from the results folder of
+solutions; ``python -m coartic.analysis.renew_optima FOLDER`` makes it from the results folder of
 that suite. Searches for the optimum in a results folder of the user's own count as well, so a
 table for the user's own task has gaps as soon as the task's optimum is among its runs.
 """
@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -20,16 +19,13 @@ from typing import Any, Literal
 import pandas as pd
 from pydantic import BaseModel, ConfigDict
 
-from coartic import PAPER, CoarticError, Task
-from coartic.analysis.results.folder import Results, load_results
-from coartic.analysis.results.laws import BASE
-from coartic.files import write_atomically
-from coartic.runs.record import SEARCH
-from coartic.runs.tables import label_of
-from coartic.text import one_line
+from coartic import PAPER, MotionModel, Task
+from coartic.runs.plan import SEARCH, label_of
 
+BASE = "task"
+"""Base locked as the task has it: the case that rewards compare with."""
 DATA = Path(__file__).with_name("optima.json")
-SHIPPED = f"shipped data (analysis/results/{DATA.name})"
+SHIPPED = f"shipped data (analysis/{DATA.name})"
 
 OtherArm = Literal["free", "still"]
 ARMS: tuple[OtherArm, ...] = ("free", "still")
@@ -99,7 +95,9 @@ class KnownOptimum:
         return f"{'proven' if self.proven else 'not proven'}; {self.source}"
 
 
-def known_optima(results: Results) -> dict[tuple[str, str], KnownOptimum]:
+def known_optima(
+    runs: pd.DataFrame, tasks: Mapping[str, Task], model: MotionModel
+) -> dict[tuple[str, str], KnownOptimum]:
     """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
 
     What the shipped data say where task and model are the same in all that matters, bettered by
@@ -107,18 +105,13 @@ def known_optima(results: Results) -> dict[tuple[str, str], KnownOptimum]:
     Searches of an instance of a family are short, and any run of the folder may better them.
     """
     found: dict[tuple[str, str], KnownOptimum] = {}
-    runs = results.runs
     solved = runs[runs.method.str.startswith(SEARCH) & (runs.status == "ok")]
-    for name, task in results.tasks.items():
+    for name, task in tasks.items():
         own = solved[solved.task == name]
         for arm in ARMS:
             searches = dict(_searches(own, arm))
-            candidates = [_from_runs(pd.concat(list(searches.values())))] if searches else []
-            entry = (
-                _shipped().get((essence(task), arm))
-                if results.manifest.specification.model == PAPER
-                else None
-            )
+            candidates = [from_runs(pd.concat(list(searches.values())))] if searches else []
+            entry = _shipped().get((essence(task), arm)) if model == PAPER else None
             if entry is not None and entry.reward is not None:
                 best = tuple(entry.searches.items())
                 candidates.append(KnownOptimum(entry.reward, entry.hands, entry.bound, best))
@@ -152,66 +145,17 @@ def entries() -> list[ShippedOptimum]:
     return [ShippedOptimum.model_validate(entry) for entry in content["optima"]]
 
 
-def collect(results: Results) -> list[ShippedOptimum]:
-    """Entries of ``optima.json`` from a results folder of suite ``optimum``.
-
-    Raises CoarticError where the folder has no searches for the optimum.
-    """
-    runs = results.runs[results.runs.method.str.startswith(SEARCH)]
-    if not len(runs):
-        raise CoarticError(f"{results.folder}: has no runs of methods {SEARCH}*")
-    runs = runs.join(_restrictions(runs))
-    movements = results.solutions()
-    environment = results.manifest.environment.model_dump(mode="json")
-    keys = ("coartic", "commit", "model_code", "python", "date")
-    made_by = {key: environment[key] for key in keys}
-    found = []
-    for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
-        name, base, arm = map(str, key)
-        good = group[group.status == "ok"]
-        facts: dict[str, Any] = {"infeasible": group.reason.iloc[0]}
-        if len(good):
-            best = _from_runs(good)
-            first = good.iloc[int(good.reward.astype(int).argmax())].run_id
-            rows = movements[movements.run_id == first].drop(columns="run_id")
-            facts = {key: getattr(best, key) for key in ("reward", "hands", "bound")}
-            facts |= {"searches": dict(best.searches), "solution": rows.to_dict("records")}
-        entry = ShippedOptimum(
-            task=name,
-            essence=essence(results.tasks[name]),
-            base=base,
-            other_arm=arm,
-            run_ids=tuple(sorted(group.run_id)),
-            made_by=made_by,
-            **facts,
-        )
-        found.append(entry)
-    return found
-
-
-def renew(new: Iterable[ShippedOptimum]) -> int:
-    """Put entries into ``optima.json`` in the place of those about the same; how many stay."""
-    kept = {entry.key: entry for entry in entries()}
-    renewed = {entry.key: entry for entry in new}
-    content = [
-        entry.model_dump(exclude_unset=True) for _, entry in sorted((kept | renewed).items())
-    ]
-    text = json.dumps({"optima": content}, indent=1, ensure_ascii=False)
-    write_atomically(DATA, f"{text}\n".encode())
-    return len(kept.keys() - renewed.keys())
-
-
 def _searches(solved: pd.DataFrame, arm: str) -> Iterator[tuple[tuple[str, str], pd.DataFrame]]:
     """Of solved searches those with this other arm and the task's own base, by cell."""
     if not len(solved):
         return
-    asked = _restrictions(solved)
+    asked = restrictions(solved)
     kept = solved[(asked.base == BASE) & (asked.other_arm == arm)]
     for (task, method, variant), own in kept.groupby(["task", "method", "variant"], sort=False):
         yield (str(task), label_of(str(method), str(variant))), own
 
 
-def _restrictions(runs: pd.DataFrame) -> pd.DataFrame:
+def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     """Lock of the base and other arm of each run, by its parameters."""
     known = {"base": BASE, "other_arm": "free"}
     asked = {text: known | json.loads(text) for text in runs.parameters.unique()}
@@ -220,7 +164,8 @@ def _restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _from_runs(runs: pd.DataFrame) -> KnownOptimum:
+def from_runs(runs: pd.DataFrame) -> KnownOptimum:
+    """The best of these solved runs, with the lowest bound that they prove."""
     best = runs.iloc[int(runs.reward.astype(int).argmax())]
     bounds = runs.proven_bound.dropna()
     searches = runs.groupby("method").reward.max()
@@ -265,22 +210,3 @@ def _bettered(known: KnownOptimum, runs: pd.DataFrame) -> KnownOptimum:
 def _shipped() -> dict[tuple[str, str], ShippedOptimum]:
     """Entries with the task's own base, by the task's essence and the other arm."""
     return {(entry.essence, entry.other_arm): entry for entry in entries() if entry.base == BASE}
-
-
-def main() -> None:
-    """``python -m coartic.analysis.results.optima FOLDER``: renew entries of ``optima.json``."""
-    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
-        sys.exit(
-            "usage: python -m coartic.analysis.results.optima RESULTS_FOLDER\n"
-            f"Renews in {DATA} what the folder's optimum runs cover; the rest stays."
-        )
-    try:
-        new = collect(load_results(Path(sys.argv[1])))
-    except CoarticError as error:
-        sys.exit(one_line(str(error)))
-    kept = renew(new)
-    print(f"{DATA}: {len(new)} optima renewed, {kept} kept")
-
-
-if __name__ == "__main__":
-    main()

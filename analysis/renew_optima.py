@@ -1,0 +1,81 @@
+"""Make the shipped optima anew from the results of suite ``optimum``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+from coartic import CoarticError
+from coartic.analysis.optima import DATA, ShippedOptimum, entries, essence, from_runs, restrictions
+from coartic.analysis.study import Study, load
+from coartic.files import write_atomically
+from coartic.runs.plan import SEARCH
+from coartic.text import one_line
+
+
+def collect(study: Study) -> list[ShippedOptimum]:
+    """Entries of ``optima.json`` from a results folder of suite ``optimum``.
+
+    Raises CoarticError where the folder has no searches for the optimum.
+    """
+    runs = study.runs[study.runs.method.str.startswith(SEARCH)]
+    if not len(runs):
+        raise CoarticError(f"{study.folder}: has no runs of methods {SEARCH}*")
+    runs = runs.join(restrictions(runs))
+    keys = ("coartic", "commit", "model_code", "python", "date")
+    made_by = {key: study.made_with[key] for key in keys}
+    found = []
+    for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
+        name, base, arm = map(str, key)
+        good = group[group.status == "ok"]
+        facts: dict[str, Any] = {"infeasible": group.reason.iloc[0]}
+        if len(good):
+            best = from_runs(good)
+            first = good.iloc[int(good.reward.astype(int).argmax())].run_id
+            rows = study.solutions[study.solutions.run_id == first].drop(columns="run_id")
+            facts = {key: getattr(best, key) for key in ("reward", "hands", "bound")}
+            facts |= {"searches": dict(best.searches), "solution": rows.to_dict("records")}
+        entry = ShippedOptimum(
+            task=name,
+            essence=essence(study.tasks[name]),
+            base=base,
+            other_arm=arm,
+            run_ids=tuple(sorted(group.run_id)),
+            made_by=made_by,
+            **facts,
+        )
+        found.append(entry)
+    return found
+
+
+def renew(new: Iterable[ShippedOptimum]) -> int:
+    """Put entries into ``optima.json`` in the place of those about the same; how many stay."""
+    kept = {entry.key: entry for entry in entries()}
+    renewed = {entry.key: entry for entry in new}
+    content = [
+        entry.model_dump(exclude_unset=True) for _, entry in sorted((kept | renewed).items())
+    ]
+    text = json.dumps({"optima": content}, indent=1, ensure_ascii=False)
+    write_atomically(DATA, f"{text}\n".encode())
+    return len(kept.keys() - renewed.keys())
+
+
+def main() -> None:
+    """``python -m coartic.analysis.renew_optima FOLDER``: renew entries of ``optima.json``."""
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        sys.exit(
+            "usage: python -m coartic.analysis.renew_optima RESULTS_FOLDER\n"
+            f"Renews in {DATA} what the folder's optimum runs cover; the rest stays."
+        )
+    try:
+        new = collect(load(sys.argv[1]))
+    except CoarticError as error:
+        sys.exit(one_line(str(error)))
+    kept = renew(new)
+    print(f"{DATA}: {len(new)} optima renewed, {kept} kept")
+
+
+if __name__ == "__main__":
+    main()

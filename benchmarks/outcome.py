@@ -1,0 +1,219 @@
+"""From what a worker states of runs to the runs that are kept: executed and scored here, where the
+method has never been."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from coartic.benchmarks.pool import Failure
+from coartic.benchmarks.provenance import environment, now
+from coartic.benchmarks.registry import Entry
+from coartic.benchmarks.worker import Answer, Outcome, PlainMovement
+from coartic.errors import IncompleteError, SolutionError
+from coartic.learner.kernel import PARTS as TENTHS
+from coartic.learner.learning import CORRECTIONS
+from coartic.method import Information, Meter
+from coartic.model import MotionModel
+from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel
+from coartic.robot import Hand
+from coartic.runs.plan import SEARCH
+from coartic.runs.store import PARTS, RESULTS, Environment, Run
+from coartic.tasks.task import Task, hands_of
+from coartic.text import LONGEST_REASON, plain
+
+MOST_MOVEMENTS = 10_000
+"""Movements of one solution."""
+MOST_STEPS = 1_000_000
+"""Movement steps along one solution, its targets visited in order: thousands do."""
+_STATUSES = frozenset({"ok", "infeasible", "solver-failed", "crashed"})
+_EMPTY = dict.fromkeys(RESULTS)
+
+
+def kept(
+    names: Sequence[Mapping[str, Any]],
+    answer: Answer | Failure,
+    task: Task,
+    entry: Entry,
+    model: MotionModel,
+) -> list[Run]:
+    """The runs of a job as they are kept, also of one that failed.
+
+    ``names`` are what identifies each: its id, number, seed and so on.
+    """
+    if isinstance(answer, Failure):
+        times: dict[str, Any] = {"wall_s": answer.wall_s}
+        return [_run(name, Outcome(answer.status, answer.reason), {}, times) for name in names]
+    times = {
+        "wall_s": answer.wall_s / len(names),
+        "cpu_s": answer.cpu_s / len(names),
+        "warm": answer.warm,
+        "together": len(names),
+        "process_peak_mb": answer.process_peak_mb,
+    }
+    made_with = environment() if answer.environment is None else Environment(**answer.environment)
+    outcomes = [_believed(outcome, entry) for outcome in answer.outcomes]
+    parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
+    found = scored(
+        task, [list(map(_movement, outcomes[n].parts[part])) for n, part in parts], model
+    )
+    executions: list[dict[str, Execution]] = [{} for _ in outcomes]
+    for (n, part), execution in zip(parts, found, strict=True):
+        if isinstance(execution, Execution):
+            executions[n][part] = execution
+        elif isinstance(execution, IncompleteError):
+            outcomes[n] = _ended(outcomes[n], "infeasible", str(execution))
+        else:
+            why = f"the solution cannot be executed: {execution}"
+            outcomes[n] = _ended(outcomes[n], "solver-failed", why)
+    return [
+        _run(name, outcome, own if outcome.status == "ok" else {}, times, task, made_with)
+        for name, outcome, own in zip(names, outcomes, executions, strict=True)
+    ]
+
+
+def scored(
+    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel
+) -> list[Execution | Exception]:
+    """Execute solutions side by side: the only scores that count.
+
+    In place of an execution, a SolutionError for a solution that breaks the task's rules, an
+    IncompleteError for one that does not hit every goal.
+    """
+    too_long = [_too_long(task, solution, model) for solution in solutions]
+    good = [own for own, error in zip(solutions, too_long, strict=True) if error is None]
+    made = iter(execute_many(task, good, model=model))
+    found: list[Execution | Exception] = []
+    for error in too_long:
+        execution = next(made) if error is None else error
+        if isinstance(execution, Execution) and not execution.completed:
+            found.append(IncompleteError(execution.reason))
+        else:
+            found.append(execution)
+    return found
+
+
+def _too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
+    """What is wrong with a solution that would take very long to execute."""
+    if len(solution) > MOST_MOVEMENTS:
+        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
+    corners = [task.q0]
+    for movement in solution:
+        corners += [] if movement.waypoints is None else list(movement.waypoints)
+        corners += [] if movement.target is None else [movement.target]
+    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
+        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / model.step
+        if steps > MOST_STEPS:
+            return SolutionError(
+                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+            )
+    return None
+
+
+def _believed(outcome: Outcome, entry: Entry) -> Outcome:
+    """An outcome, or what becomes of one that its method cannot have."""
+    used = {*outcome.used}
+    solution = outcome.parts.get("solution", [])
+    if any(kind == "corrective" and target is None for _, _, kind, target, _ in solution):
+        used.add(Information.CORRECTIVE_PROCESS.value)
+    undeclared = sorted(used - {*entry.told})
+    if undeclared:
+        why = f"the method used {undeclared[0]!r}, which it does not declare"
+        return Outcome("crashed", why)
+    if outcome.status not in _STATUSES:
+        return Outcome("solver-failed", f"it states the status {outcome.status!r}")
+    if outcome.bound is not None and not entry.name.startswith(SEARCH):
+        why = f"it states a bound, which is for this project's methods {SEARCH}*"
+        return Outcome("solver-failed", why)
+    if outcome.status != "ok":
+        return replace(outcome, parts={}, bound=None)
+    return replace(outcome, parts={"solution": [], **outcome.parts})
+
+
+def _ended(outcome: Outcome, status: str, reason: str) -> Outcome:
+    """An outcome whose solution is none."""
+    return replace(outcome, status=status, reason=reason, parts={}, bound=None)
+
+
+def _movement(row: PlainMovement) -> Movement:
+    goal, hand, kind, target, waypoints = row
+    return Movement(
+        goal,
+        hand,  # type: ignore[arg-type]
+        kind,  # type: ignore[arg-type]
+        None if target is None else np.array(target),
+        waypoints=None if waypoints is None else np.array(waypoints),
+    )
+
+
+def _run(
+    name: Mapping[str, Any],
+    outcome: Outcome,
+    executions: Mapping[str, Execution],
+    times: Mapping[str, Any],
+    task: Task | None = None,
+    made_with: Environment | None = None,
+) -> Run:
+    """A run as it is kept."""
+    solution = executions.get("solution")
+    rewards = outcome.rewards
+    corrections: Any = outcome.details.get(CORRECTIONS)
+    counted = isinstance(corrections, list) and len(corrections) == 1 + TENTHS
+    row = {
+        **_EMPTY,
+        **name,
+        **times,
+        **{key: outcome.meter.get(key) for key in vars(Meter())},
+        "status": outcome.status,
+        "reason": "" if outcome.status == "ok" else _reason(outcome.reason),
+        "early_corrections": corrections[1] if counted else None,
+        "late_corrections": corrections[-1] if counted else None,
+        "proven_bound": outcome.bound,
+        "date": now(),
+        "used": ", ".join(outcome.used),
+        "details": json.dumps(outcome.details),
+    }
+    for prefix, part in (("", "solution"), ("initial_", "initial"), ("replay_", "replay")):
+        if (execution := executions.get(part)) is not None:
+            row |= {f"{prefix}reward": execution.reward, f"{prefix}hands": execution.hands}
+    if solution is not None:
+        assert task is not None
+        hands: Sequence[Hand] = hands_of(solution.hands)
+        row |= {
+            "best_trial": rewards.index(solution.reward) if solution.reward in rewards else None,
+            "solution_corrections": solution.corrections,
+            "other_arm_travel": other_arm_travel(task, hands, solution.configurations),
+        }
+    movements = {part: execution.movements for part, execution in executions.items()}
+    del row["setting"], row["environment"]
+    row["result"] = result_of(row, movements, rewards)
+    return Run(row, made_with or environment(), movements, rewards)
+
+
+def result_of(
+    row: Mapping[str, Any],
+    movements: Mapping[str, Sequence[Movement]],
+    rewards: Sequence[int | None],
+) -> str:
+    """Hash of status, solutions to the last joint, rewards of all trials, bound.
+
+    Equal for runs that came out the same, whatever was spent on the way.
+    """
+    parts: list[Any] = [row["status"], row["proven_bound"], list(rewards)]
+    for part in PARTS:
+        for own in movements.get(part, ()):
+            assert own.target is not None
+            points = None if own.waypoints is None else own.waypoints.tolist()
+            parts.append(
+                [part, own.goal, own.hand, own.kind, own.ticks, own.target.tolist(), points]
+            )
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+
+def _reason(text: str) -> str:
+    return plain(text, LONGEST_REASON) or "it gave no reason"

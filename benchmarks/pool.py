@@ -1,0 +1,246 @@
+"""Worker processes on this machine, with a time limit for each run.
+
+Methods of this project share workers; any other method has workers of its own. On Linux these may
+write to a temporary folder of theirs alone: that keeps a careless method out of the results, of
+other methods and of the kernels.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from copy import copy
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol, runtime_checkable
+
+from pebble import ProcessExpired, ProcessPool
+
+from coartic.benchmarks.provenance import THREADS
+from coartic.benchmarks.worker import Answer, Job, learns, perform, prepare
+from coartic.errors import CoarticError
+from coartic.learner.learning import threads_for
+from coartic.text import plain
+
+_AHEAD = 2  # jobs a worker that wait for it
+_LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
+_LAST_WORDS = 3  # lines of what a worker that died has printed
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a job has no answer."""
+
+    status: str
+    """``timeout`` or ``crashed``."""
+    reason: str
+    wall_s: float
+
+
+@runtime_checkable
+class Executor(Protocol):
+    """Performs jobs, somewhere."""
+
+    @property
+    def workers(self) -> int:
+        """How many at once."""
+        ...
+
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+        """The number of each job with its answer, as they come, in any order."""
+        ...
+
+
+class Local:
+    """Worker processes on this machine; ``jobs`` of them, or one a core."""
+
+    def __init__(self, jobs: int = -1) -> None:
+        self.workers = threads_for(jobs)
+
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+        """The number of each job with its answer, as they come."""
+        numbered = sorted(enumerate(jobs), key=lambda pair: _owner(pair[1]))
+        for owner, own in groupby(numbered, key=lambda pair: _owner(pair[1])):
+            yield from self._perform(list(own), foreign=bool(owner))
+
+    def _perform(
+        self, jobs: list[tuple[int, Job]], *, foreign: bool
+    ) -> Iterator[tuple[int, Answer | Failure]]:
+        workers = min(self.workers, len(jobs))
+        kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
+        tasks = [(task, own) for (_, own), task in kernels.items()]
+        with tempfile.TemporaryDirectory(prefix="coartic-") as folder, _one_thread_each():
+            pool = ProcessPool(
+                workers, initializer=_begin, initargs=(folder, foreign, workers, tasks),
+                context=_context(),
+            )  # fmt: skip
+            running: dict[Future[Answer], tuple[int, float]] = {}
+            waiting = iter(jobs)
+            try:
+                while True:
+                    for number, job in waiting:
+                        future: Any = pool.schedule(perform, args=(job,), timeout=job.time_limit_s)
+                        running[future] = number, time.monotonic()
+                        if len(running) == (1 + _AHEAD) * workers:
+                            break
+                    if not running:
+                        break
+                    done, _ = wait(running, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        number, started = running.pop(future)
+                        seconds = time.monotonic() - started
+                        yield number, _answer(future, jobs, number, seconds, Path(folder))
+            except RuntimeError:  # the pool's own
+                said = {_last_words(file) for file in Path(folder).glob("*.txt")}
+                raise CoarticError(
+                    f"worker processes cannot begin ({'; '.join(sorted(said))}); finished runs are "
+                    "kept"
+                ) from None
+            finally:
+                pool.stop()  # type: ignore[no-untyped-call]
+                pool.join()
+
+
+def _owner(job: Job) -> str:
+    """Whose workers perform a job: this project's methods share theirs."""
+    return "" if job.is_ours else f"{job.method} {job.code}"
+
+
+def _answer(
+    future: Future[Answer], jobs: list[tuple[int, Job]], number: int, seconds: float, folder: Path
+) -> Answer | Failure:
+    try:
+        return future.result()
+    except TimeoutError:
+        limit = dict(jobs)[number].time_limit_s or seconds
+        return Failure("timeout", f"time limit of {limit:g} s exceeded", limit)
+    except ProcessExpired as error:
+        how = f"exit code {error.exitcode}"
+        if error.exitcode is not None and error.exitcode < 0:
+            with contextlib.suppress(ValueError):
+                how = f"killed by {signal.Signals(-error.exitcode).name}"
+        reason = f"the worker process ended ({how}): {_last_words(folder / f'{error.pid}.txt')}"
+        return Failure("crashed", reason, seconds)
+    except BrokenProcessPool:
+        raise
+    except Exception as error:  # its answer cannot be read
+        return Failure("crashed", plain(f"{type(error).__name__}: {error}"), seconds)
+
+
+def _last_words(file: Path) -> str:
+    try:
+        lines = file.read_text(errors="replace").strip().splitlines()
+    except OSError:
+        lines = []
+    return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
+
+
+def _begin(
+    folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
+) -> None:
+    """What a worker does first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+    said = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
+    os.dup2(said, 1)
+    os.dup2(said, 2)
+    if sys.platform == "linux":
+        kill_with_parent = 1  # PR_SET_PDEATHSIG
+        ctypes.CDLL(None).prctl(kill_with_parent, signal.SIGKILL, 0, 0, 0)
+    _bound_memory(workers)
+    prepare(tasks)
+    if foreign:
+        own = tempfile.mkdtemp(dir=folder)
+        os.environ["TMPDIR"] = own
+        tempfile.tempdir = own
+        os.chdir(own)
+        confine(Path(folder))
+
+
+def _bound_memory(workers: int) -> None:
+    """A method that allocates without end gets a MemoryError, not the whole machine."""
+    try:
+        import resource
+
+        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (ImportError, ValueError, OSError):
+        return
+    share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
+    resource.setrlimit(resource.RLIMIT_DATA, (share, share))
+
+
+def confine(folder: Path) -> None:
+    """Let this process write below a folder alone, for good, where the system can (Linux 5.13 with
+    Landlock); nothing where it cannot."""
+    if sys.platform != "linux":
+        return
+    libc = ctypes.CDLL(None, use_errno=True)
+    create, add, restrict = 444, 445, 446  # of system calls
+    # Write and remove files, make them of all kinds; not what later versions added.
+    writes = sum(1 << bit for bit in (1, 4, 5, 6, 7, 8, 9, 10, 11, 12))
+    rights = ctypes.c_uint64(writes)
+    rules = libc.syscall(create, ctypes.byref(rights), ctypes.sizeof(rights), 0)
+    if rules < 0:
+        return
+    for allowed in (folder, Path("/dev/null"), Path("/dev/shm")):
+        with contextlib.suppress(OSError):
+            place = os.open(allowed, os.O_PATH | os.O_CLOEXEC)
+            own = writes if allowed.is_dir() else 1 << 1
+            rule = own.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
+            libc.syscall(add, rules, 1, rule, 0)
+            os.close(place)
+    no_new_privileges = 38
+    libc.prctl(no_new_privileges, 1, 0, 0, 0)
+    libc.syscall(restrict, rules, 0)
+    os.close(rules)
+
+
+@contextlib.contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Workers that begin meanwhile have one thread for BLAS each."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(THREADS)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+_START = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+_Ordinary: Any = multiprocessing.get_context(_START).Process  # type: ignore[attr-defined]
+
+
+class WorkerProcess(_Ordinary):  # type: ignore[misc]
+    """A process in which the program that is running is not run again."""
+
+    @staticmethod
+    def _Popen(process: Any) -> Any:  # noqa: N802
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            return _Ordinary._Popen(process)
+        finally:
+            sys.modules["__main__"] = main
+
+
+def _context() -> Any:
+    """How workers begin: forked from a server that has imported what they need, where there is
+    such a thing."""
+    context: Any = copy(multiprocessing.get_context(_START))
+    context.set_forkserver_preload(["coartic.benchmarks.pool"])
+    context.Process = WorkerProcess
+    return context

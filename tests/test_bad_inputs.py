@@ -1,0 +1,172 @@
+"""What a user writes wrong gets one sentence, with the key and what would be right."""
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from coartic import CoarticError, load_task
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.run import Selection, run_suite
+from coartic.benchmarks.suites import load_suite, select_cells
+from coartic.tasks.families import read_family
+from tests.support.bad_inputs import GOOD
+from tests.support.suites import KNOWN
+
+FAMILY = """
+title = "Mine"
+description = "Mine."
+goals = [2, 3]
+links = [4, 4]
+base = ["free"]
+[region]
+x = [-5, 5]
+y = [-3, 3]
+[[start]]
+"""
+SUITE = """
+title = "x"
+description = "x"
+runs = 1
+[[cells]]
+tasks = ["ascending"]
+methods = ["dual-process/EC1"]
+"""
+METHOD = """
+from coartic.method import Method
+class A(Method):
+    name = "a"
+    title = citation = "x"
+    told = frozenset()
+    def solve(self, session): ...
+"""
+
+
+def changed(good, old, new):
+    assert old in good
+    return good.replace(old, new)
+
+
+task, family, suite, method = (partial(changed, text) for text in (GOOD, FAMILY, SUITE, METHOD))
+
+TASKS = [
+    (task("[5.0, 2.0]", "[nan, 2.0]"), "goals[1][0] is nan; it must be a finite number"),
+    (task("base = [0.0,", "base = [inf,"), "start.base[0] is inf"),
+    (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is empty"),
+    ('locked_base = ["x", "y"]\n' + task("[5.0, 2.0]", "[5.0, 20.0]"), "out of reach"),
+    ("goal = 1\n" + GOOD, "goal is an unknown key; did you mean 'goals'?"),
+    (task('"RR"', '"RRR"'), "3 hands for 2 goals"),
+    (task('"RR"', '"RX"'), "initial_hands"),
+    (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
+    (GOOD.partition("[start]")[0], "start"),
+    (task('"mine"', '"my task"'), "name"),
+    ('title = "a\\nb"' + GOOD, "title should be one line of printable text"),
+    (task("goals = [[", "goals = [[["), "line"),
+]
+FAMILIES = [
+    (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it must be at least 2"),
+    (family("[2, 3]", "[3, 2]"), "goals: goes from more to less"),
+    (family("[4, 4]", "[3, 9]"), "links[1] is 9; it must be at most 8"),
+    ("apart = 0.1" + FAMILY, "apart lets goals overlap"),
+    ("radius = 0.01" + FAMILY, "radius is not larger than the accuracy"),
+    ("reach = 4.0001" + FAMILY, "reach: has more than three decimals"),
+    ("within = 1.5" + FAMILY, "within: should be above 0, at most 1"),
+    ("clear = true" + FAMILY, "clear: should be a number up to 1000"),
+    (family('["free"]', '["flying"]'), "base[0] is 'flying'"),
+    ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
+]
+SUITES = [
+    (suite("process/", "proces/"), "did you mean 'dual-process/EC1'"),
+    (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
+    (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
+    (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it must be at least 0"),
+    (SUITE + "grid = {noise_sd = []}", "cells[0].grid"),
+    (suite('["dual-process/EC1"]', "[]"), "cells[0].methods"),
+    (SUITE + "run = 3", "cells[0].run is an unknown key; did you mean 'runs'?"),
+    (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4 to move"),
+    (SUITE + "move = {goal = 2, by = [[0, 1e9]]}", "it must be at most"),
+]
+METHODS = [
+    ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),
+    ("raise SystemExit(3)", "cannot be imported: SystemExit: 3"),
+    ("x = 1", "defines no subclass of coartic.method.Method"),
+    ("def (", "cannot be imported: SyntaxError"),
+    (method("def solve", "def solves"), "that is complete: A has no solve"),
+    (method("title = ", ""), "title must be a text"),
+    (method('"a"', '"a b"'), "name 'a b' may have letters"),
+    (method('"a"', '"dual-process/EC1"'), "'dual-process/EC1' is reserved"),
+    (method('"a"', '"cma-es/every"'), "'cma-es/every' is already taken"),
+    (method("frozenset()", '"goals"'), "told must be a set of Information"),
+    (METHOD + "    files = ('w.npy',)", "w.npy"),
+    (METHOD + "    Parameters = dict", "Parameters must be a subclass of coartic.method"),
+    (METHOD + "    stochastic = 'no'", "stochastic must be"),
+]
+
+
+def cells(path):
+    return select_cells(load_suite(str(path)), KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("read", "name", "text", "words"),
+    [
+        *((load_task, "mine.toml", *case) for case in TASKS),
+        *((read_family, "mine.v1.toml", *case) for case in FAMILIES),
+        (read_family, "x.toml", FAMILY, "the name of a family's file is NAME.v1.toml"),
+        *((cells, "own.toml", *case) for case in SUITES),
+        *((lambda path: registry([path]), "mine.py", *case) for case in METHODS),
+    ],
+)
+def test_a_file(read, name, text, words, tmp_path):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CoarticError) as caught:
+        read(path)
+    (line,) = str(caught.value).splitlines()
+    assert words in line
+    assert name in line or "suite 'own'" in line or "method '" in line
+
+
+@pytest.mark.parametrize("read", [load_task, cells, read_family, lambda path: registry([path])])
+def test_a_file_that_is_not_there(read, tmp_path):
+    with pytest.raises(CoarticError, match=r"(?i)mine.v1.toml.*no such file"):
+        read(tmp_path / "mine.v1.toml")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
+        ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
+        ({"tasks": ["ascending"], "methods": ["EC4"]}, "no method to run on what was asked for"),
+        ({"task_files": ["ascending.toml"]}, "name 'ascending' is already taken"),
+        ({"task_files": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
+        ({"task_files": ["mine.toml", "mine.toml"]}, "the same task file is given twice"),
+        ({"tasks": "ascending"}, "tasks is a list: write tasks=['ascending']"),
+        ({"task_files": Path("a.toml")}, "task_files is a list: write task_files=['a.toml']"),
+        ({"tasks": [3]}, "tasks is [3]; it must be a list of names or paths"),
+        ({"runs": "3"}, "runs is '3'; it must be from 1 to "),
+        ({"trials": 2.5}, "trials is 2.5; it must be from 1 to "),
+        ({"runs": True}, "runs is True; it must be from 1 to "),
+        ({"seed": -1}, "seed is -1; it must be from 0 to "),
+        ({"readings": ["tie=right"]}, "did you mean 'ties'?"),
+        ({"executor": 2}, "executor is 2; it must be one, as Local(jobs=2)"),
+        ({"select": {}}, "select is {}; it must be a Selection"),
+        ({"suite": "papr"}, "unknown suite 'papr'; did you mean 'paper'"),
+        ({"folder": None}, "folder is None; it must be a path"),
+        ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
+    ],
+)
+def test_an_argument(wrong, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine", "ascending", "left"):
+        text = GOOD.replace("mine", name)
+        if name == "left":
+            text = 'hands = ["left"]' + text.replace("RR", "LL")
+        Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    own = {name: wrong[name] for name in ("tasks", "methods", "task_files") if name in wrong}
+    rest = {name: value for name, value in wrong.items() if name not in own}
+    with pytest.raises(CoarticError) as caught:
+        run_suite(**{"suite": "paper", "folder": "out", "select": Selection(**own)} | rest)
+    assert words in str(caught.value)
+    assert not Path("out").exists()

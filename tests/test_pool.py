@@ -1,0 +1,204 @@
+"""Methods in worker processes: whatever one does, it harms no other, and its runs are kept."""
+
+import contextlib
+import ctypes
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import coartic
+from coartic import CoarticError, load_task
+from coartic.analysis.study import load
+from coartic.benchmarks.pool import Local
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.suites import Cell
+from coartic.benchmarks.worker import job_of
+from coartic.runs.store import open_store
+from tests.support.suites import KNOWN, run_and_write
+
+METHODS = """
+import os, signal, sys, tempfile, time
+import numpy as np
+import coartic.benchmarks.outcome, coartic.benchmarks.worker, coartic.motion.solution
+from coartic.method import Information, Method, MethodError, Parameters, Result
+from coartic.motion.solution import Movement
+
+def corrected(session, hand="right"):
+    return tuple(Movement(n, hand, "corrective") for n in range(1, session.goals_count + 1))
+
+class What(Parameters):
+    what: str = "honest"
+
+class Does(Method):
+    name = "test/does"
+    title = citation = "x"
+    told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+    stochastic = False
+    Parameters = What
+    def solve(self, session):
+        return getattr(self, self.parameters.what)(session)
+
+class Again(Does):
+    name = "test/again"
+"""
+HONEST = -319  # what these movements are worth
+HANDLED = {
+    "hangs": ("time.sleep(99)", "timeout", "time limit of 2 s exceeded"),
+    "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
+              "crashed", "exit code 7): last words"),
+    "is_killed": ("os.kill(os.getpid(), signal.SIGKILL)", "crashed", "killed by SIGKILL"),
+    "breaks": ("raise SystemExit(0)", "crashed", "SystemExit: 0"),
+    "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
+    "nothing": ("return None", "solver-failed", "returned NoneType, not a Result"),
+    "no_solution": ("return Result(None)", "solver-failed", "cannot be kept: TypeError"),
+    "no_movements": ("return Result((1, 2, 3))", "solver-failed", "cannot be kept"),
+    "too_few": ("return Result(corrected(session)[:1])", "solver-failed", "wanted [1, 2, 3]"),
+    "nan": ("return Result((Movement(1, 'right', 'planned', session.q0 * np.nan),) * 3)",
+            "solver-failed", "finite"),
+    "wrong_size": ("return Result((Movement(1, 'right', 'planned', np.zeros(3)),) * 3)",
+                   "solver-failed", "needs (10,)"),
+    "wrong_hand": ("return Result(corrected(session, 'left'))", "solver-failed", "hand"),
+    "far": ("return Result((Movement(1, 'right', 'planned', session.q0 + 1e6),) * 3)",
+            "solver-failed", "steps; at most"),
+    "many": ("return Result(corrected(session) * 9999)", "solver-failed", "movements; at most"),
+    "waypoints": ("return Result((Movement(1, 'right', 'path', session.q0, waypoints='abc'),))",
+                  "solver-failed", "cannot be kept"),
+    "smuggled": ("away = [session.q0 + 1]\n        return Result((Movement("
+                 "1, 'right', 'planned', session.q0, waypoints=away), *corrected(session)))",
+                 "solver-failed", "a planned movement has no waypoints"),
+    "details": ("return Result(corrected(session), {'call': print})",
+                "solver-failed", "cannot be kept: TypeError"),
+    "own_word": ("raise MethodError('infeasible', 'no way', {'why': np.zeros(2)})",
+                 "crashed", "TypeError: Object of type ndarray"),
+    "bound": ("return Result(corrected(session), bound=-1)", "solver-failed", "states a bound"),
+    "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
+    "trials": ("for _ in range(9): session.trial(corrected(session))",
+               "crashed", "all 3 trials of the budget are made"),
+    "honest": ("return Result(corrected(session))", "ok", ""),
+    "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
+               "        return Result(corrected(session))", "ok", ""),
+    "giant": ("coartic.motion.solution.execute = coartic.benchmarks.outcome.scored = None\n"
+              "        coartic.benchmarks.worker.MotionModel = None\n"
+              "        session.model = session.model._replace(step=1.0)\n"
+              "        return Result(corrected(session))", "ok", ""),
+}  # fmt: skip
+"""What a method does, how its run ends, and words of the reason."""
+
+
+def entries(folder, bodies):
+    """Methods of a file, which do one of these things."""
+    text = "".join(f"    def {name}(self, session):\n        {body}\n" for name, body in bodies)
+    head, mark, tail = METHODS.partition("class Again")
+    (folder / "mine.py").write_text(head + text + mark + tail, encoding="utf-8")
+    known = registry([folder / "mine.py"])
+    return known["test/does"], known["test/again"]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """In the same workers, then others, then this project's."""
+    folder, task = tmp_path_factory.mktemp("pool"), load_task("ascending")
+    does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
+    cells = [Cell(task, does, (("what", name),)) for name in HANDLED]
+    cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
+    study = run_and_write(
+        folder / "out", cells, executor=Local(2), runs=1, time_limit_s=2.0, trial_budget=3
+    )
+    return study.runs.set_index("label")
+
+
+@pytest.mark.parametrize("name", HANDLED)
+def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
+    run = runs.loc["test/does" if name == "honest" else f"test/does what={name}"]
+    _, status, words = HANDLED[name]
+    assert run.status == status, run.reason
+    assert words in run.reason
+    assert run.reason.isprintable()
+    assert run.isna().reward if status != "ok" else run.reward == HONEST
+
+
+def test_other_methods_notice_nothing(runs):
+    assert runs.reward["test/again"] == runs.reward["corrective-alone/given"] == HONEST
+
+
+def landlock():
+    """Whether the system can confine a process (Linux 5.13)."""
+    return sys.platform == "linux" and ctypes.CDLL(None).syscall(444, None, 0, 1) > 0
+
+
+@pytest.mark.skipif(not landlock(), reason="no Landlock")
+def test_methods_of_others_write_into_a_folder_of_theirs_alone(tmp_path):
+    forbidden = [tmp_path, tmp_path / "out", Path(coartic.__file__).parent, Path.home()]
+    tries = f"""tempfile.NamedTemporaryFile().write(b"x")
+        open("here", "w").close()
+        found = {{}}
+        for place in {list(map(str, forbidden))}:
+            try:
+                open(place + "/test_pool", "w").close()
+            except PermissionError:
+                found[place] = "refused"
+        return Result(corrected(session), found)"""
+    does, _ = entries(tmp_path, [("honest", tries)])
+    cells = [Cell(load_task("ascending"), does)]
+    study = run_and_write(tmp_path / "out", cells, executor=Local(1))
+    with open_store(study.folder) as store:
+        run = store.run(study.runs.run_id[0]).run
+    assert run.status == "ok", run.row["reason"]
+    assert json.loads(run.row["details"]) == dict.fromkeys(map(str, forbidden), "refused")
+
+
+def script(tmp_path, body):
+    """A process that runs such a method, from a script without a guard."""
+    entries(tmp_path, [("honest", body)])
+    (tmp_path / "script.py").write_text("""
+from coartic.benchmarks.run import Selection, run_suite
+print("begun", flush=True)
+select = Selection(tasks=["ascending"], methods=["test/does"], method_files=["mine.py"])
+print(run_suite("paper", "out", select=select, watch=lambda *_: print("watched", flush=True)))
+""")
+    command = [sys.executable, "script.py"]
+    return subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    with script(tmp_path, "return Result(corrected(session))") as process:
+        said = process.stdout.read().splitlines()
+    assert said[:-1] == ["begun", "watched", "watched"]
+    assert said[-1].startswith("1 run in")
+    assert load(tmp_path / "out").runs.reward.tolist() == [HONEST]
+
+
+def test_workers_that_cannot_begin_get_a_sentence():
+    entry, task = KNOWN["dual-process/EC1"], load_task("ascending").model_dump(mode="json")
+    job = job_of(entry, task | {"goals": []}, entry.complete({}), (0,))
+    with pytest.raises(CoarticError, match="worker processes cannot begin.*goals is empty"):
+        list(Local(1).perform([job] * 10))
+
+
+def session_of(leader):
+    """Processes that a process has started, and itself."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, _, _, session, *_ = place.read_text().rpartition(") ")[2].split()
+            found += [place] if int(session) == leader and state != "Z" else []
+    return found
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what is left elsewhere ends with its run")
+def test_workers_end_with_their_parent(tmp_path):
+    with script(tmp_path, "time.sleep(60)") as process:
+        while len(session_of(process.pid)) < 4:  # the server, its tracker and a worker
+            time.sleep(0.05)
+            assert process.poll() is None
+        process.kill()
+    deadline = time.monotonic() + 5
+    while session_of(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert session_of(process.pid) == []
