@@ -43,7 +43,7 @@ COLUMNS = {  # of table results: what is said of each solution that is stored of
 UNCHECKED = (
     "Times, memory, counts of what was spent, and rewards of single trials are taken as stored.",
     "Tasks, constants and parameters are taken as stored with each run, and proven bounds as true.",
-    "A change of a configuration that leaves all ticks and that travel as they are is not seen.",
+    "A changed configuration is not seen where ticks and the other arm's travel stay the same.",
     "No method is run: `coartic verify --again N` sees whether it finds these solutions again.",
 )
 
