@@ -43,8 +43,8 @@ COLUMNS = {  # of table results: what is said of each solution that is stored of
 UNCHECKED = (
     "Times, memory, counts of what was spent, and rewards of single trials are taken as stored.",
     "Tasks, constants and parameters are taken as stored with each run, and proven bounds as true.",
-    "Configurations are seen by their ticks: a change that leaves all of those alike is not found.",
-    "Whether the method finds these solutions: `coartic verify --again N` performs runs anew.",
+    "A changed configuration is not seen where ticks and the other arm's travel stay the same.",
+    "No method is run: `coartic verify --again N` sees whether it finds these solutions again.",
 )
 
 
@@ -222,8 +222,8 @@ class Report(NamedTuple):
 
 def verify(folder: Path) -> Report:
     """Check all runs of a folder, asked for last or not. sqlite3.Error: it cannot be read."""
-    place = f"{(folder / 'runs.sqlite').resolve().as_uri()}?mode=ro"
-    with closing(sqlite3.connect(place, uri=True)) as db:
+    place = (folder / "runs.sqlite").resolve().as_uri()
+    with closing(sqlite3.connect(f"{place}?mode=ro", uri=True)) as db:
         db.row_factory = sqlite3.Row
         return check_all(db)
 
@@ -235,7 +235,7 @@ def check_all(db: sqlite3.Connection) -> Report:
         query = f"SELECT count(*) FROM {table} WHERE result_id NOT IN (SELECT id FROM results)"
         if lost := db.execute(query).fetchone()[0]:
             wrong.append(f"{lost} rows of table {table} are of no run.")
-    runs, movements, unsolved = 0, 0, 0
+    runs = movements = unsolved = 0
     rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
     query = "SELECT *, results.id AS own FROM results LEFT JOIN settings ON settings.id = setting"
     for row in db.execute(query):
@@ -274,11 +274,11 @@ def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list
     query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
     for order, number, *q in db.execute(query, [run]):
         need(number == len(waypoints[order]), f"movement {order} lacks a waypoint")
-        waypoints[order].append(np.array(q, np.float64))
+        waypoints[order].append(np.array(q, dtype=np.float64))
     query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
-    for part, order, *facts in db.execute(query, [run]):
+    for part, order, goal, hand, kind, ticks, *q in db.execute(query, [run]):
         points = waypoints.pop(order, []) if part == "solution" else []
-        parts[part].append(Movement._make([order, *facts[:4], np.array(facts[4:]) * 1.0, points]))
+        parts[part].append(Movement(order, goal, hand, kind, ticks, np.array(q, float), points))
     need(not waypoints, "it has waypoints of no movement")
     return parts
 
