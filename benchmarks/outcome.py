@@ -208,10 +208,10 @@ def result_of(
     for part in PARTS:
         for own in movements.get(part, ()):
             assert own.target is not None
-            points = None if own.waypoints is None else own.waypoints.tolist()
-            parts.append(
-                [part, own.goal, own.hand, own.kind, own.ticks, own.target.tolist(), points]
-            )
+            # SQLite keeps no sign of zero, and 0.0 is added to lose it here as well.
+            points = None if own.waypoints is None else (own.waypoints + 0.0).tolist()
+            target = (own.target + 0.0).tolist()
+            parts.append([part, own.goal, own.hand, own.kind, own.ticks, target, points])
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
 
