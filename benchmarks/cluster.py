@@ -6,7 +6,7 @@ import logging
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coartic.benchmarks.pool import Failure, Local
 from coartic.benchmarks.provenance import environment
@@ -14,17 +14,13 @@ from coartic.benchmarks.registry import brief, current_code
 from coartic.benchmarks.worker import Answer, Job
 from coartic.errors import CoarticError
 
-if TYPE_CHECKING:
-    from distributed import Client, Future
-
 WORKERS_S = 600.0  # that runs wait while no worker is connected
-_ASK_EVERY_S = 2.0
+_LOOK_S = 0.05  # between looks at what is done
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """An executor: a Dask scheduler, with this version of coartic on its workers; ``say`` is told
-    what is waited for. TLS is set up in Dask's own configuration."""
+    """An executor: a Dask scheduler, whose workers have this version of coartic."""
 
     def __init__(
         self, address: str, *, workers_s: float = WORKERS_S, say: Callable[[str], None] = print
@@ -34,41 +30,34 @@ class Dask:
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
         """The number of each job with its answer, as they come; another worker takes over the
-        jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, it has
-        no workers for a long time, or they have another version.
-        """
+        jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, or it
+        has no workers of this version."""
         client = self._client()
-        try:
-            from distributed import as_completed
+        from distributed import as_completed
 
+        try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
             numbers = {future.key: number for number, future in enumerate(futures)}
-            answers, waited_since = as_completed(futures, loop=client.loop), None
+            answers = as_completed(futures, loop=client.loop)
             while not answers.is_empty():
-                waited_since = self._check_workers(client, waited_since)
-                deadline = time.monotonic() + _ASK_EVERY_S
-                while not answers.has_ready() and time.monotonic() < deadline:
-                    time.sleep(_ASK_EVERY_S / 100)
+                self._wait_for_workers(client)
+                time.sleep(0.0 if answers.has_ready() else _LOOK_S)
                 for future in answers.next_batch(block=False):
                     yield numbers[future.key], self._answer(future)
         finally:
             client.close(timeout=3)
 
-    def _answer(self, future: Future[Any]) -> Answer | Failure:
+    def _answer(self, future: Any) -> Any:
         from distributed import CancelledError, KilledWorker
 
         try:
-            return future.result()  # type: ignore[no-any-return]
+            return future.result()
         except KilledWorker:
             return Failure("crashed", "every worker that tried this run died", 0.0)
-        except CoarticError:
-            raise
         except (Exception, CancelledError) as error:
-            if future.status != "error":
-                raise self._lost(error) from None
-            raise CoarticError(f"a Dask worker cannot work: {brief(error)}. {_GOES_ON}") from None
+            raise error if isinstance(error, CoarticError) else self._lost(error) from None
 
-    def _client(self) -> Client:
+    def _client(self) -> Any:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
         try:
             from distributed import Client
@@ -77,41 +66,33 @@ class Dask:
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
         except Exception as error:  # Dask's, of many kinds: who answers may be anybody
-            raise CoarticError(
-                f"no Dask scheduler at {self.address} ({brief(error)}). Give the address that the "
-                "scheduler prints, such as tcp://127.0.0.1:8786."
-            ) from None
+            words = f"no Dask scheduler at {self.address} ({brief(error)}). Give the address that "
+            raise CoarticError(f"{words}it prints, such as tcp://127.0.0.1:8786.") from None
 
-    def _check_workers(self, client: Client, since: float | None) -> float | None:
-        """Since when there are no workers. Raises CoarticError where that is too long."""
+    def _wait_for_workers(self, client: Any) -> None:
         try:
-            workers = client.scheduler_info()["workers"]
+            if not client.scheduler_info()["workers"]:
+                self.say(f"no Dask worker is connected to {self.address}: waiting for one")
+                client.wait_for_workers(1, timeout=self.workers_s)
+        except TimeoutError:
+            words = f"no Dask worker was connected to {self.address} for {self.workers_s:g} s;"
+            raise CoarticError(
+                f"{words} start one: dask worker {self.address}. {_GOES_ON}"
+            ) from None
         except Exception as error:
             raise self._lost(error) from None
-        if workers:
-            return None
-        if since is None:
-            self.say(f"no Dask worker is connected to {self.address}: waiting for one")
-            return time.monotonic()
-        if time.monotonic() - since > self.workers_s:
-            raise CoarticError(
-                f"no Dask worker was connected to {self.address} for {self.workers_s:g} s; start "
-                f"some with: dask worker {self.address}. {_GOES_ON}"
-            )
-        return since
 
     def _lost(self, error: BaseException) -> CoarticError:
-        return CoarticError(f"lost Dask scheduler {self.address} ({brief(error)}). {_GOES_ON}")
+        words = f"lost Dask scheduler {self.address}, or its workers cannot work"
+        return CoarticError(f"{words} ({brief(error)}). {_GOES_ON}")
 
 
 def _remote(job: Job) -> Answer | Failure:
     """Perform a job on a worker's machine, in a process that ends with its time limit."""
     here = current_code(job.where, job.method)
     if here != job.code:
-        raise CoarticError(
-            f"method {job.method!r} has code {here} on a Dask worker and {job.code} where the "
-            "suite was started; install the same version everywhere"
-        )
+        words = f"method {job.method!r} has code {here} on a Dask worker and {job.code} where the "
+        raise CoarticError(f"{words}suite was started; install the same version everywhere")
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     ((_, answer),) = Local(1).perform([job])
     if isinstance(answer, Answer):

@@ -2,9 +2,11 @@
 
 import json
 import math
+import os
 import re
 import shutil
 import sqlite3
+import subprocess
 import sys
 from contextlib import closing
 from itertools import pairwise
@@ -200,3 +202,12 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     movement = checker.Movement(0, 1, hand, kind, 0, target, [middle, target])
     stopped, *rest = checker.make(own, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
+
+
+@pytest.mark.parametrize("kernel", ["Haswell", "Zen", "Prescott"])
+def test_a_folder_is_sound_under_other_kernels_of_blas(whole, kernel):
+    """As in another lab, whose processor has them."""
+    command = [sys.executable, checker.__file__, whole]
+    environment = {**os.environ, "OPENBLAS_CORETYPE": kernel}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Nothing differs" in done.stdout) == (0, True)
