@@ -75,10 +75,8 @@ class Dask:
                 self.say(f"no Dask worker is connected to {self.address}: waiting for one")
                 client.wait_for_workers(1, timeout=self.workers_s)
         except TimeoutError:
-            words = f"no Dask worker was connected to {self.address} for {self.workers_s:g} s;"
-            raise CoarticError(
-                f"{words} start one: dask worker {self.address}. {_GOES_ON}"
-            ) from None
+            words = f"Dask scheduler {self.address} had no workers for {self.workers_s:g} s"
+            raise CoarticError(f"{words}; start some. {_GOES_ON}") from None
         except Exception as error:
             raise self._lost(error) from None
 
