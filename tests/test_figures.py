@@ -29,7 +29,7 @@ from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.register import signatures
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
-from tests.support.made_up import MadeUp
+from tests.support.made_up import MadeUp, row, study_of
 from tests.support.suites import KNOWN, run_and_write
 
 
@@ -187,6 +187,13 @@ def test_shares_of_hand_sequences(study):
     assert data.groupby(["task", "method", "source"]).share.sum().to_numpy() == pytest.approx(1)
     paper = data[(data.source == "published") & (data.method == "dual-process/EC2")]
     assert dict(zip(paper.hands, paper.runs, strict=True)) == {"RRLR": 11, "RRRR": 9}
+
+
+def test_three_tasks_have_three_panels():
+    names = ["two-armed-1", "two-armed-2", "two-armed-1-m002"]
+    runs = [row("dual-process/EC2", -500, task=name, run=k) for name in names for k in range(3)]
+    plot = recruitment(study_of(pd.DataFrame(runs), list(map(load_task, names))))
+    assert [axes.axison for axes in plot.figure.axes] == [True, True, True, False]
 
 
 def test_context_parts_are_the_signatures(study):
