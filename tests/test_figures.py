@@ -29,7 +29,7 @@ from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.register import signatures
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
-from tests.support.made_up import MadeUp
+from tests.support import made_up
 from tests.support.suites import KNOWN, run_and_write
 
 
@@ -189,6 +189,15 @@ def test_shares_of_hand_sequences(study):
     assert dict(zip(paper.hands, paper.runs, strict=True)) == {"RRLR": 11, "RRRR": 9}
 
 
+def test_three_tasks_have_three_panels():
+    names = ["two-armed-1", "two-armed-2", "two-armed-1-m002"]
+    runs = [
+        made_up.row("dual-process/EC2", -500, task=name, run=k) for name in names for k in range(3)
+    ]
+    plot = recruitment(made_up.study_of(pd.DataFrame(runs), list(map(load_task, names))))
+    assert [axes.axison for axes in plot.figure.axes] == [True, True, True, False]
+
+
 def test_context_parts_are_the_signatures(study):
     (row,) = context(study).data.itertuples()
     frame = signatures(study).dropna(subset="value").set_index("signature").value
@@ -213,7 +222,7 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     )
     own = study.cells["ascending", "dual-process/EC1"]
     cells = study.cells | {("ascending", label): own for label in labels}
-    of = MadeUp(study, cells=cells)
+    of = made_up.MadeUp(study, cells=cells)
     of._computed[signatures.__wrapped__] = planted
     plot = context(of, methods=labels)
     data = plot.data.set_index("method").loc[labels]

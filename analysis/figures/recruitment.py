@@ -46,6 +46,9 @@ def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
     size = style.TWO, (0.75 + 0.155 * max(bars)) * shape[0]
     figure, panels = style.figure_of(shape, size)
     colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
+    for axes in panels[len(found) :]:
+        axes.set_axis_off()
+    panels = panels[: len(found)]
     for axes, task in zip(panels, found.values(), strict=True):
         _panel(axes, task, data[data.task == task.name], order, colors)
     style.letters(panels)
