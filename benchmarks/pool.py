@@ -33,6 +33,7 @@ from coartic.errors import CoarticError
 from coartic.learner.learning import threads_for
 from coartic.text import plain
 
+_LOOK_S = 1.0  # between looks at the pool
 _AHEAD = 2  # jobs a worker that wait for it
 _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
@@ -96,7 +97,9 @@ class Local:
                             break
                     if not running:
                         break
-                    done, _ = wait(running, return_when=FIRST_COMPLETED)
+                    done, _ = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
+                    if not done and not pool.active:
+                        raise BrokenProcessPool  # which leaves what waits as it is
                     for future in done:
                         number, started = running.pop(future)
                         seconds = time.monotonic() - started
