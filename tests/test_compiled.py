@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -43,6 +44,7 @@ def test_a_user_without_a_home(monkeypatch, tmp_path):
     def homeless():
         raise RuntimeError("Could not determine home directory.")
 
+    compiled.source_fingerprint()  # of the package where it is
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled.Path, "home", homeless)
     monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
@@ -129,3 +131,30 @@ def test_nothing_is_said_where_machine_code_cannot_be_kept(monkeypatch, tmp_path
 
     assert twice(3) == 6
     assert not list(tmp_path.rglob("*.nb?"))
+
+
+MOVE = """
+import sys
+import numpy as np
+from coartic import Robot, move
+for links in map(int, sys.argv[1:]):
+    robot = Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)
+    target = np.full(robot.dof, 0.3)
+    print(move(robot, np.zeros(robot.dof), target, "left", (90.0, 9.0), 0.1).ticks, flush=True)
+"""
+
+
+def test_machine_code_of_several_processes_goes_together(tmp_path):
+    """Each compiles for a number of links; one that loads all of it moves all robots."""
+
+    def ticks(*links):
+        command = [sys.executable, "-c", MOVE, *map(str, links)]
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True, timeout=100
+        )
+        return done.stdout.split()
+
+    alone = [ticks(links)[0] for links in (5, 2, 3)]
+    assert ticks(5, 2, 3) == alone
+    assert ticks(3, 2, 5) == alone[::-1]

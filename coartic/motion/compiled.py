@@ -155,6 +155,16 @@ def entry(function: F) -> F:
     return kernel
 
 
+def _mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+    return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
+
+
+# Machine code on disk calls functions by names that say their types. Numba names a record by its
+# number in the process that compiles, so a process that loads code of two such processes may call
+# one's function with the other's record. What is in the record is a name that holds everywhere.
+types.Record.mangling_args = property(_mangled)
+
+
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
     """Type of a record as kernels read it: what it holds lies together, at places they know."""
     return np.dtype(list(fields.items()), align=True)
