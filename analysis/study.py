@@ -27,6 +27,8 @@ from coartic.runs.store import FILE, open_store
 from coartic.text import counted
 
 Computed = TypeVar("Computed")
+MOST_EXECUTED = 300
+"""Runs of a cell whose solutions are executed again for the signatures."""
 
 
 def load(folder: str | Path) -> Study:
@@ -122,10 +124,13 @@ class Study:
 
     @cached_property
     def movements(self) -> tuple[dict[str, pd.DataFrame], dict[str, pd.DataFrame]]:
-        """Movements of each run's solution, and waypoints of those along a path, by run id."""
+        """Movements of each run's solution, and waypoints of those along a path, by run id.
+
+        Of the runs that :meth:`trajectories` executes.
+        """
+        executed = [run_id for cell in self.cells.values() for run_id in _executed_of(cell)]
         tables = (self.solutions, self._frame("paths"))
-        own = (table[table.run_id.isin(self.runs.run_id)] for table in tables)
-        movements, waypoints = map(_by_run, own)
+        movements, waypoints = (_by_run(table[table.run_id.isin(executed)]) for table in tables)
         return movements, waypoints
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
@@ -134,16 +139,25 @@ class Study:
             yield from store.rewards()
 
     def trajectories(self, task: str, label: str) -> Trajectories:
-        """Solutions of a cell, executed again tick by tick, each cell once."""
+        """Solutions of a cell, executed again tick by tick, each cell once.
+
+        The first 300 runs that solved the task: signatures say no more with thousands, which
+        would fill the memory.
+        """
         key = task, label
-        if key not in self._executed:
-            self._executed[key] = trajectories_of(
-                self.cells[key], self.tasks[task], self.model, self.movements, self.sequences
+        if key not in self._trajectories:
+            movements, waypoints = self.movements
+            solutions = {
+                run_id: (movements[run_id], waypoints.get(run_id))
+                for run_id in _executed_of(self.cells[key])
+            }
+            self._trajectories[key] = trajectories_of(
+                self.cells[key], self.tasks[task], self.model, solutions, self.sequences
             )
-        return self._executed[key]
+        return self._trajectories[key]
 
     @cached_property
-    def _executed(self) -> dict[CellKey, Trajectories]:
+    def _trajectories(self) -> dict[CellKey, Trajectories]:
         return {}
 
     @cached_property
@@ -173,6 +187,10 @@ def _frame(folder: Path, view: str, _: int) -> pd.DataFrame:
     """A view of a folder as it was at a time: studies of parts of a folder share it."""
     with open_store(folder) as store:
         return store.frame(view)
+
+
+def _executed_of(cell: CellRuns) -> list[str]:
+    return [str(run_id) for run_id in cell.good.run_id[:MOST_EXECUTED]]
 
 
 def _by_run(table: pd.DataFrame) -> dict[str, pd.DataFrame]:

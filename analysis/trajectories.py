@@ -140,14 +140,12 @@ def trajectories_of(
     cell: CellRuns,
     task: Task,
     model: MotionModel,
-    movements: tuple[Mapping[str, pd.DataFrame], Mapping[str, pd.DataFrame]],
+    solutions: Mapping[str, tuple[pd.DataFrame, pd.DataFrame | None]],
     sequences: pd.DataFrame,
 ) -> Trajectories:
-    """The solved runs of a cell, executed; ``movements`` are solutions and paths by run id."""
-    solutions, paths = movements
+    """Solved runs of a cell, executed; ``solutions`` has the movements and waypoints of each."""
     runs = tuple(
-        trajectory(task, movements_from(task, solutions[run_id], paths.get(run_id)), model)
-        for run_id in cell.good.run_id
+        trajectory(task, movements_from(task, *solution), model) for solution in solutions.values()
     )
     best = best_sequences(sequences, cell.task)
     return Trajectories(task, cell.method, cell.variant, runs, tuple(best), model)

@@ -163,12 +163,12 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
 @cache
 def built_in() -> Mapping[str, Entry]:
     """This project's methods by id."""
-    return {
-        method.name: Entry(method, BUILT_IN, name, code_of(_file_of(module)))
-        for name in MODULES
-        for module in [importlib.import_module(name)]
-        for method in module.METHODS
-    }
+    entries: dict[str, Entry] = {}
+    for name in MODULES:
+        module = importlib.import_module(name)
+        code = code_of(_file_of(module))  # once for its methods: it takes a while
+        entries |= {method.name: Entry(method, BUILT_IN, name, code) for method in module.METHODS}
+    return entries
 
 
 def method_at(where: str, name: str) -> type[Method]:

@@ -530,7 +530,7 @@ def test_judges_beside_planted_plans(claim, rows, verdict):
 def with_paths(study, paths):
     """Plant the solutions of a study: runs by task and label."""
     for (task, label), runs in paths.items():
-        study._executed[task, label] = Trajectories(study.tasks[task], label, "", tuple(runs))
+        study._trajectories[task, label] = Trajectories(study.tasks[task], label, "", tuple(runs))
     return study
 
 

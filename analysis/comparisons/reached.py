@@ -8,7 +8,7 @@ been reached. Shares and the budgets that they take are exact, not read off a gr
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from coartic.robot import Array
 WAY = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
 _RESAMPLES = 1_999
+_FIGURES_AT_ONCE = 1_000_000  # weights of pairs in memory
 
 
 class Crossing(NamedTuple):
@@ -67,20 +68,22 @@ class Targets:
         budget = self._least(self._weights[None], level)[0]
         if min(self._sizes) < FEWEST:
             return Crossing(budget, math.nan, math.nan)
-        drawn = self._least(self._resampled(), level)
-        low, high = np.quantile(drawn, TAILS, method="inverted_cdf")
+        budgets = np.concatenate([self._least(weights, level) for weights in self._resampled()])
+        low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
         return Crossing(budget, float(low), float(high))
 
-    def _resampled(self) -> Array:
-        """Weights of the pairs with runs drawn anew within their task, ``(resamples, pairs)``."""
+    def _resampled(self) -> Iterator[Array]:
+        """Weights of the pairs with runs drawn anew within their task, ``(resamples, pairs)``, some
+        resamples at a time: of thousands of runs all would fill the memory."""
         rng = np.random.default_rng(SEED)
-        shape = (_RESAMPLES, len(WAY))
-        counts = []
-        for size in self._sizes:
-            drawn = rng.multinomial(size, np.full(size, 1 / size), size=_RESAMPLES)
-            counts.append(np.repeat(drawn, shape[1], axis=1))
-        weights: Array = np.concatenate(counts, axis=1) * self._weights
-        return weights
+        drawn = [
+            rng.multinomial(size, np.full(size, 1 / size), size=_RESAMPLES).astype(np.int32)
+            for size in self._sizes
+        ]
+        at_once = max(1, _FIGURES_AT_ONCE // len(self._weights))
+        for first in range(0, _RESAMPLES, at_once):
+            counts = np.concatenate([own[first : first + at_once] for own in drawn], axis=1)
+            yield np.repeat(counts, len(WAY), axis=1) * self._weights
 
     def _least(self, weights: Array, level: float) -> Array:
         """For each row of weights, the least value at which their sum reaches the level."""

@@ -84,9 +84,12 @@ def dependence_below(
         return math.nan
     means, squares = [], np.zeros(resamples)
     for group in (first, second):
-        drawn = group[rng.integers(len(group), size=(resamples, len(group)))]
-        means.append(mean(drawn, 1))
-        squares += ((drawn - means[-1][:, None]) ** 2).sum(axis=(1, 2))
+        means.append(np.empty((resamples, group.shape[1])))
+        for start in range(0, resamples, 500):  # thousands of runs would fill the memory
+            rows = slice(start, min(start + 500, resamples))
+            drawn = group[rng.integers(len(group), size=(rows.stop - start, len(group)))]
+            means[-1][rows] = mean(drawn, 1)
+            squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
     pooled = np.sqrt(squares / (len(first) + len(second) - 2))
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
     return float(1 + reached.sum()) / (resamples + 1)
@@ -120,11 +123,14 @@ def permutation_p(
     weights, exact = divisions(len(first), len(second), rng, resamples)
     own = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
     flat = pool.reshape(len(pool), -1)
-    null, observed = (
-        np.linalg.norm((rows @ flat).reshape(*rows.shape[:-1], *pool.shape[1:]), axis=-1)
-        for rows in (weights, own)
-    )
-    return p_values(null, observed, exact=exact)
+
+    def distances(rows: Array) -> Array:
+        means = (rows @ flat).reshape(*rows.shape[:-1], *pool.shape[1:])
+        lengths: Array = np.linalg.norm(means, axis=-1)
+        return lengths
+
+    null = np.concatenate([distances(block) for block in weights])
+    return p_values(null, distances(own), exact=exact)
 
 
 def lead_time(

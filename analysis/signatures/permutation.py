@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import combinations, permutations
 
 import numpy as np
@@ -11,24 +12,35 @@ from numpy.typing import NDArray
 from coartic.analysis.statistics.estimates import RESAMPLES
 from coartic.robot import Array
 
+_AT_ONCE = 500  # divisions in memory
+
 
 def divisions(
     first: int, second: int, rng: np.random.Generator, resamples: int = RESAMPLES
-) -> tuple[Array, bool]:
+) -> tuple[Iterator[Array], bool]:
     """Ways to divide runs into two groups, and whether these are all there are.
 
-    Shape ``(m, first + second)``: weights that give the first group's mean less the second's.
-    All where they are no more than ``resamples``, else as many drawn at random.
+    Blocks of shape ``(m, first + second)``: weights that give the first group's mean less the
+    second's. All where they are no more than ``resamples``, else as many drawn at random.
+    Together they would fill the memory with thousands of runs.
     """
     runs = first + second
     exact = math.comb(runs, first) <= resamples
-    if exact:
-        chosen = np.array(list(combinations(range(runs), first)))
-    else:
-        chosen = rng.random((resamples, runs)).argpartition(first - 1, axis=1)[:, :first]
-    weights = np.full((len(chosen), runs), -1 / second)
-    np.put_along_axis(weights, chosen, 1 / first, axis=1)
-    return weights, exact
+    every = np.array(list(combinations(range(runs), first))) if exact else None
+
+    def blocks() -> Iterator[Array]:
+        count = resamples if every is None else len(every)
+        for start in range(0, count, _AT_ONCE):
+            size = min(_AT_ONCE, count - start)
+            if every is None:
+                chosen = rng.random((size, runs)).argpartition(first - 1, axis=1)[:, :first]
+            else:
+                chosen = every[start : start + size]
+            weights = np.full((size, runs), -1 / second)
+            np.put_along_axis(weights, chosen, 1 / first, axis=1)
+            yield weights
+
+    return blocks(), exact
 
 
 def orders(

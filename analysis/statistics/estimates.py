@@ -38,7 +38,7 @@ SEED = 0
 """Of every resampling; it has nothing to do with the seeds of the runs."""
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
-MOST_DRAWN = 10_000
+MOST_DRAWN = 500
 """Values of a sample up to which a resample draws as many as there are."""
 _ZERO = np.zeros(1)
 NO_SPREAD = "the interval is a point: no spread"
