@@ -31,9 +31,10 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from coartic.baselines.uninformed import TOLD, Practice, UninformedParameters
+from coartic.baselines.uninformed import Practice, UninformedParameters
 from coartic.method import Method, Result, Session
 from coartic.motion.initial import too_many_sequences
+from coartic.optimisers import TOLD
 from coartic.robot import Array
 from coartic.tasks.task import Task
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 import itertools
 
 from coartic import Execution, Movement, Task
-from coartic.learner.method import spend_search
 from coartic.method import Information, Method, MethodError, Result, Session
-from coartic.motion.initial import changes_of_hand, search_initial_hands, too_many_sequences
+from coartic.motion.initial import changes_of_hand, too_many_sequences
 from coartic.robot import Hand
 from coartic.tasks.task import hands_of
 
@@ -36,11 +35,9 @@ class GivenHands(Method):
 
     def solve(self, session: Session) -> Result:
         """One trial, the targets found by **A** as it goes."""
-        task = session.hand_over(Information.CORRECTIVE_PROCESS)
-        search = search_initial_hands(task)
-        spend_search(session, search)
+        hands = hands_of(session.find_initial_hands())
         with session.solving():
-            execution = session.trial(_corrective(hands_of(search.hands)))
+            execution = session.trial(_corrective(hands))
         if not execution.completed:
             raise MethodError("infeasible", execution.reason)
         return Result(execution.movements)

@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from coartic.baselines.uninformed import TOLD, Practice, UninformedParameters
-from coartic.learner.method import spend_search
-from coartic.method import Information, Method, Result, Session
-from coartic.motion.initial import search_initial_hands
+from coartic.baselines.uninformed import Practice, UninformedParameters
+from coartic.method import Method, Result, Session
+from coartic.optimisers import TOLD
 from coartic.robot import Array
 
 _AHEAD = 128  # trials that are drawn before they are made, at most
@@ -88,13 +87,11 @@ def _search(
     epsilon: float,
     memory: Literal["reached", "target"] | None,
 ) -> Result:
-    task = session.hand_over(Information.CORRECTIVE_PROCESS)
-    first = search_initial_hands(task, model=session.model)
-    spend_search(session, first)
+    first_hands = session.find_initial_hands()
     practice = Practice(session, parameters)
     search = _Search(session, practice, parameters.sigma, epsilon, memory)
     with session.solving():
-        search.run(first.hands)
+        search.run(first_hands)
     return practice.result(sequences=len(search.centres))
 
 

@@ -8,21 +8,17 @@ goals were hit are known afterwards.
 from __future__ import annotations
 
 import math
-from functools import partial
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from coartic import Movement, execute
 from coartic.learner.learning import TRIALS
-from coartic.method import Information, MethodError, Parameters, Result, Session
-from coartic.motion.trials import make_trials
-from coartic.robot import HANDS, Array
-from coartic.tasks.task import hands_of
-
-TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+from coartic.method import MethodError, Parameters, Result, Session
+from coartic.motion.trials import Trials, movements_of
+from coartic.optimisers import explored_joints
+from coartic.robot import Array
 
 
 class UninformedParameters(Parameters):
@@ -36,22 +32,11 @@ class UninformedParameters(Parameters):
     4 and 3 of the learner)."""
 
 
-class Attempt(NamedTuple):
-    """What is known of trials after making them."""
-
-    rewards: Array
-    """Total rewards, shape ``(N,)``; -inf where a trial failed."""
-    reached: Array
-    """Configuration when each goal was hit, shape ``(N, G, dof)``."""
-
-
 class Practice:
-    """The physical trials of one run: makes them, counts them, remembers the best."""
+    """The physical trials of one run: makes them and remembers the best."""
 
     def __init__(self, session: Session, parameters: UninformedParameters) -> None:
         self._session = session
-        self._task = session.hand_over(*TOLD)
-        self._trials = partial(make_trials, self._task, model=session.model)
         self._other_arm = parameters.other_arm
         left = session.trials_left
         self.left = parameters.trials if left is None else min(parameters.trials, left)
@@ -65,26 +50,15 @@ class Practice:
         self._targets: Array = np.empty(0)
 
     def explored(self, hands: str) -> NDArray[np.bool_]:
-        """Joints that a hand sequence explores, shape ``(G, dof)``.
+        """Joints that a hand sequence explores, shape ``(G, dof)``."""
+        return explored_joints(self._session, hands, self._other_arm)
 
-        Never a locked base coordinate, nor an arm that hits neither this goal nor a later
-        one: moving it can only cost.
-        """
-        session, names = self._session, hands_of(hands)
-        mask = np.zeros((len(names), session.dof), dtype=np.bool_)
-        mask[:, :2] = [coordinate not in session.locked_base for coordinate in "xy"]
-        for goal, chosen in enumerate(names):
-            useful = names[goal:] if self._other_arm == "free" else (chosen,)
-            for hand in HANDS:
-                mask[goal, session.joints(hand)] = hand in useful
-        return mask
-
-    def by_correction(self, hands: str) -> Attempt:
+    def by_correction(self, hands: str) -> Trials:
         """One trial by **A** alone."""
         shape = (1, self._session.goals_count, self._session.dof)
         return self._make([hands], np.full(shape, np.nan))
 
-    def by_targets(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Attempt:
+    def by_targets(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Trials:
         """Trials with targets for the joints in ``mask`` (G, dof); the others keep still.
 
         ``values`` has shape ``(N, number of joints in the mask)``.
@@ -95,7 +69,7 @@ class Practice:
 
     def until_better(
         self, hands: list[str], masks: list[NDArray[np.bool_]], values: list[Array], than: Array
-    ) -> Attempt:
+    ) -> Trials:
         """As :meth:`by_targets`, one trial after the other, each with hands of its own.
 
         The last one is the first whose reward exceeds its entry in ``than`` (N,). Those after
@@ -117,41 +91,16 @@ class Practice:
                 "no trial hit every goal",
                 details,
             )
-        movements = [
-            Movement(number, hand, "corrective")
-            if np.isnan(target).all()
-            else Movement(number, hand, "learned", target)
-            for number, (hand, target) in enumerate(
-                zip(hands_of(self.hands), self._targets, strict=True), 1
-            )
-        ]
-        # Only the log of a trial that was made and counted, so not another trial.
-        log = execute(self._task, movements, model=self._session.model)
-        return Result(log.movements, {"best_trial": self._best_trial, **details})
+        movements = movements_of(self.hands, self._targets)
+        return Result(movements, {"best_trial": self._best_trial, **details})
 
-    def _make(self, hands: list[str], targets: Array, than: Array | None = None) -> Attempt:
-        made = self._trials(hands, targets)
-        rewards = np.where(made.completed, -made.ticks, -math.inf)
-        if than is not None and (better := rewards > than).any():
-            end = int(better.argmax()) + 1
-            if end < len(rewards):  # what the trials up to there alone took
-                made, rewards = self._trials(hands[:end], targets[:end]), rewards[:end]
-        self._session.spend(
-            trials=len(rewards),
-            movement_ticks=int(made.ticks.sum()),
-            forward_kinematics=made.evaluations,
-            jacobians=made.iterations,
-            corrective_iterations=made.iterations,
-            corrections=made.corrections,
-            failed_trials=int((~made.completed).sum()),
-        )
-        self._session.record_rewards(
-            int(reward) if math.isfinite(reward) else None for reward in rewards.tolist()
-        )
+    def _make(self, hands: list[str], targets: Array, until: Array | None = None) -> Trials:
+        trials = self._session.trials(hands, targets, until=until)
+        rewards = trials.rewards
         best = int(rewards.argmax())
         if rewards[best] > self.reward:
             self.reward, self.hands = float(rewards[best]), hands[best]
-            self._best_trial, self._targets = self.made + best, made.targets[best]
+            self._best_trial, self._targets = self.made + best, trials.targets[best]
         self.made += len(rewards)
         self.left -= len(rewards)
-        return Attempt(rewards, made.reached)
+        return trials

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from coartic.motion.movement import MoveResult, move
     from coartic.motion.solution import Execution, Movement, execute
     from coartic.motion.ticks import Trajectory, trajectory
+    from coartic.optimisers import Objective, Optimiser, objective
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
     from coartic.tasks.task import Provenance, Start, Task, parse_task
@@ -41,6 +42,8 @@ __all__ = [
     "MoveResult",
     "Movement",
     "NotApplicableError",
+    "Objective",
+    "Optimiser",
     "Provenance",
     "Robot",
     "Start",
@@ -58,6 +61,7 @@ __all__ = [
     "learning_table",
     "load_task",
     "move",
+    "objective",
     "parse_task",
     "runs_table",
     "solutions_table",
@@ -75,6 +79,7 @@ _HOMES = {
     "motion.movement": ("MoveResult", "move"),
     "motion.solution": ("Execution", "Movement", "execute"),
     "motion.ticks": ("Trajectory", "trajectory"),
+    "optimisers": ("Objective", "Optimiser", "objective"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),

@@ -23,7 +23,9 @@ from pydantic import BaseModel, ConfigDict
 from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
+from coartic.motion.initial import search_initial_hands
 from coartic.motion.solution import Execution, Movement, execute
+from coartic.motion.trials import Hands, Trials, hand_codes, make_trials
 from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
@@ -301,6 +303,73 @@ class Session:
         return replace(
             execution, movements=tuple(solution), configurations=execution.configurations[:0]
         )
+
+    def trials(self, hands: Hands, targets: Any, *, until: Any = None) -> Trials:
+        """Make N physical trials at once, which takes a fraction of the time of N :meth:`trial`.
+
+        ``hands`` is one hand sequence for all (``"RRLR"``), one each, or an array of shape
+        ``(N, G)`` with 0 for left and 1 for right. ``targets`` has shape ``(N, G, dof)``, length
+        unit (base) and rad (joints): a joint whose target is NaN keeps its value, and for a goal
+        without any target the corrective process acts alone, which has to be declared. Goals
+        that are missed are corrected, and paid for.
+
+        Where the budget has fewer trials left, only the first are made: what comes back is as
+        long as trials were made. With ``until``, shape ``(N,)``, the last trial is the first
+        whose reward exceeds its entry; those after it are not made.
+
+        Rewards and counts are those of single trials, but for forward kinematics, of which a
+        single trial spends one or two more per goal. Where the corrective process is not
+        declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
+        Raises BudgetError where no trial is left, ValueError for arrays that do not fit the task.
+        """
+        self._use(Information.REWARD_BY_TRIAL)
+        given = np.asarray(targets, dtype=np.float64)
+        if np.isnan(given).all(axis=-1).any():
+            self._use(Information.CORRECTIVE_PROCESS)
+        count, left = len(given), self.trials_left
+        codes = hand_codes(self._task, hands, count)
+        if left is not None and left < count:
+            if left <= 0:
+                raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
+            codes, given = codes[:left], given[:left]
+        made = make_trials(self._task, codes, given, model=self.model)
+        if until is not None:
+            better = made.rewards > np.asarray(until)[: len(given)]
+            if better.any():
+                made = Trials._make(each[: int(better.argmax()) + 1] for each in made)
+        self._meter.trials += len(made.ticks)
+        self._meter.movement_ticks += int(made.ticks.sum())
+        self._meter.corrections += int(made.corrections.sum())
+        self._meter.corrective_iterations += int(made.iterations.sum())
+        self._meter.jacobians += int(made.iterations.sum())
+        self._meter.forward_kinematics += int(made.evaluations.sum())
+        self._meter.failed_trials += int((~made.completed).sum())
+        for ticks, completed in zip(made.ticks.tolist(), made.completed.tolist(), strict=True):
+            self._rewards.append(-ticks if completed else None)
+        if Information.CORRECTIVE_PROCESS in self._told:
+            return made
+        return made._replace(
+            corrections=made.corrections[:0],
+            iterations=made.iterations[:0],
+            targets=made.targets[:0],
+            reached=made.reached[:0],
+        )
+
+    def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
+        """The hand sequence of a first trial, for a robot with these hands (all by default).
+
+        Where the task names a policy in place of a sequence, the trials that it takes are
+        counted, but no reward is kept of them. Raises NotApplicableError where no sequence
+        completes the task, or there are too many.
+        """
+        self._use(Information.CORRECTIVE_PROCESS)
+        self._use(Information.REWARD_BY_TRIAL)
+        search = search_initial_hands(self._task, hands, model=self.model)
+        for name, count in search._asdict().items():
+            if name != "hands":
+                setattr(self._meter, name, getattr(self._meter, name) + count)
+        self._meter.jacobians += search.corrective_iterations
+        return search.hands
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Corrective movements without a target are a use of the corrective process."""

@@ -31,7 +31,6 @@ from coartic.learner.conditions import (
 )
 from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.initial import InitialSearch, search_initial_hands
 from coartic.motion.lanes import LANES
 from coartic.tasks.task import Task
 
@@ -109,9 +108,8 @@ class DualProcess(Method):
         condition = replace(self.condition, **parameters.model_dump(exclude={"trials"}))
         tasks = [session.hand_over(*self.told) for session in sessions]
         task, model = tasks[0], sessions[0].model
-        search = search_initial_hands(task, condition.hands, model=model)
         for session in sessions:
-            spend_search(session, search)
+            session.find_initial_hands(condition.hands)
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
         if trials < 1:
@@ -140,13 +138,6 @@ def _result(session: Session, run: LearningRun) -> Result | MethodError:
         replay=run.replay if run.replay_completed else (),
         details={CORRECTIONS: run.corrections.tolist()},
     )
-
-
-def spend_search(session: Session, search: InitialSearch) -> None:
-    """Charge what a policy spent on finding the initial hands."""
-    spent = search._asdict()
-    del spent["hands"]
-    session.spend(**spent, jacobians=search.corrective_iterations)
 
 
 _SECONDARY = "change the posture as little as possible (nullspace of a correction)"

@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.movement import LARGEST, checked_goal, configuration
 from coartic.motion.reach import reach_in_turn
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of, letters_of
+
+Hands = str | Sequence[str] | NDArray[np.integer[Any]]
+"""Hand sequences of N trials: one for all (``"RRLR"``), one each, or an array of shape ``(N, G)``
+of indices into HANDS (0 left, 1 right)."""
 
 
 class Trials(NamedTuple):
@@ -27,23 +32,26 @@ class Trials(NamedTuple):
     """Control ticks of each, shape ``(N,)``."""
     completed: NDArray[np.bool_]
     """Whether every goal was hit, shape ``(N,)``."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made, shape ``(N,)``."""
+    iterations: NDArray[np.int64]
+    """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
+    evaluations: NDArray[np.int64]
+    """Forward-kinematics evaluations the kernel made, shape ``(N,)``."""
     targets: Array
     """Targets as moved to, shape ``(N, G, dof)``; a row of NaN where **A** alone acted,
     and in the goals after a failure what was given."""
     reached: Array
     """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN after a failure."""
-    corrections: int
-    """Corrective movements made, in all trials."""
-    iterations: int
-    """Iterations of the corrective process, one Jacobian each."""
-    evaluations: int
-    """Forward-kinematics evaluations the kernel made."""
+
+    @property
+    def rewards(self) -> Array:
+        """Total rewards, shape ``(N,)``; -inf where a trial failed."""
+        return np.where(self.completed, -self.ticks, -np.inf)
 
 
-def make_trials(
-    task: Task, hands: str | Sequence[str], targets: Array, *, model: MotionModel = PAPER
-) -> Trials:
-    """Make N trials, each from the start, with one hand sequence (``"RRLR"``) or each its own.
+def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel = PAPER) -> Trials:
+    """Make N trials, each from the start.
 
     ``targets`` has shape ``(N, G, dof)``, length unit (base) and rad (joints). A joint
     whose target is NaN keeps its value; for a goal without any target **A** acts alone.
@@ -59,7 +67,7 @@ def make_trials(
     made = reach_in_turn(
         task.robot,
         starts,
-        _checked_hands(task, hands, count),
+        hand_codes(task, hands, count),
         np.array([goals], dtype=np.float64),
         float(task.radius),
         given,
@@ -72,16 +80,37 @@ def make_trials(
     return Trials(
         ticks=made.ticks.sum(axis=1),
         completed=made.hit[:, -1].copy(),
+        corrections=made.corrections.sum(axis=1),
+        iterations=made.iterations.sum(axis=1),
+        evaluations=made.evaluations.sum(axis=1),
         targets=given,
         reached=made.q,
-        corrections=int(made.corrections.sum()),
-        iterations=int(made.iterations.sum()),
-        evaluations=int(made.evaluations.sum()),
     )
 
 
-def _checked_hands(task: Task, hands: str | Sequence[str], count: int) -> NDArray[np.int64]:
-    """The hand of every trial and goal; ValueError where they do not fit the task."""
+def movements_of(hands: str, targets: Array) -> tuple[Movement, ...]:
+    """A trial as a solution: ``targets`` has shape ``(G, dof)``, NaN where **A** acts alone."""
+    return tuple(
+        Movement(number, hand, "corrective")
+        if np.isnan(target).all()
+        else Movement(number, hand, "learned", target)
+        for number, (hand, target) in enumerate(zip(hands_of(hands), targets, strict=True), 1)
+    )
+
+
+def hand_codes(task: Task, hands: Hands, count: int) -> NDArray[np.int64]:
+    """The hand of every trial and goal, shape ``(count, G)``, as indices into HANDS.
+
+    Raises ValueError where they do not fit the task.
+    """
+    if isinstance(hands, np.ndarray) and hands.dtype.kind in "iu":
+        allowed = [HANDS.index(hand) for hand in task.hands]
+        if hands.shape != (count, len(task.goals)) or not np.isin(hands, allowed).all():
+            raise ValueError(
+                f"hands of shape {hands.shape} do not fit task {task.name!r}: needed is shape "
+                f"({count}, {len(task.goals)}) of numbers among {allowed}"
+            )
+        return hands.astype(np.int64)
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
     letters = set(letters_of(task.hands))

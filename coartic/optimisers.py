@@ -1,0 +1,221 @@
+"""The benchmark for optimisers: the cost of a trial as a function that is to be minimised.
+
+:func:`objective` makes the function of a task, for scipy and the like. An :class:`Optimiser` is a
+method of the benchmark that consists of such a function and of what minimises it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import abstractmethod
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from coartic.learner.learning import TRIALS
+from coartic.method import (
+    BudgetError,
+    Information,
+    Method,
+    MethodError,
+    Parameters,
+    Result,
+    Session,
+)
+from coartic.model import PAPER, MotionModel
+from coartic.motion.initial import too_many_sequences
+from coartic.motion.solution import Movement
+from coartic.motion.trials import movements_of
+from coartic.robot import HANDS, Array
+from coartic.tasks.catalogue import load_task
+from coartic.tasks.task import Task, hands_of, letters_of
+
+TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+"""What a method that minimises an :class:`Objective` is told."""
+FAILED = 1_000_000
+"""Cost of a trial that fails, ticks. One that takes so long has failed, too."""
+HALF_WIDTH = 1.0
+
+
+def explored_joints(
+    session: Session, hands: str, other_arm: Literal["free", "still"] = "free"
+) -> NDArray[np.bool_]:
+    """Joints that are worth exploring with a hand sequence, shape ``(G, dof)``.
+
+    Never a locked base coordinate, nor an arm that hits neither this goal nor a later one: moving
+    it can only cost. With ``"still"``, only the arm that hits the goal.
+    """
+    names = hands_of(hands)
+    mask = np.zeros((len(names), session.dof), dtype=np.bool_)
+    mask[:, :2] = [coordinate not in session.locked_base for coordinate in "xy"]
+    for goal, chosen in enumerate(names):
+        useful = names[goal:] if other_arm == "free" else (chosen,)
+        for hand in HANDS:
+            mask[goal, session.joints(hand)] = hand in useful
+    return mask
+
+
+class Objective:
+    """The cost of a trial in ticks, a function of its target configurations.
+
+    A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
+    by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
+    ``FAILED`` where the trial fails. Goals that a movement misses are corrected, and paid for.
+    The first trials are made at once: the corrective process alone, with ``hands`` or with every
+    hand sequence, of which the best is kept. Raises MethodError where it completes none.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        hands: str | None = None,
+        *,
+        half_width: float = HALF_WIDTH,
+        trials: int | None = None,
+    ) -> None:
+        self._session = session
+        self._end = None if trials is None else session.meter.trials + trials
+        if hands is None:
+            letters = letters_of(sorted(session.hands))
+            several = itertools.product(letters, repeat=session.goals_count)
+            sequences = ["".join(sequence) for sequence in several]
+            sequences.sort(key=lambda sequence: sequence != session.initial_hands)
+        else:
+            sequences = [hands]
+        sequences = sequences[: self._trials_left(len(sequences))]
+        shape = (len(sequences), session.goals_count, session.dof)
+        alone = session.trials(sequences, np.full(shape, np.nan))
+        best = int(alone.rewards.argmax())
+        if not alone.completed[best]:
+            raise MethodError("infeasible", "the corrective process completes no hand sequence")
+        self.hands = sequences[best]
+        """The hand sequence."""
+        self.joints = explored_joints(session, self.hands)
+        """Joints that have a target in a point, shape ``(G, dof)``."""
+        self.x0: Array = alone.reached[best, self.joints]
+        """A point to begin with: where the corrective process hits the goals, shape ``(dim,)``."""
+        self.dim = len(self.x0)
+        """Number of parameters."""
+        self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
+        """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
+        self.evaluations = 0
+        """Points evaluated; the first trials are not among them."""
+        self.best_x = self.x0
+        """The best point so far."""
+        self.best_cost = float(-alone.rewards[best])
+        """Its cost; that of the corrective process alone where no point was better."""
+        self._best_targets = alone.targets[best]
+
+    @property
+    def solution(self) -> tuple[Movement, ...]:
+        """The movements of the best trial, for :func:`coartic.execute`."""
+        return movements_of(self.hands, self._best_targets)
+
+    def __call__(self, x: ArrayLike) -> Any:
+        """The cost of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)`` as scipy has
+        them; see :meth:`many`."""
+        points = np.asarray(x, dtype=np.float64)
+        return float(self.many(points[None])[0]) if points.ndim == 1 else self.many(points.T)
+
+    def many(self, points: ArrayLike) -> Array:
+        """Costs ``(N,)`` of points ``(N, dim)``, which are evaluated side by side.
+
+        Raises BudgetError where trials are not left for all of them, after those that are left
+        are made. Raises ValueError for a wrong shape and for figures that are not finite.
+        """
+        array = np.asarray(points, dtype=np.float64)
+        if array.ndim != 2 or array.shape[1] != self.dim or not np.isfinite(array).all():
+            raise ValueError(
+                f"points of shape {array.shape}: needed is (N, {self.dim}), all of it finite"
+            )
+        left = self._trials_left(len(array))
+        targets = np.full((left, *self.joints.shape), np.nan)
+        targets[:, self.joints] = array[:left]
+        trials = self._session.trials(self.hands, targets)
+        in_time = trials.completed & (trials.ticks < FAILED)
+        costs = np.where(in_time, trials.ticks, FAILED).astype(np.float64)
+        self.evaluations += len(costs)
+        if len(costs) and costs.min() < self.best_cost:
+            best = int(costs.argmin())
+            self.best_cost, self.best_x = float(costs[best]), array[best].copy()
+            self._best_targets = trials.targets[best]
+        if len(costs) < len(array):
+            raise BudgetError("all trials of the budget are made")
+        return costs
+
+    def _trials_left(self, wanted: int) -> int:
+        """How many of so many trials are left."""
+        left = wanted if self._end is None else self._end - self._session.meter.trials
+        if left <= 0 < wanted:
+            raise BudgetError("all trials of the budget are made")
+        return min(wanted, left)
+
+
+def objective(
+    task: Task | str | Path,
+    hands: str | None = None,
+    *,
+    half_width: float = HALF_WIDTH,
+    model: MotionModel = PAPER,
+) -> Objective:
+    """The cost of a trial of a task, as a function that scipy and others can minimise.
+
+    ``task`` is a task, the name of one or a file; ``hands`` a hand sequence (``"RRLR"``), by
+    default the one with which the corrective process alone does best; ``half_width`` that of the
+    bounds around ``x0``, length unit (base) and rad (joints). Raises TaskError for a task that
+    cannot be used, ValueError for hands that do not fit, MethodError where the corrective process
+    completes no sequence, or where there are too many to try.
+    """
+    chosen = task if isinstance(task, Task) else load_task(task)
+    if hands is None and (reason := too_many_sequences(chosen, len(chosen.hands))):
+        raise MethodError("infeasible", f"{reason}; say which hands")
+    session = Session(chosen, 0, TOLD, model=model)
+    return Objective(session, hands, half_width=half_width)
+
+
+class OptimiserParameters(Parameters):
+    """Parameters of every :class:`Optimiser`."""
+
+    trials: Annotated[int, Field(gt=0)] = TRIALS
+    hands: str | None = None
+    """Hand sequence; by default the one with which the corrective process alone does best."""
+    half_width: Annotated[float, Field(gt=0, le=100)] = HALF_WIDTH
+    """Of the bounds, length unit (base) and rad (joints)."""
+
+
+class Optimiser(Method):
+    """A method of the benchmark that minimises the cost of a trial.
+
+    A subclass has a name, a title, a citation and :meth:`optimise`.
+    """
+
+    told = TOLD
+    Parameters = OptimiserParameters
+
+    def why_not(self, task: Task) -> str | None:
+        """More hand sequences than can be tried one by one."""
+        return None if self.parameters.hands else too_many_sequences(task, len(task.hands))
+
+    def solve(self, session: Session) -> Result:
+        """Optimise until the trials are used up; the solution is the best trial's."""
+        parameters: OptimiserParameters = self.parameters
+        try:
+            cost = Objective(
+                session,
+                parameters.hands,
+                half_width=parameters.half_width,
+                trials=parameters.trials,
+            )
+        except BudgetError:
+            raise MethodError("infeasible", "the trial budget leaves no trial to make") from None
+        with session.solving(), suppress(BudgetError):
+            self.optimise(cost, session.rng)
+        return Result(cost.solution, {"evaluations": cost.evaluations})
+
+    @abstractmethod
+    def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
+        """Minimise; the objective keeps the best point, and ends this when no trial is left."""
