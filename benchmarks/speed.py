@@ -1,4 +1,4 @@
-"""How fast trials are: the learner's kernel, and suite ``paper`` through the harness.
+"""How fast trials are: through each public way, in the learner, and suite ``paper`` as a whole.
 
     python -m coartic.benchmarks.speed
 
@@ -7,20 +7,34 @@ Times depend on the machine; compare ratios, and times of one call.
 
 from __future__ import annotations
 
+import importlib.util
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from coartic import CONDITIONS, Task, learn_many, load_task
+import numpy as np
+
+from coartic import CONDITIONS, Objective, Task, learn_many, load_task
+from coartic.baselines.cma_es import Every
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.run import plan_suite
 from coartic.learner.learning import METHOD_PREFIX, TRIALS, warm_up
+from coartic.method import Session
 from coartic.motion.lanes import LANES
+from coartic.motion.reach import reach_in_turn
+from coartic.motion.trials import hand_codes, movements_of
+from coartic.robot import Array
 from coartic.runs.store import open_store
 
 
 def main() -> None:
     """Measure and print."""
+    rates = trials_a_second()
+    print(f"{'way':32}{'trials a second':>18}{'of the kernel':>16}")
+    for way, rate in rates.items():
+        print(f"{way:32}{rate:18,.0f}{rate / rates['kernel, 1000 at once']:16.4f}")
     plan = plan_suite("paper")
     cells = [
         (load_task(cell.task), cell.method.removeprefix(METHOD_PREFIX)) for cell in plan.plan.cells
@@ -44,6 +58,101 @@ def main() -> None:
         with open_store(Path(folder)) as store:
             store.frame("runs")
         print(f"read back: {time.perf_counter() - clock:.2f} s")
+
+
+def trials_a_second() -> dict[str, float]:
+    """Trials a second on one core through each public way: the same trials, of ``two-armed-1``.
+
+    They are around what CMA-ES finds, so that few goals are missed. Those of Gymnasium are left
+    out where it is not installed.
+    """
+    task = load_task("two-armed-1")
+    session = Session(task, 0, Every.told)
+    solution = Every(Every.Parameters(trials=3000)).solve(session).solution
+    hands = "".join(movement.hand[0].upper() for movement in solution)
+    best = np.array([movement.target for movement in solution])
+    cost = Objective(session, hands)
+    noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
+    targets = best + noise
+    codes, ones = hand_codes(task, [hands] * 1000, 1000), np.ones((1000, len(hands)), np.bool_)
+    starts = np.tile(task.q0, (1000, 1))
+    single = [movements_of(hands, target) for target in targets[:100]]
+
+    def kernel() -> None:
+        reach_in_turn(
+            task.robot,
+            starts,
+            codes,
+            task.goal_array[None],
+            task.radius,
+            targets.copy(),  # into which it writes
+            ones,
+            bounds=(0, 1000),
+            locked_base=task.locked_base,
+        )
+
+    rates = {
+        "kernel, 1000 at once": _rate(1000, kernel),
+        "Session.trials, 1000 at once": _rate(1000, lambda: session.trials(codes, targets)),
+        "objective.many, 1000 at once": _rate(1000, lambda: cost.many(targets[:, cost.joints])),
+        "objective, one by one": _rate(
+            100, lambda: [cost(target[cost.joints]) for target in targets[:100]]
+        ),
+        "Session.trial, one by one": _rate(100, lambda: [session.trial(own) for own in single]),
+    }
+    if importlib.util.find_spec("gymnasium"):
+        rates |= _rates_of_environments(hands, best, noise)
+    return rates
+
+
+def _rates_of_environments(hands: str, best: Array, noise: Array) -> dict[str, float]:
+    import gymnasium
+
+    import coartic.gym  # noqa: F401 (registers the environments)
+
+    name, options = "coartic/TwoArmed1-v0", {"around": best}
+    env = gymnasium.make(name, **options)
+    sides = np.where(np.array([*hands]) == "R", 1.0, -1.0)
+    actions = np.concatenate(
+        [
+            np.broadcast_to(sides[:, None], (1000, len(hands), 1)),
+            noise[..., env.unwrapped.arms.free],
+        ],
+        axis=-1,
+    ).swapaxes(0, 1)  # goals first
+
+    def episodes() -> None:
+        for n in range(100):
+            env.reset()
+            for action in actions[:, n]:
+                env.step(action)
+
+    rates = {"environment, one by one": _rate(100, episodes)}
+    for vectors, count, mode in (
+        ("SyncVectorEnv of 16", 16, "sync"),
+        ("vector environment of 16", 16, "vector_entry_point"),
+        ("vector environment of 1000", 1000, "vector_entry_point"),
+    ):
+        many = gymnasium.make_vec(name, num_envs=count, vectorization_mode=mode, **options)
+        many.reset()
+
+        def rounds(many: Any = many, count: int = count) -> None:
+            for action in [*actions, actions[0]]:  # in the last step all begin anew
+                many.step(action[:count])
+
+        rates[vectors] = _rate(count, rounds)
+    return rates
+
+
+def _rate(trials: int, make: Callable[[], object]) -> float:
+    """Trials a second, the median of several times; ``make`` makes so many."""
+    make()
+    times: list[float] = []
+    while len(times) < 5 or (sum(times) < 1.0 and len(times) < 500):
+        clock = time.thread_time()
+        make()
+        times.append(time.thread_time() - clock)
+    return trials / float(np.median(times))
 
 
 def _us_a_trial(task: Task, condition: str, runs: int) -> float:

@@ -324,7 +324,10 @@ class Session:
         """
         self._use(Information.REWARD_BY_TRIAL)
         given = np.asarray(targets, dtype=np.float64)
-        if np.isnan(given).all(axis=-1).any():
+        if given.ndim != 3:
+            raise ValueError(f"targets have shape {given.shape}; needed is (N, G, dof)")
+        without_base = given[np.isnan(given[..., 0])]  # few, in which to look further
+        if np.isnan(without_base).all(axis=-1).any():
             self._use(Information.CORRECTIVE_PROCESS)
         count, left = len(given), self.trials_left
         codes = hand_codes(self._task, hands, count)
@@ -344,8 +347,10 @@ class Session:
         self._meter.jacobians += int(made.iterations.sum())
         self._meter.forward_kinematics += int(made.evaluations.sum())
         self._meter.failed_trials += int((~made.completed).sum())
-        for ticks, completed in zip(made.ticks.tolist(), made.completed.tolist(), strict=True):
-            self._rewards.append(-ticks if completed else None)
+        rewards: list[int | None] = (-made.ticks).tolist()
+        for failed in np.flatnonzero(~made.completed).tolist():
+            rewards[failed] = None
+        self._rewards.extend(rewards)
         if Information.CORRECTIVE_PROCESS in self._told:
             return made
         return made._replace(

@@ -105,7 +105,8 @@ def hand_codes(task: Task, hands: Hands, count: int) -> NDArray[np.int64]:
     """
     if isinstance(hands, np.ndarray) and hands.dtype.kind in "iu":
         allowed = [HANDS.index(hand) for hand in task.hands]
-        if hands.shape != (count, len(task.goals)) or not np.isin(hands, allowed).all():
+        fits = (hands >= min(allowed)) & (hands <= max(allowed))
+        if hands.shape != (count, len(task.goals)) or not fits.all():
             raise ValueError(
                 f"hands of shape {hands.shape} do not fit task {task.name!r}: needed is shape "
                 f"({count}, {len(task.goals)}) of numbers among {allowed}"

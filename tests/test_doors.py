@@ -1,0 +1,210 @@
+"""Sessions' trials in one call, and the objective function, against trials made one by one."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import coartic
+from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic.benchmarks.conformance import check_method
+from coartic.benchmarks.registry import registry
+from coartic.method import BudgetError, Information, Meter, MethodError, Session, UndeclaredError
+from coartic.motion.trials import hand_codes, movements_of
+from coartic.optimisers import FAILED, TOLD, Objective
+from tests.support.strategies import tiny_task
+
+PAGE = (Path(__file__).parent.parent / "docs" / "howto" / "optimisers.md").read_text("utf-8")
+BLIND = frozenset({Information.REWARD_BY_TRIAL})
+
+
+def sample(task, count, noise=0.3, seed=0):
+    """Hand sequences, and targets around what the corrective process does with them."""
+    rng = np.random.default_rng(seed)
+    hands = [str(sequence) for sequence in rng.choice(hand_sequences(task), count)]
+    targets = np.array([corrective_trial(task, sequence).configurations for sequence in hands])
+    free = [axis not in task.locked_base for axis in "xy"] + [True] * (task.robot.dof - 2)
+    return hands, targets + noise * np.array(free) * rng.standard_normal(targets.shape)
+
+
+@pytest.mark.parametrize("name", coartic.builtin_tasks())
+def test_a_batch_is_so_many_single_trials(name):
+    task = load_task(name)
+    model = MotionModel(max_iterations=150 if name == "two-armed-1" else 70)  # some trials fail
+    hands, targets = sample(task, 40)
+    targets[::7, 1] = np.nan
+    batch, single = (Session(task, 0, TOLD, model=model) for _ in range(2))
+    trials = batch.trials(hands, targets)
+    made = [single.trial(movements_of(*pair)) for pair in zip(hands, targets, strict=True)]
+    assert batch.rewards == single.rewards == [execution.reward for execution in made]
+    assert 0 < batch.rewards.count(None) < 40
+    np.testing.assert_array_equal(
+        trials.rewards, [-np.inf if e.reward is None else e.reward for e in made]
+    )
+    assert trials.ticks.tolist() == [execution.ticks for execution in made]
+    assert trials.corrections.tolist() == [execution.corrections for execution in made]
+    for reached, execution in zip(trials.reached, made, strict=True):
+        hits = len(execution.configurations)
+        np.testing.assert_array_equal(reached[:hits], execution.configurations)
+        assert np.isnan(reached[hits:]).all()
+    for count in {*Meter.COUNTS} - {"forward_kinematics"}:
+        assert getattr(batch.meter, count) == getattr(single.meter, count), count
+    assert 0 < batch.meter.forward_kinematics < single.meter.forward_kinematics
+
+
+def test_hands_as_text_and_as_numbers():
+    task = load_task("two-armed-1")
+    hands, targets = sample(task, 6)
+    session = Session(task, 0, TOLD)
+    codes = hand_codes(task, hands, 6)
+    assert [["L", "R"][code] for code in codes[0]] == [*hands[0]]
+    for one, other in zip(
+        session.trials(hands, targets), session.trials(codes, targets), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
+    for wrong in (codes[:5], codes[:, :3], codes + 1, hands[:5], "LLL"):
+        with pytest.raises(ValueError, match="hand"):
+            session.trials(wrong, targets)
+
+
+def test_a_budget_that_ends_within_a_batch():
+    task = load_task("two-armed-2")
+    hands, targets = sample(task, 10)
+    whole = Session(task, 0, TOLD).trials(hands, targets)
+    session = Session(task, 0, TOLD, trial_budget=7)
+    assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
+    rest = session.trials(hands[4:], targets[4:])
+    np.testing.assert_array_equal(rest.rewards, whole.rewards[4:7])
+    assert (session.meter.trials, session.trials_left, len(session.rewards)) == (7, 0, 7)
+    assert len(session.trials([], targets[:0]).ticks) == 0
+    with pytest.raises(BudgetError, match="all 7 trials"):
+        session.trials(hands, targets)
+    assert session.meter.trials == 7
+
+
+def test_until_the_first_that_is_better():
+    task = load_task("two-armed-2")
+    hands, targets = sample(task, 12)
+    rewards = Session(task, 0, TOLD).trials(hands, targets).rewards
+    until = np.full(12, np.inf)
+    until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
+    session, alone = Session(task, 0, TOLD), Session(task, 0, TOLD)
+    np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
+    alone.trials(hands[:6], targets[:6])
+    assert session.meter == alone.meter
+    assert session.rewards == alone.rewards
+
+
+def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
+    task = load_task("ascending")
+    hands, targets = sample(task, 3)
+    session = Session(task, 0, BLIND)
+    blind, told = session.trials(hands, targets), Session(task, 0, TOLD).trials(hands, targets)
+    np.testing.assert_array_equal(blind.rewards, told.rewards)
+    assert told.corrections.sum() > 0
+    hidden = (blind.corrections, blind.iterations, blind.targets, blind.reached)
+    assert [len(field) for field in hidden] == [0] * 4
+    targets[1, 2] = np.nan
+    with pytest.raises(UndeclaredError, match="corrective process"):
+        session.trials(hands, targets)
+    with pytest.raises(UndeclaredError, match="reward by trial"):
+        Session(task, 0, TOLD - BLIND).trials(hands, targets)
+
+
+def test_the_cost_of_a_point_is_what_its_trial_takes():
+    task = load_task("two-armed-1")
+    cost = coartic.objective(task, "LRLR", half_width=0.25)
+    assert (cost.dim, cost.bounds.shape) == (4 * 9 - 4, (32, 2))  # locked in y; L is done at last
+    np.testing.assert_allclose(cost.bounds.T - cost.x0, [[-0.25] * 32, [0.25] * 32])
+    assert cost.best_cost == -corrective_trial(task, "LRLR").reward
+    points = cost.x0 + 0.1 * np.random.default_rng(1).standard_normal((20, 32))
+    costs = cost.many(points)
+    q, targets = task.q0, np.tile(task.q0, (4, 1))
+    targets[cost.joints] = points[3]
+    for goal in range(4):  # joints without a parameter stay where they are
+        targets[goal] = np.where(cost.joints[goal], targets[goal], q)
+        q = execute(task, movements_of("LRLR", targets)).configurations[goal]
+    assert costs[3] == -execute(task, movements_of("LRLR", targets)).reward
+    np.testing.assert_array_equal(cost(points.T), costs)
+    assert cost(points[3]) == costs[3]
+    assert cost.evaluations == 41
+
+
+def test_the_best_point_is_kept_with_its_solution():
+    task = load_task("ascending")
+    cost = coartic.objective("ascending")
+    assert execute(task, cost.solution).reward == -319  # the corrective process alone
+    rng, costs, points = np.random.default_rng(0), [], []
+    for _ in range(30):
+        points.append(cost.x0 + 0.05 * rng.standard_normal((50, cost.dim)))
+        costs.append(cost.many(points[-1]))
+    assert cost.best_cost == np.min(costs) < 319
+    np.testing.assert_array_equal(cost.best_x, np.vstack(points)[np.argmin(costs)])
+    assert -execute(task, cost.solution).reward == cost.best_cost == cost(cost.best_x)
+
+
+def test_the_default_hands_are_those_that_do_best_alone():
+    task = load_task("two-armed-1")
+    alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
+    assert coartic.objective(task).hands == max(alone, key=alone.get) == "LRLR"
+    with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
+        coartic.objective(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
+    with pytest.raises(ValueError, match="do not fit"):
+        coartic.objective(task, "LR")
+
+
+def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
+    model = MotionModel(max_iterations=100)
+    cost = coartic.objective("ascending", model=model)
+    costs = cost.many(cost.x0 + np.random.default_rng(0).standard_normal((200, cost.dim)))
+    assert 0 < (costs == FAILED).sum() < 200
+    assert costs[costs < FAILED].max() < 5000
+    with pytest.raises(MethodError, match="completes no hand sequence"):
+        coartic.objective("ascending", model=MotionModel(max_iterations=2))
+    for wrong in (cost.x0[None, 1:], [[np.nan] * cost.dim], cost.x0):
+        with pytest.raises(ValueError, match="needed is"):
+            cost.many(wrong)
+
+
+@pytest.mark.parametrize(("budget", "trials"), [(30, None), (None, 30), (30, 50)])
+def test_the_objective_ends_with_the_trials(budget, trials):
+    session = Session(load_task("two-armed-2"), 0, TOLD, trial_budget=budget)
+    cost = Objective(session, trials=trials)
+    points = np.tile(cost.x0, (10, 1))
+    assert len(cost.many(points)) == 10
+    with pytest.raises(BudgetError):
+        cost.many(points)  # 16 for the hands, and 4 of these
+    assert (cost.evaluations, session.meter.trials) == (14, 30)
+    with pytest.raises(BudgetError):
+        cost(cost.x0)
+    assert session.meter.trials == 30
+
+
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+FILES = {re.search(r'name = "(.*)"', text)[1]: text for text in BLOCKS if "Optimiser)" in text}
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+def test_optimisers_of_the_page_are_methods(name, tmp_path, in_this_process):
+    pytest.importorskip(re.search(r"^(?:import|from) (\w+)", FILES[name], re.MULTILINE)[1])
+    assert FILES[name].count("\n") <= 30
+    path = tmp_path / f"{name.replace('-', '_')}_of_the_page.py"
+    path.write_text(FILES[name], "utf-8")
+    entry = registry([path])[name]
+    laws = check_method(entry, tasks=[load_task("ascending")])
+    assert [law for law in laws if not law.passed] == []
+    session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
+    solution = entry.made({}).solve(session).solution
+    assert session.meter.trials == 300
+    assert execute(load_task("ascending"), solution).reward == max(
+        reward for reward in session.rewards if reward is not None
+    )
+
+
+def test_the_first_program_of_the_page(capsys):
+    exec(BLOCKS[0].replace("maxiter=100", "maxiter=3"), {})
+    shown = capsys.readouterr().out
+    cost, reward = re.search(r"([0-9.]+) ticks", shown)[1], re.search(r"\n(-\d+)\n", shown)[1]
+    assert float(cost) == -int(reward)

@@ -1,0 +1,155 @@
+"""The environments of Gymnasium against executions, and against Gymnasium's own vectors."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coartic import CONDITIONS, MotionModel, execute, learn, load_task
+from coartic.baselines.cma_es import Bandit
+from coartic.method import Session
+from coartic.optimisers import FAILED
+
+gymnasium = pytest.importorskip("gymnasium")
+
+import coartic.gym  # noqa: E402
+
+IDS = {f"coartic/{name}-v0": task for name, task in coartic.gym.TASKS.items() if task}
+TWO = "coartic/TwoArmed1-v0"
+
+
+def solutions(task):
+    """Of the learner, and of CMA-ES, which ends as near to a whole tick as it gets."""
+    condition = CONDITIONS["EC4" if len(task.hands) == 2 else "EC1"]
+    yield learn(task, condition, seed=0, trials=300).learned
+    yield Bandit(Bandit.Parameters(trials=800)).solve(Session(task, 0, Bandit.told)).solution
+
+
+@pytest.mark.parametrize("around", [None, "alone"])
+@pytest.mark.parametrize("name", IDS)
+def test_a_replayed_solution_gets_its_reward(name, around):
+    task = load_task(IDS[name])
+    env = gymnasium.make(name, around=around and "R" * len(task.goals)).unwrapped
+    for solution in solutions(task):
+        execution = execute(task, solution)
+        first = {m.goal: m for m in reversed(execution.movements)}
+        env.reset()
+        steps = [
+            env.step(env.action_for(first[goal].hand, first[goal].target)) for goal in sorted(first)
+        ]
+        _, rewards, ended, truncated, infos = zip(*steps, strict=True)
+        assert [-reward for reward in rewards] == list(execution.ticks_by_goal())
+        assert sum(rewards) == execution.reward
+        assert [*ended] == [False] * (len(task.goals) - 1) + [True]
+        assert not any(truncated)
+        assert infos[-1]["hands"] == execution.hands
+        assert infos[-1]["is_success"]
+        assert not infos[-2]["is_success"]
+        np.testing.assert_allclose(env.arms.q[0], execution.configurations[-1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("coartic/Ascending-v0", {}),
+        (TWO, {"observe": "posture"}),
+        ("coartic/Task-v0", {"task": "long/v1/i017", "around": "RRRRRR"}),
+    ],
+)
+def test_the_checkers_find_nothing(name, options, monkeypatch):
+    from gymnasium.utils.env_checker import check_env
+
+    monkeypatch.setitem(coartic.gym.TaskEnv.metadata, "render_fps", 1000)
+    check_env(gymnasium.make(name, **options).unwrapped)
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    checker.check_env(gymnasium.make(name, **options).unwrapped)
+
+
+def test_what_the_learner_sees_and_what_can_be_seen():
+    task = load_task("two-armed-1")
+    plain, whole = (gymnasium.make(TWO, observe=what) for what in ("learner", "posture"))
+    seen, _ = plain.reset(seed=3)
+    assert seen.tolist() == [1, 0, 0, 0, 0, 0]
+    whole.reset()
+    left = np.full(plain.action_space.shape, -0.1)
+    seen, _, _, _, info = plain.step(left)
+    assert seen.tolist() == [0, 1, 0, 0, 1, 0]
+    assert (info["hands"], info["corrections"]) == ("L", 1)
+    seen = whole.step(left)[0]
+    q = whole.unwrapped.arms.q[0]
+    np.testing.assert_allclose(seen[6:], [*q, *task.goal_array.ravel()], rtol=1e-6)
+    assert plain.step(-left)[0].tolist() == [0, 0, 1, 0, 0, 1]
+    assert plain.action_space.shape == (1 + 9,)  # the base is locked in y
+    assert gymnasium.make("coartic/Ascending-v0").action_space.shape == (2 + 4,)
+
+
+def test_trials_that_fail_and_actions_that_are_none():
+    env = gymnasium.make("coartic/Ascending-v0", model=MotionModel(max_iterations=2))
+    env.reset()
+    _, reward, ended, _, info = env.step(np.zeros(6))
+    assert (reward, ended, info["is_success"]) == (-FAILED, True, False)
+    for action in (np.nan, 1e9):
+        env.reset()
+        with pytest.raises(ValueError, match="not finite, or far beyond"):
+            env.step(np.full(6, action))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"around": "LRLR", "observe": "posture"}, {"model": MotionModel(max_iterations=150)}],
+)
+def test_the_vector_is_as_many_single_ones(options):
+    """Episodes that fail end earlier, so that robots are at different goals."""
+    own, sync = (
+        gymnasium.make_vec(TWO, num_envs=7, vectorization_mode=mode, **options)
+        for mode in ("vector_entry_point", "sync")
+    )
+    assert isinstance(own, coartic.gym.TaskVectorEnv)
+    assert own.metadata["autoreset_mode"] == sync.metadata["autoreset_mode"]
+    assert own.single_action_space == sync.single_action_space
+    assert own.observation_space == sync.observation_space
+    own.action_space.seed(0)
+    ended = []
+    results = [(own.reset(seed=1), sync.reset(seed=1))]
+    for _ in range(17):
+        actions = own.action_space.sample()
+        results.append((own.step(actions), sync.step(actions)))
+        ended.append(results[-1][0][2].tolist())
+    for (*ours, our_info), (*theirs, their_info) in results:
+        for one, other in zip(ours, theirs, strict=True):
+            np.testing.assert_array_equal(one, other)
+            assert one.dtype == other.dtype
+        for key in ("corrections", "is_success", "hands"):
+            there = their_info[f"_{key}"]
+            assert our_info[key][there].tolist() == their_info[key][there].tolist()
+    assert np.array(ended).any(axis=0).all()
+    assert ("model" in options) == (np.array(ended)[[0, 1, 2]].any())
+
+
+def test_the_robot_is_drawn():
+    env = gymnasium.make(TWO, render_mode="rgb_array")
+    env.reset()
+    before = env.render()
+    env.step(np.zeros(10))
+    assert before.shape == (400, 600, 3)
+    assert before.dtype == np.uint8
+    assert (before != env.render()).any()
+
+
+def test_importing_the_environments_compiles_nothing():
+    code = "import sys, coartic.gym; assert not {'numba', 'matplotlib', 'torch'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_agent_of_the_page_trains(capsys):
+    pytest.importorskip("stable_baselines3")
+    page = Path(__file__).parent.parent / "docs" / "howto" / "agents.md"
+    (text,) = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    made = {}
+    exec(text.replace("60_000", "2048"), made)
+    assert -560 < made["total"] < -480  # the corrective process alone: -532
+    assert made["info"]["is_success"]
+    assert all(-FAILED < episode["r"] < -480 for episode in made["agent"].ep_info_buffer)
