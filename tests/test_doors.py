@@ -39,9 +39,8 @@ def test_a_batch_is_so_many_single_trials(name):
     made = [single.trial(movements_of(*pair)) for pair in zip(hands, targets, strict=True)]
     assert batch.rewards == single.rewards == [execution.reward for execution in made]
     assert 0 < batch.rewards.count(None) < 40
-    np.testing.assert_array_equal(
-        trials.rewards, [-np.inf if e.reward is None else e.reward for e in made]
-    )
+    rewards = [-np.inf if reward is None else reward for reward in single.rewards]
+    assert trials.rewards.tolist() == rewards
     assert trials.ticks.tolist() == [execution.ticks for execution in made]
     assert trials.corrections.tolist() == [execution.corrections for execution in made]
     for reached, execution in zip(trials.reached, made, strict=True):
@@ -59,9 +58,8 @@ def test_hands_as_text_and_as_numbers():
     session = Session(task, 0, TOLD)
     codes = hand_codes(task, hands, 6)
     assert [["L", "R"][code] for code in codes[0]] == [*hands[0]]
-    for one, other in zip(
-        session.trials(hands, targets), session.trials(codes, targets), strict=True
-    ):
+    both = session.trials(hands, targets), session.trials(codes, targets)
+    for one, other in zip(*both, strict=True):
         np.testing.assert_array_equal(one, other)
     for wrong in (codes[:5], codes[:, :3], codes + 1, hands[:5], "LLL"):
         with pytest.raises(ValueError, match="hand"):
@@ -80,7 +78,6 @@ def test_a_budget_that_ends_within_a_batch():
     assert len(session.trials([], targets[:0]).ticks) == 0
     with pytest.raises(BudgetError, match="all 7 trials"):
         session.trials(hands, targets)
-    assert session.meter.trials == 7
 
 
 def test_until_the_first_that_is_better():
@@ -150,8 +147,6 @@ def test_the_default_hands_are_those_that_do_best_alone():
     assert coartic.objective(task).hands == max(alone, key=alone.get) == "LRLR"
     with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
         coartic.objective(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
-    with pytest.raises(ValueError, match="do not fit"):
-        coartic.objective(task, "LR")
 
 
 def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
@@ -178,7 +173,6 @@ def test_the_objective_ends_with_the_trials(budget, trials):
     assert (cost.evaluations, session.meter.trials) == (14, 30)
     with pytest.raises(BudgetError):
         cost(cost.x0)
-    assert session.meter.trials == 30
 
 
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -197,10 +191,8 @@ def test_optimisers_of_the_page_are_methods(name, tmp_path, in_this_process):
     assert [law for law in laws if not law.passed] == []
     session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
     solution = entry.made({}).solve(session).solution
-    assert session.meter.trials == 300
-    assert execute(load_task("ascending"), solution).reward == max(
-        reward for reward in session.rewards if reward is not None
-    )
+    assert session.meter.trials == len(session.rewards) == 300
+    assert execute(load_task("ascending"), solution).reward == max(session.rewards)
 
 
 def test_the_first_program_of_the_page(capsys):
