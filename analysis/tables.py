@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -392,10 +393,13 @@ def all_signatures(study: Study) -> pd.DataFrame:
     columns = ["task", "label", "signature", "where", "value", "low", "high", "p", "n", "unit"]
     joined = variants(families(study.tasks))
 
+    @cache
+    def ids_of(names: tuple[str, ...], label: str) -> str:
+        return _runs(*(study.cells[name, label] for name in names if (name, label) in study.cells))
+
     def run_ids(task: str, label: str, against: str, moving: float) -> str:
         beside = {against} if math.isnan(moving) else set().union(*(g for g in joined if task in g))
-        names = [task, *sorted(beside - {task, ""})]
-        return _runs(*(study.cells[name, label] for name in names if (name, label) in study.cells))
+        return ids_of((task, *sorted(beside - {task, ""})), label)
 
     behind = frame[["task", "label", "against", "moving"]].astype({"moving": float})
     ids = [run_ids(*row) for row in behind.itertuples(index=False)]

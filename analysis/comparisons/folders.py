@@ -55,8 +55,8 @@ def compared_cells(first: Study, second: Study) -> pd.DataFrame:
     ticks and rewards of all trials, of those ``shared``; mean rewards ``reward_a`` and
     ``reward_b``; ``difference`` of B less A with its 95 % BCa interval, paired by seed where at
     least three are shared; ``p`` of a two-tailed test (pairs: sign flips) after Holm's correction
-    over all cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few runs, or
-    not compared; ``remarks``.
+    over all cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few
+    runs, or not compared; ``remarks``.
     """
     ours, theirs = facts_of(first), facts_of(second)
     rows = [

@@ -105,17 +105,18 @@ class Targets:
         return Crossing(budget, float(low), float(high))
 
 
-@lru_cache(maxsize=1)
-def resampled_counts(sizes: tuple[int, ...]) -> NDArray[np.int16]:
+@lru_cache(maxsize=2)
+def resampled_counts(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """How often each run is in each resample, ``(RESAMPLES, runs)``, tasks by their runs."""
     rng = np.random.default_rng(SEED)
     draws = (rng.multinomial(size, np.full(size, 1 / size), size=RESAMPLES) for size in sizes)
-    return np.concatenate([counts.astype(np.int16) for counts in draws], axis=1)
+    return np.concatenate([counts.astype(np.uint8) for counts in draws], axis=1)
 
 
 @cached
 def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
-    """Pairs of run and target by task (or :data:`ALL_TASKS`), method and spend.
+    """Pairs of run and target by task, method and spend; over :data:`ALL_TASKS` where some method
+    ran on all of several.
 
     Of the tasks of :func:`~.standings.ends`, and of all methods but variants and searches for
     the optimum. A run whose steps are not known, such as the time of a cold one, has no part.
@@ -132,7 +133,7 @@ def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
             keys = [(task, label, spend) for task, label in zip(own.task, own.label, strict=True)]
             if 1 < len(scale) == len(keys) and spends.keys() >= set(keys):
                 found[ALL_TASKS, str(method), spend] = Targets([spends[key] for key in keys])
-    return found | {key: Targets([own]) for key, own in spends.items()}
+    return found or {key: Targets([own]) for key, own in spends.items()}
 
 
 def spent_at(runs: Sequence[BestSoFar], spend: str, start: float, best: float) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,24 +33,6 @@ from coartic.motion.initial import initial_hands
 
 ALL_TASKS = "all tasks"
 """In the column of tasks: the mean over all of them."""
-
-
-class Standing(NamedTuple):
-    """How far a method ends from the optimum on a task, or over all."""
-
-    task: str
-    """Or :data:`ALL_TASKS`."""
-    method: str
-    """Label."""
-    knows: str
-    """What it uses of the reward: one of :data:`~.methods.GROUPS`."""
-    algorithm: str
-    gap: float
-    """Mean, as a share of the optimum."""
-    low: float
-    high: float
-    """Ends of the 95 % interval over runs, NaN where there is none."""
-    runs: int
 
 
 @cached
@@ -100,19 +81,26 @@ def gaps(study: Study) -> pd.DataFrame:
 
 @cached
 def standings(study: Study) -> pd.DataFrame:
-    """Rows as :class:`Standing`, nearest first: over all tasks, then task by task.
+    """How far each method ends from the optimum: over all tasks, then task by task.
 
-    Of methods that solved every run; searches for the optimum and variants are left out.
+    Nearest first; of methods that solved every run, without searches for the optimum and variants.
+    Columns ``task`` (or :data:`ALL_TASKS`), ``method`` (label), ``knows`` (what it uses of the
+    reward: one of :data:`~.methods.GROUPS`), ``algorithm``, ``gap`` (mean, as a share of the
+    optimum) with the ``low`` and ``high`` end of its 95 % interval over runs, and ``runs``.
     """
-    rows = [row for row in over_all(study) if not is_variant(row.method)]
-    rows += [row for row in task_by_task(study) if not is_variant(row.method)]
-    frame = pd.DataFrame(
-        [row for row in rows if not is_search(row.method)], columns=Standing._fields
-    )
+    rows = [
+        (task, method, group_of(study, method), algorithm_of(method), *gap)
+        for task, method, *gap in [*over_all(study), *task_by_task(study)]
+        if not is_variant(method) and not is_search(method)
+    ]
+    columns = ["task", "method", "knows", "algorithm", "gap", "low", "high", "runs"]
     places = [ALL_TASKS, *study.tasks]
-    frame = frame.assign(place=[places.index(task) for task in frame.task])
-    frame = frame.sort_values(["place", "gap"], kind="stable", ignore_index=True)
-    return frame.drop(columns="place")
+    rows.sort(key=lambda row: (places.index(str(row[0])), row[4]))
+    return pd.DataFrame(rows, columns=columns)
+
+
+Standing = tuple[str, str, float, float, float, int]
+"""Task, method, gap with its interval, and runs."""
 
 
 def over_all(study: Study) -> Iterator[Standing]:
@@ -121,10 +109,8 @@ def over_all(study: Study) -> Iterator[Standing]:
     for name, runs in gaps(study).groupby("method", sort=False):
         by_task = {str(task): own.gap.to_numpy() for task, own in runs.groupby("task")}
         if len(tasks) > 1 and len(by_task) == len(tasks) and runs.gap.notna().all():
-            method, group = str(name), group_of(study, str(name))
-            gap, algorithm = task_mean(by_task), algorithm_of(method)
-            of = gap.estimate, gap.low, gap.high
-            yield Standing(ALL_TASKS, method, group, algorithm, *of, len(runs))
+            gap = task_mean(by_task)
+            yield ALL_TASKS, str(name), gap.estimate, gap.low, gap.high, len(runs)
 
 
 def task_by_task(study: Study) -> Iterator[Standing]:
@@ -135,8 +121,7 @@ def task_by_task(study: Study) -> Iterator[Standing]:
             best, found = study.optima[task, "free"].reward, mean(cell.rewards)
             # The higher the reward, the smaller the gap.
             gap, low, high = gap_share([found.estimate, found.high, found.low], best).tolist()
-            group, algorithm = group_of(study, label), algorithm_of(label)
-            yield Standing(task, label, group, algorithm, gap, low, high, len(cell.runs))
+            yield task, label, gap, low, high, len(cell.runs)
 
 
 def leaders(study: Study, group: str) -> pd.DataFrame:
