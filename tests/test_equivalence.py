@@ -11,15 +11,6 @@ from scipy import stats
 from coartic.analysis.statistics.equivalence import difference, equivalence, shares
 
 
-def test_interval_is_welchs():
-    rng = np.random.default_rng(13)
-    ours, theirs = rng.normal(-505, 5, 20), rng.normal(-502, 3, 15)
-    found = difference(ours, theirs.mean(), theirs.std(ddof=1), 15)
-    expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
-    assert found.estimate == pytest.approx(ours.mean() - theirs.mean())
-
-
 def test_interval_against_an_exact_value_is_students():
     ours = np.random.default_rng(14).normal(-484, 4, 12)
     found = difference(ours, -484, None, 20)
@@ -52,9 +43,9 @@ def test_p_is_of_two_one_sided_tests():
     assert found.p == pytest.approx(max(above, below))
     assert found.n == (20, 15)
     printed = difference(ours, theirs.mean(), theirs.std(ddof=1), 15)
-    assert (printed.low, printed.high) == pytest.approx((found.low, found.high))
-    known = equivalence(ours - theirs.mean(), 0.0, 4.0)
-    assert known.n == (20,)
+    expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
+    for one in (found, printed):
+        assert (one.low, one.high) == pytest.approx((expected.low, expected.high))
 
 
 @given(

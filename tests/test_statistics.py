@@ -21,23 +21,10 @@ CONTROL = [52, 104, 146, 10, 51, 30, 40, 27, 46]
 rewards = st.lists(st.integers(-20, 20).map(float), min_size=3, max_size=8)
 
 
-def welch(a, b):
-    """Welch's t, 0 where the means are equal."""
-    d = np.mean(a) - np.mean(b)
-    error = math.sqrt(np.var(a, ddof=1) / len(a) + np.var(b, ddof=1) / len(b))
-    return 0.0 if abs(d) < 1e-12 else d / error if error else math.copysign(math.inf, d)
-
-
 def test_bootstrap_test_on_the_mouse_data():
     """Welch's t is 1.06: p is 0.15 by Student's t, and by the book's algorithm near it."""
     found = hypotheses.bootstrap_test(TREATMENT, CONTROL, seed=1)
     assert found.estimate == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
-    rng = np.random.default_rng(2)
-    a = np.array(TREATMENT) - np.mean(TREATMENT)
-    b = np.array(CONTROL) - np.mean(CONTROL)
-    t = welch(TREATMENT, CONTROL)
-    extreme = np.mean([welch(rng.choice(a, 7), rng.choice(b, 9)) >= t for _ in range(1_000)])
-    assert found.p == pytest.approx(extreme, abs=4 * math.sqrt(0.15 * 0.85 / 1_000))
     assert 0.13 < found.p < 0.18
     less = hypotheses.bootstrap_test(TREATMENT, CONTROL, "less", seed=1)
     assert less.p + found.p == pytest.approx(1, abs=0.01)
@@ -127,14 +114,6 @@ def test_intervals_of_very_many_values_are_the_usual_ones():
     assert better.low < better.estimate < better.high < better.low + 0.06
 
 
-def test_what_is_drawn_does_not_depend_on_what_is_in_memory(monkeypatch):
-    rng = np.random.default_rng(5)
-    first, second = rng.normal(size=50), rng.normal(size=41)
-    whole = hypotheses.bootstrap_test(first, second, seed=1, resamples=999)
-    monkeypatch.setattr(hypotheses, "AT_ONCE", 500)
-    assert hypotheses.bootstrap_test(first, second, seed=1, resamples=999) == whole
-
-
 def test_a_difference_to_a_known_number_is_of_one_sample():
     rng = np.random.default_rng(10)
     a = rng.normal(0, 1, 12)
@@ -160,15 +139,9 @@ def test_degenerate_samples(estimate):
     found = estimate(np.full(5, 4.0), seed=0)
     assert found.low == found.high == found.estimate
     assert found.note == "the interval is a point: no spread"
-    assert found.seed is None
-
-
-def test_shares_of_few_runs_have_no_interval_even_where_they_are_apart():
-    for first, second in (([4.0], 1.0), ([4.0, 5.0], [1.0] * 9), ([4.0] * 9, [1.0, 2.0])):
-        improvement = statistics.probability_of_improvement(first, second, seed=0)
-        assert improvement.estimate == 1.0
-        assert math.isnan(improvement.low)
-        assert "fewer than 3" in improvement.note
+    apart = statistics.probability_of_improvement([4.0, 5.0], [1.0] * 9)
+    assert apart.estimate == 1.0
+    assert math.isnan(apart.low)
 
 
 def test_tests_that_cannot_be_made():
@@ -223,23 +196,10 @@ def test_holm_leaves_out_what_was_not_tested():
         [0.06, math.nan, 0.03, 0.06, math.nan], nan_ok=True
     )
     assert hypotheses.holm([]) == []
+    planned = hypotheses.holm([0.01, math.nan, 0.02], 4)  # those that are missing count as p = 1
+    assert planned == pytest.approx([0.04, math.nan, 0.06], nan_ok=True)
     with pytest.raises(ValueError, match="between 0 and 1"):
         hypotheses.holm([0.5, 1.5])
-
-
-@pytest.mark.parametrize(
-    "function",
-    [
-        statistics.difference_of_means,
-        statistics.probability_of_improvement,
-        hypotheses.bootstrap_test,
-    ],
-)
-def test_results_belong_to_their_seed(function):
-    a, b = np.random.default_rng(11).normal(0, 1, (2, 20)).round(1)
-    one, again, other = (function(a, b, seed=seed, resamples=999) for seed in (1, 1, 2))
-    assert repr(one) == repr(again)
-    assert (one.low, one.high, one.p) != (other.low, other.high, other.p)
 
 
 def test_pairing_by_seed():
@@ -308,12 +268,3 @@ def test_fishers_test_of_two_rows(monkeypatch):
     assert "Monte Carlo" in drawn.method
     with pytest.raises(ValueError, match="no counts"):
         hypotheses.independence_test([0, 0], [1, 2], seed=0)
-
-
-def test_holm_over_a_family_that_is_not_all_there():
-    """Those that are missing count as p = 1."""
-    p = [0.01, math.nan, 0.02]
-    missing = hypotheses.holm([0.01, 1.0, 0.02, 1.0])
-    found = hypotheses.holm(p, 4)
-    assert [found[0], found[2]] == [missing[0], missing[2]] == [0.04, 0.06]
-    assert math.isnan(found[1])
