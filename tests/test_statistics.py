@@ -122,21 +122,11 @@ def test_a_difference_to_a_known_number_is_of_one_sample():
     assert (known.low, known.high, known.n) == (alone.low, alone.high, (12,))
 
 
-@pytest.mark.parametrize(
-    "estimate",
-    [
-        statistics.mean,
-        lambda values, seed: statistics.difference_of_means(values, values[::-1], seed=seed),
-        lambda values, seed: statistics.difference_of_means(values, 0.0, seed=seed),
-    ],
-)
-def test_degenerate_samples(estimate):
-    for values in ([4.0], [4.0, 5.0]):
-        found = estimate(np.array(values), seed=0)
-        assert math.isnan(found.low)
-        assert math.isnan(found.high)
-        assert "fewer than 3" in found.note
-    found = estimate(np.full(5, 4.0), seed=0)
+def test_degenerate_samples():
+    found = statistics.mean([4.0, 5.0])
+    assert math.isnan(found.low)
+    assert "fewer than 3" in found.note
+    found = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
     assert found.low == found.high == found.estimate
     assert found.note == "the interval is a point: no spread"
     apart = statistics.probability_of_improvement([4.0, 5.0], [1.0] * 9)
@@ -229,9 +219,7 @@ def test_closed_intervals():
 
 def test_rounding_is_no_spread():
     """A mean of equal numbers can differ from them in the last bit."""
-    equal = np.full(6, 0.1)
-    assert not statistics.varies(equal)
-    assert np.mean(equal) - 0.1 != 0 or np.mean(np.full(3, 0.1)) - 0.1 != 0
+    assert not statistics.varies(np.full(6, 0.1))
     assert not statistics.centred(np.full((3, 2), 0.1)).any()
     assert statistics.varies(np.array([300.0, 300.001]))
     assert statistics.standard_deviation(np.full(3, 0.1)) == 0
