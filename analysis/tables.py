@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from coartic.analysis.comparisons.methods import method_rows
 from coartic.analysis.comparisons.pairs import pairs_table
 from coartic.analysis.comparisons.paper import paper_rows, sequence_rows
 from coartic.analysis.comparisons.progress import best_so_far
-from coartic.analysis.comparisons.reached import targets
+from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps, standings
 from coartic.analysis.generality.exploration import contrasts
 from coartic.analysis.generality.presence import presence
@@ -39,10 +40,9 @@ from coartic.analysis.methods import (
 from coartic.analysis.published import published_cell, published_initial
 from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.register import signatures as signature_values
-from coartic.analysis.statistics.estimates import Inference, mean
+from coartic.analysis.statistics.estimates import Inference, mean, standard_deviation
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.statistics.instances import other_tasks
-from coartic.analysis.statistics.spread import sd
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import marked
 
@@ -72,9 +72,9 @@ def _runs(*cells: CellRuns) -> str:
 def best_condition(study: Study, task: str) -> str | None:
     """Label of the learner's own condition with the highest mean reward on a task."""
     rewards = {
-        label: row.reward
-        for (name, label), row in method_rows(study).items()
-        if name == task and label in CONDITIONS and not math.isnan(row.reward)
+        label: float(cell.rewards.mean())
+        for (name, label), cell in study.cells.items()
+        if name == task and label in CONDITIONS and len(cell.good)
     }
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
 
@@ -131,7 +131,7 @@ def published(study: Study) -> pd.DataFrame:
             "published_sd": summary.sd if summary else None,
             "published_initial": getattr(published_initial(task), "reward", None),
             "ours": row.rewards.mean() if len(row.rewards) else math.nan,
-            "ours_sd": sd(row.rewards),
+            "ours_sd": standard_deviation(row.rewards),
             "ours_initial": row.cell.good.initial_reward.dropna().mean(),
             "runs": len(row.rewards),
             "verdict": row.verdict,
@@ -162,7 +162,7 @@ def hands(study: Study) -> pd.DataFrame:
             "published": row.published.mean if row.published else None,
             "published_sd": row.published.sd if row.published else None,
             "ours": row.rewards.mean() if len(row.rewards) else math.nan,
-            "ours_sd": sd(row.rewards),
+            "ours_sd": standard_deviation(row.rewards),
             "run_ids": " ".join(map(str, good.run_id[good.hands == row.hands])),
         }
         values |= _spread("difference", row.difference) if row.difference else {}
@@ -235,7 +235,7 @@ def ranking(study: Study) -> pd.DataFrame:
         keys = list(zip(parts.task, parts.label, strict=True))
         by_cell = parts.set_index("task").label
         each = {
-            task: method_rows(study)[task, by_cell[task]].gap_share
+            task: method_rows(study).gap[task, by_cell[task]]
             for task in names
             if task in by_cell.index
         }
@@ -257,66 +257,32 @@ def ranking(study: Study) -> pd.DataFrame:
 @cached
 def price(study: Study) -> pd.DataFrame:
     """What it costs to reach a quarter and half of the targets."""
-    known = targets(study)
-    over = next(iter(known), ("",))[0]
-    rows = []
-    for label in in_order({method for task, method, _ in known if task == over}):
-        spends = {
-            spend: found
-            for (task, own, spend), found in known.items()
-            if (task, own) == (over, label)
-        }
-        row: Row = {"method": label}
-        for name, spend, level in (
-            ("trials_to_quarter", "trials", 0.25),
-            ("trials_to_half", "trials", 0.5),
-            ("kinematics_to_half", "forward_kinematics", 0.5),
-            ("seconds_to_half", "solve_s", 0.5),
-        ):
-            if spend in spends:
-                budget, low, high = spends[spend].crossing(level)
-                row |= {name: budget, f"{name}_low": low, f"{name}_high": high}
-        if "trials" in spends:
-            row["reached"] = spends["trials"].share()
-            parts = gaps(study)[gaps(study).method == label].drop_duplicates(["task", "label"])
-            pairs = zip(parts.task, parts.label, strict=True)
-            row["run_ids"] = _runs(
-                *(study.cells[key] for key in pairs if over in (ALL_TASKS, key[0]))
-            )
-            rows.append((label, row))
-    columns = ["trials_to_quarter", "trials_to_half", "kinematics_to_half", "seconds_to_half"]
-    spread = " ".join(f"{name} {name}_low {name}_high" for name in columns)
-    return _ordered(_table(rows), f"method reached {spread} run_ids")
+    frame = price_by_method(study)
+    run_ids = []
+    for label, over in frame.task.items():
+        parts = gaps(study)[gaps(study).method == label].drop_duplicates(["task", "label"])
+        pairs = zip(parts.task, parts.label, strict=True)
+        run_ids.append(_runs(*(study.cells[key] for key in pairs if over in (ALL_TASKS, key[0]))))
+    frame = frame.drop(columns=["task", "knows"]).assign(run_ids=run_ids)
+    frame.insert(0, "method", frame.index)
+    return frame.rename_axis("row")
 
 
 @cached
 def methods(study: Study) -> pd.DataFrame:
     """Every method on every task: reward, gap, hands and what a run spends."""
-    rows = []
-    for (task, label), row in method_rows(study).items():
-        if task in one_by_one(study):
-            cell = study.cells[task, label]
-            values: Row = {
-                "task": marked(study.tasks[task].label, study.tasks[task]),
-                "method": label,
-                "runs": row.runs,
-                "solved": row.solved,
-                "reward": row.reward,
-                "reward_sd": row.reward_sd,
-                "gap": row.gap_share,
-                "hands": row.hands,
-                "trials": row.trials,
-                "forward_kinematics": row.forward_kinematics,
-                "solve_s": row.solve_s,
-                "told": row.told,
-                "corrections": row.corrections,
-                "jacobians": row.jacobians,
-                "movement_ticks": row.movement_ticks,
-                "other_arm": row.other_arm,
-                "run_ids": _runs(cell),
-            }
-            rows.append((f"{task} {label}", values))
-    return _table(rows)
+    frame = method_rows(study).reset_index()
+    frame = frame[frame.task.isin(list(one_by_one(study)))]
+    cells = [study.cells[key] for key in zip(frame.task, frame.label, strict=True)]
+    names = frame.task + " " + frame.label
+    frame = frame.assign(
+        task=[marked(study.tasks[name].label, study.tasks[name]) for name in frame.task],
+        run_ids=[_runs(cell) for cell in cells],
+    )
+    order = "task method runs solved reward reward_sd gap hands trials forward_kinematics solve_s"
+    order += " told corrections jacobians movement_ticks other_arm run_ids"
+    frame = frame.rename(columns={"label": "method"}).set_index(names).rename_axis("row")
+    return _ordered(frame, order)
 
 
 @cached
@@ -427,10 +393,13 @@ def all_signatures(study: Study) -> pd.DataFrame:
     columns = ["task", "label", "signature", "where", "value", "low", "high", "p", "n", "unit"]
     joined = variants(families(study.tasks))
 
+    @cache
+    def ids_of(names: tuple[str, ...], label: str) -> str:
+        return _runs(*(study.cells[name, label] for name in names if (name, label) in study.cells))
+
     def run_ids(task: str, label: str, against: str, moving: float) -> str:
         beside = {against} if math.isnan(moving) else set().union(*(g for g in joined if task in g))
-        names = [task, *sorted(beside - {task, ""})]
-        return _runs(*(study.cells[name, label] for name in names if (name, label) in study.cells))
+        return ids_of((task, *sorted(beside - {task, ""})), label)
 
     behind = frame[["task", "label", "against", "moving"]].astype({"moving": float})
     ids = [run_ids(*row) for row in behind.itertuples(index=False)]

@@ -7,9 +7,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
-from coartic.analysis.study import load
 from coartic.benchmarks.suites import Cell
-from coartic.runs.store import FILE
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
 
@@ -78,12 +76,3 @@ def test_the_command_prints_what_differs(first, tmp_path, monkeypatch, capsys):
     assert len(table.read_text().splitlines()) == 3
     with pytest.raises(CoarticError, match="same folder"):
         load_pair(tmp_path / "b", tmp_path / "b")
-
-
-def test_a_damaged_file_is_said(first, tmp_path):
-    """Damaged in its head, where it is noticed at once, or where the runs are."""
-    whole = (first.folder / FILE).read_bytes()
-    for begin, end in ((0, 100), (len(whole) // 4, len(whole))):
-        (tmp_path / FILE).write_bytes(whole[:begin] + b"\xff" * (end - begin) + whole[end:])
-        with pytest.raises(CoarticError, match="is damaged"):
-            load(tmp_path)

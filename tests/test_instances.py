@@ -1,4 +1,4 @@
-"""Statistics over instances: planted components, differences and slopes come back."""
+"""Statistics over instances: planted spreads and differences come back."""
 
 import math
 
@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from coartic.analysis.statistics.estimates import NO_SPREAD
-from coartic.analysis.statistics.instances import (
-    Paired,
-    chance,
-    components,
-    other_tasks,
-    paired,
-)
-from coartic.analysis.statistics.power import power
+from coartic.analysis.statistics.instances import gap_share, other_tasks, task_mean
 
 
 def simulated(rng, instances, runs, *, between=0.1, within=0.05, mean=0.3):
@@ -82,57 +75,23 @@ def test_a_pair_is_the_difference_on_the_same_instance():
     assert swapped.estimate == pytest.approx(-found.estimate)
 
 
-def test_planted_components_come_back():
-    rng = np.random.default_rng(5)
-    instances, methods, runs = 300, 12, 6
-    method = np.linspace(-1, 1, methods)
-    hard = rng.normal(0, 2.0, instances)
-    scores = {}
-    for m in range(methods):
-        suits = rng.normal(0, 0.7, instances)
-        means = method[m] + hard + suits
-        scores[f"m{m}"] = [rng.normal(mean, 0.4, runs) for mean in means]
-    found = components(scores)
-    assert found.method == pytest.approx(method.var(ddof=1), rel=0.1)
-    assert found.instance == pytest.approx(4.0, rel=0.2)
-    assert found.interaction == pytest.approx(0.49, rel=0.1)
-    assert found.seed == pytest.approx(0.16, rel=0.05)
-    assert sum(found.shares().values()) == pytest.approx(1)
+def test_the_interval_ends_at_what_runs_can_make():
+    """Gaps are never below 0: two instances at 0 and one far away."""
+    gaps = [(np.zeros(3),), (np.zeros(3),), (np.array([0.3, 0.3, 0.4]),)]
+    found = other_tasks({"a": gaps})
+    assert found.low == 0
+    assert found.high <= 0.4
+    turned = other_tasks({"a": [(np.zeros(3), *own) for own in gaps]})
+    assert (turned.low, turned.high) == pytest.approx((-found.high, -found.low), abs=0.02)
 
 
-def test_components_without_any():
-    alike = [np.array([0.5]), np.array([0.5, 0.5])]
-    assert math.isnan(components({"a": alike, "b": alike}).shares()["seed"])
-    with pytest.raises(ValueError, match="two methods"):
-        components({"a": alike})
-    with pytest.raises(ValueError, match="same instances"):
-        components({"a": alike, "b": alike[:1]})
-
-
-def test_planted_difference_and_its_variance():
-    rng = np.random.default_rng(6)
-    true = rng.normal(0.02, 0.03, 800)
-    first = [rng.normal(0.5 + d, 0.1, 10) for d in true]
-    second = [rng.normal(0.5, 0.05, 10) for _ in true]
-    found = paired(first, second)
-    assert found.mean == pytest.approx(0.02, abs=0.005)
-    assert found.between == pytest.approx(0.0009, rel=0.2)
-    assert found.within == pytest.approx((0.01, 0.0025), rel=0.1)
-    assert found.variance(10) == found.between + sum(found.within) / 10
-
-
-def test_instances_that_show_a_difference():
-    """As the noncentral t distribution has it, within the steps of the search."""
-    found = Paired(0.0, 0.0, (0.0009, 0.0007))
-    count = found.needed(0.01, 1)
-    assert 0.8 <= chance(0.01, 0.04, count, 0.05) < 0.82
-    assert chance(0.01, 0.04, math.floor(count / 1.03), 0.05) < 0.8
-    assert found.needed(0.01, 100) < 10 < count
-    assert Paired(0.0, 0.0, (0.0, 0.0)).needed(0.01, 1) == 3
-    assert chance(0.5, 1.0, 20, 0.05, tails=1) == pytest.approx(power(0.5, 1.0, 0.0, 20, 0.05))
-    rng = np.random.default_rng(7)
-    drawn = rng.normal(0.5, 1.0, (4000, 20))
-    t = drawn.mean(axis=1) / drawn.std(axis=1, ddof=1) * math.sqrt(20)
-    assert chance(0.5, 1.0, 20, 0.05) == pytest.approx((np.abs(t) > 2.093).mean(), abs=0.03)
-    with pytest.raises(ValueError, match="difference of 0"):
-        found.needed(0.0, 1)
+def test_given_tasks_are_strata():
+    """Tasks far apart add no width to the interval of their mean."""
+    assert gap_share([-300, -303], -300).tolist() == [0, 0.01]
+    rng = np.random.default_rng(31)
+    runs = rng.normal(0, 1, (4, 20))
+    found = task_mean({task: 100 * i + runs[i] for i, task in enumerate("abcd")})
+    assert found.estimate == pytest.approx(150 + runs.mean())
+    error = math.sqrt(sum(own.var() / 20 for own in runs)) / 4
+    assert found.high - found.low == pytest.approx(2 * 1.96 * error, rel=0.1)
+    assert task_mean({"a": [1.0] * 4, "b": [5.0] * 40}).estimate == 3.0  # each counts the same

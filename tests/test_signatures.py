@@ -43,7 +43,6 @@ from coartic.analysis.signatures.subtasks import (
     sacrifice_p,
     sacrifices,
 )
-from coartic.analysis.statistics import intervals
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from, entropy
 from coartic.learner.rows import movement_rows
 from coartic.motion.solution import other_arm_travel
@@ -537,27 +536,6 @@ def test_smoothness_leaves_out_what_does_not_move():
     path = trajectory(task, planned(posture(1.0), posture(1.0), hands="RR"))
     own = path.hand_path("right")[:91]
     assert smoothness(path) == (pytest.approx(spectral_arc_length(own)), math.inf)
-
-
-# Intervals
-
-
-def test_student_interval_by_hand():
-    """Mean 4, standard error 1, quantile of t with 2 degrees of freedom 4.302653."""
-    values = [4 - math.sqrt(3), 4.0, 4 + math.sqrt(3)]
-    assert intervals.mean(values)[:3] == pytest.approx((4.0, 4 - 4.302653, 4 + 4.302653), abs=1e-6)
-    assert intervals.mean([2.0, 2.0])[:3] == (2.0, 2.0, 2.0)
-    assert np.isnan(intervals.mean([2.0])[1:]).all()
-
-
-def test_wilson_interval_by_hand():
-    """7 of 10: (p + z²/2n ± z √(p(1-p)/n + z²/4n²)) / (1 + z²/n), z = 1.959964."""
-    z, p, n = 1.959964, 0.7, 10
-    centre, half = p + z**2 / 2 / n, z * math.sqrt(p * (1 - p) / n + z**2 / 4 / n**2)
-    limits = (centre - half) / (1 + z**2 / n), (centre + half) / (1 + z**2 / n)
-    assert intervals.share([True] * 7 + [False] * 3)[:3] == pytest.approx((0.7, *limits), abs=1e-6)
-    assert intervals.share([True])[0] == 1.0
-    assert np.isnan(intervals.share([True])[1:]).all()
 
 
 # Locus

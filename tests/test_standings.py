@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.comparisons.methods import BY_TRIAL
-from coartic.analysis.comparisons.reached import WAY, Targets, targets
+from coartic.analysis.comparisons.methods import BY_TRIAL, UNTOLD, group_of
+from coartic.analysis.comparisons.reached import WAY, Targets, price, targets
 from coartic.analysis.comparisons.standings import (
     ALL_TASKS,
     apart_p,
@@ -18,7 +18,7 @@ from coartic.analysis.comparisons.standings import (
     leaders,
     standings,
 )
-from coartic.analysis.statistics.across_tasks import gap_share, task_mean
+from coartic.analysis.statistics.estimates import SEED
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
 SEQUENCES = pd.DataFrame(
@@ -45,7 +45,6 @@ def study(rewards):
 
 def test_gaps_of_a_results_folder():
     """The initial solution of two-armed-1 is among its sequences."""
-    assert gap_share([-300, -303], -300).tolist() == [0, 0.01]
     runs = {
         "run": [0, 1], "seed": [7, 8], "status": ["ok", "infeasible"], "reason": ["", "planted"],
         "reward": [-520, None], "hands": ["RRLR", None], "initial_reward": [-675, None],
@@ -61,18 +60,6 @@ def test_gaps_of_a_results_folder():
     missed = {("two-armed-1", "free"): replace(optima["two-armed-1", "free"], reward=-680)}
     below = MadeUp(results, sequences=SEQUENCES, optima=missed)  # below the initial solution
     assert gaps(below).empty
-
-
-def test_strata_are_resampled_within_themselves():
-    """Tasks far apart add no width to the interval of their mean."""
-    rng = np.random.default_rng(31)
-    runs = rng.normal(0, 1, (4, 20))
-    apart = {task: 100 * i + runs[i] for i, task in enumerate("abcd")}
-    found = task_mean(apart)
-    assert found.estimate == pytest.approx(np.mean([own.mean() for own in apart.values()]))
-    error = math.sqrt(sum(own.var() / 20 for own in runs)) / 4
-    assert found.high - found.low == pytest.approx(2 * 1.96 * error, rel=0.1)
-    assert task_mean({"a": [1.0] * 4, "b": [5.0] * 40}).estimate == 3.0  # each counts the same
 
 
 LEARNER = {("ascending", "dual-process/EC1"): [-300, -301, -302, -303],
@@ -103,6 +90,16 @@ def test_a_rank_counts_algorithms():
     assert apart_p(seen, "cma-es/bandit", "cma-es/every") == 1.0
 
 
+def test_a_method_that_makes_one_trial_does_not_use_its_reward():
+    """The corrective process alone is told of its only trial, and of every hand sequence."""
+    alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
+    assert group_of(alone, "corrective-alone/given") == BY_TRIAL  # ten trials in made-up rows
+    alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
+    again = MadeUp(alone, sequences=SEQUENCES, optima=made_up_optima("ascending", "two-armed-1"))
+    assert group_of(again, "corrective-alone/given") == UNTOLD
+    assert group_of(again, "dual-process (EC1, EC4)") == BY_TRIAL
+
+
 def test_crossings_by_brute_force():
     """Budgets read off every run and target, one by one."""
     rng = np.random.default_rng(5)
@@ -119,11 +116,26 @@ def test_crossings_by_brute_force():
         crossing = found.crossing(level)
         assert crossing.budget == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
+        assert (crossing.low, crossing.high) == resampled_ends(spends, level)
     steps, shares = found.curve()
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
     assert found.share() == pytest.approx(share(1e300))
     assert math.isnan(Targets([spends[0][:2]]).crossing(0.5).low)  # too few runs
+
+
+def resampled_ends(spends, level):
+    """Percentiles of crossings, resample by resample, of runs drawn as often as they are there."""
+    rng = np.random.default_rng(SEED)
+    counts = [rng.multinomial(len(own), [1 / len(own)] * len(own), size=1_999) for own in spends]
+    budgets = np.append(np.unique(np.concatenate([own.ravel() for own in spends])), math.inf)
+    within = [(own[..., None] <= budgets).mean(axis=1) for own in spends]
+    shares = sum(
+        count @ part / len(part) for count, part in zip(counts, within, strict=True)
+    ) / len(spends)
+    shares[:, -1] = 1.0
+    crossed = budgets[(shares >= level - 1e-9).argmax(axis=1)]
+    return tuple(np.quantile(crossed, [0.025, 0.975], method="inverted_cdf"))
 
 
 def test_targets_are_evenly_spaced_rewards():
@@ -134,3 +146,6 @@ def test_targets_are_evenly_spaced_rewards():
     found = targets(seen)["ascending", "posture-based/two-goals", "trials"]
     assert found.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
     assert found.crossing(0.25).budget == 10  # trials of the made-up row
+    paid = price(seen).loc["posture-based/two-goals"]
+    assert (paid.task, paid.trials_to_quarter, paid.trials_to_half) == ("ascending", 10, 10)
+    assert paid.reached == found.share()

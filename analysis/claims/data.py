@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.comparisons.methods import MethodRow, method_rows
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import TRIALS
 from coartic.analysis.statistics.estimates import FEWEST
@@ -64,11 +63,6 @@ class Data:
         found = cell.good if hands is None else cell.good[cell.good.hands == hands]
         self.run_ids.extend(found.run_id)
         return found
-
-    def row(self, task: str, method: str) -> MethodRow:
-        """The row of :meth:`runs` in the table of methods."""
-        self.runs(task, method)
-        return method_rows(self.study)[task, method]
 
     def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
         """:meth:`runs` of the paper's learner."""

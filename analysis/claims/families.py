@@ -19,7 +19,6 @@ from coartic.analysis.claims.rules import all_hold, shown
 from coartic.analysis.generality.presence import signs
 from coartic.analysis.generality.sample import Sample, sample
 from coartic.analysis.methods import CONDITIONS, INITIAL, LEARNER, most_exploring
-from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import FEWEST
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.words import number, tally
@@ -157,7 +156,7 @@ def _reward(data: Data, name: str, side: str) -> float | None:
         values = (data.replays if replay else data.rewards)(name, condition)
     except MissingError:
         return None
-    return float(spread.mean(values))
+    return float(np.mean(values))
 
 
 def _condition(data: Data, name: str) -> str:
@@ -176,5 +175,5 @@ def _mean_sign(data: Data, name: str, condition: str, sign: str) -> float | None
         data.learned(name, condition)
     except MissingError:
         return None
-    values = signs(data.study)[name, LEARNER + condition].values.get(sign)
-    return None if values is None else float(spread.mean(values))
+    values = signs(data.study)[name, LEARNER + condition].get(sign)
+    return None if values is None else float(values.mean())

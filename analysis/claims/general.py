@@ -140,7 +140,7 @@ def beats_inaccurate(data: Data, claim: Claim) -> Finding:
         rewards = data.rewards(task, condition)
         plans = []
         for label in (_PLAN + cost for cost in SMOOTH):
-            plan = data.row(task, label).reward
+            plan = data.runs(task, label).reward.mean()
             tests.append(exceeds(rewards, plan))
             plans.append(f"{name_of(label)} {number(plan, 0)}")
         parts.append(f"{task}: learner {shown(rewards)}, {', '.join(plans)}")

@@ -24,11 +24,9 @@ from coartic.analysis.statistics.estimates import (
 from coartic.analysis.statistics.hypotheses import (
     Alternative,
     bootstrap_test,
-    share_p,
     share_test,
 )
 from coartic.analysis.words import estimate, number, tally
-from coartic.robot import Array
 
 FEW, MOST = MARGINS["few"], MARGINS["most"]
 
@@ -119,7 +117,7 @@ printed ones"""
     low, high = stats.binomtest(count, total).proportion_ci()
     share = count / total
     within = f"two one-tailed exact binomial tests, {FEW:.0%} and {MOST:.0%}"
-    room, p = min(share - FEW, MOST - share), float(half_p(count, total))
+    room, p = min(share - FEW, MOST - share), half_p(count, total)
     unlike = "Fisher's exact test, two-tailed, against the printed counts"
     apart, contrary_p = share - printed[0] / printed[1], unlike_p((count, total), printed)
     return Finding(
@@ -163,10 +161,10 @@ def nearly_all(
     )
 
 
-def half_p(count: ArrayLike, total: int) -> Array:
+def half_p(count: int, total: int) -> float:
     """p that a share lies between few and most: the larger of two exact tests."""
     bounds: tuple[tuple[float, Alternative], ...] = (FEW, "greater"), (MOST, "less")
-    return np.maximum(*(share_p(count, total, bound, side) for bound, side in bounds))
+    return max(share_test(count, total, bound, side).p for bound, side in bounds)
 
 
 def unlike_p(ours: tuple[int, int], printed: tuple[int, int]) -> float:

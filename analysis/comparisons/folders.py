@@ -12,9 +12,9 @@ import pandas as pd
 
 from coartic import CoarticError
 from coartic.analysis.cells import CellRuns
-from coartic.analysis.statistics.equivalence import MARGIN, bootstrap_equivalence
+from coartic.analysis.statistics.equivalence import MARGIN, equivalence
 from coartic.analysis.statistics.estimates import FEWEST, difference_of_means, paired_by_seed
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
 from coartic.analysis.study import Study, load
 from coartic.robot import Array
 
@@ -39,18 +39,12 @@ def differences(first: Study, second: Study) -> pd.DataFrame:
 
     Columns ``what``, ``a``, ``b``.
     """
-    a, b = _facts(first), _facts(second)
-    rows = [(name, a[name], b[name]) for name in a if a[name] != b[name]]
-    for what, ours, theirs in (
-        ("task", _tasks(first), _tasks(second)),
-        ("code of", _codes(first), _codes(second)),
-        ("library", _libraries(first), _libraries(second)),
-    ):
-        rows += [
-            (f"{what} {name}", ours.get(name, "–"), theirs.get(name, "–"))
-            for name in dict.fromkeys([*ours, *theirs])
-            if ours.get(name) != theirs.get(name)
-        ]
+    a, b = facts_of(first), facts_of(second)
+    rows = [
+        (name, a.get(name, "–"), b.get(name, "–"))
+        for name in dict.fromkeys([*a, *b])
+        if a.get(name) != b.get(name)
+    ]
     return pd.DataFrame(rows, columns=["what", "a", "b"])
 
 
@@ -60,16 +54,18 @@ def compared_cells(first: Study, second: Study) -> pd.DataFrame:
     ``runs_a`` and ``runs_b``; ``identical``: runs with the same seed and the same status, joints,
     ticks and rewards of all trials, of those ``shared``; mean rewards ``reward_a`` and
     ``reward_b``; ``difference`` of B less A with its 95 % BCa interval, paired by seed where at
-    least three are shared; ``p`` of a two-tailed bootstrap test after Holm's correction over all
-    cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few runs, or
-    not compared; ``remarks``.
+    least three are shared; ``p`` of a two-tailed test (pairs: sign flips) after Holm's correction
+    over all cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few
+    runs, or not compared; ``remarks``.
     """
-    ours, theirs = _tasks(first), _tasks(second)
+    ours, theirs = facts_of(first), facts_of(second)
     rows = [
         {
             "task": task,
             "method": label,
-            **_compared(cell, second.cells[task, label], ours[task] == theirs[task]),
+            **_compared(
+                cell, second.cells[task, label], ours[f"task {task}"] == theirs[f"task {task}"]
+            ),
         }
         for (task, label), cell in first.cells.items()
         if (task, label) in second.cells
@@ -106,12 +102,15 @@ def _compared(a: CellRuns, b: CellRuns, same_task: bool) -> dict[str, Any]:
     if len(x) >= FEWEST:
         samples = y - x, 0.0
     found = difference_of_means(*samples)
-    row |= {"difference": found.estimate, "p": bootstrap_test(*samples, "two-sided").p}
-    row |= {"difference_low": found.low, "difference_high": found.high}
-    if min(len(a.good), len(b.good)) < FEWEST:
-        return row | {"verdict": "too few runs"}
+    test = sign_flip_test(y - x) if len(x) >= FEWEST else bootstrap_test(*samples, "two-sided")
+    few = min(len(a.good), len(b.good)) < FEWEST
+    agreement = equivalence(*samples, MARGIN * abs(a.rewards.mean()))
     return row | {
-        "verdict": bootstrap_equivalence(*samples, MARGIN * abs(a.rewards.mean())).verdict
+        "difference": found.estimate,
+        "difference_low": found.low,
+        "difference_high": found.high,
+        "p": test.p,
+        "verdict": "too few runs" if few else agreement.verdict,
     }
 
 
@@ -131,9 +130,13 @@ def _remarks(a: CellRuns, b: CellRuns) -> str:
     return "; ".join(parts)
 
 
-def _facts(study: Study) -> dict[str, str]:
-    plan, made = study.plan, study.made_with
-    commit = made["commit"]
+def facts_of(study: Study) -> dict[str, str]:
+    """What a folder's runs were asked for and made with: tasks, code and libraries by their names.
+
+    Tasks go by a hash of what changes their results.
+    """
+    plan, made_with = study.plan, study.made_with
+    commit = made_with["commit"]
     facts = {
         "suite": plan.suite,
         "seed": plan.seed,
@@ -142,31 +145,17 @@ def _facts(study: Study) -> dict[str, str]:
         "time limit (s)": plan.time_limit_s,
         "trial budget": plan.trial_budget,
         "runs": len(study.runs),
-        "coartic": made["coartic"],
+        "coartic": made_with["coartic"],
         "commit": commit and commit["id"][:12] + " with changes" * commit["dirty"],
-        "code of the model": made["model_code"],
-        "Python": made["python"],
-        "platform": made["platform"],
-        "processor": made["processor"],
-        "cores": made["cores"],
+        "code of the model": made_with["model_code"],
+        "Python": made_with["python"],
+        "platform": made_with["platform"],
+        "processor": made_with["processor"],
+        "cores": made_with["cores"],
     }
+    for name, task in plan.tasks.items():
+        text = json.dumps({key: task[key] for key in task if key not in _WORDS}, sort_keys=True)
+        facts[f"task {name}"] = f"definition {hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    facts |= {f"code of {name}": method.code for name, method in plan.methods.items()}
+    facts |= {f"library {name}": version for name, version in made_with["packages"].items()}
     return {name: "–" if value is None else str(value) for name, value in facts.items()}
-
-
-def _tasks(study: Study) -> dict[str, str]:
-    tasks = study.plan.tasks
-    hashes = {}
-    for name, task in tasks.items():
-        definition = {key: task[key] for key in task if key not in _WORDS}
-        text = json.dumps(definition, sort_keys=True)
-        hashes[name] = f"definition {hashlib.sha256(text.encode()).hexdigest()[:8]}"
-    return hashes
-
-
-def _codes(study: Study) -> dict[str, str]:
-    methods = study.plan.methods
-    return {name: method.code for name, method in methods.items()}
-
-
-def _libraries(study: Study) -> dict[str, str]:
-    return dict(study.made_with["packages"])

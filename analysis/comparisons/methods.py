@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.cells import CellIdentity, CellKey, CellRuns
+from coartic.analysis.cells import CellRuns
+from coartic.analysis.methods import EC1, TOGETHER
 from coartic.analysis.optima import locks_base
-from coartic.analysis.statistics.spread import sd
+from coartic.analysis.statistics.estimates import standard_deviation
+from coartic.analysis.statistics.instances import gap_share
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import tally
 from coartic.method import Information
@@ -30,79 +31,76 @@ TOLD = {
 }
 """A letter for each kind of information, in the order in which the tables show them."""
 BY_TRIAL, BY_FORMULA, UNTOLD = GROUPS = (
-    "learn from the reward of each trial",
-    "know the reward as a formula",
-    "do not know the reward",
+    "using the reward of each trial",
+    "using the reward as a formula, and the kinematics",
+    "using the goals and the kinematics, not the reward",
 )
-"""What methods know of the reward: those that learn it, compute it, or neither."""
-_SPENT = (
-    *("trials", "movement_ticks", "forward_kinematics", "jacobians"),
-    *("solver_iterations", "build_s"),
-)
+"""What methods are told of the reward and make use of."""
 STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 
 
-@dataclass(frozen=True)
-class MethodRow(CellIdentity):
-    """A method on a task; NaN is for what is not known, such as times of runs that crashed.
+@cached
+def method_rows(study: Study) -> pd.DataFrame:
+    """A row for every method on every task: within a task the best mean reward first.
 
-    Rewards are of runs with a solution; what was spent is the median over all runs.
+    Searches for the optimum come before. The index is the task and the method's label.
+    ``solved``: runs with a solution, of which ``reward`` is the mean, ``reward_sd`` the standard
+    deviation (ticks), ``gap`` the distance of the mean to the optimum as a share of it, and
+    ``hands`` the sequences, the commonest first; ``told``: a letter for each kind of information
+    (:data:`TOLD`); ``corrections``: corrective movements that all solutions needed; ``other_arm``:
+    whether the arm that is not chosen keeps ``still`` in all solutions or ``moves``. What was spent
+    is the median over all runs, ``solve_s`` by :func:`solve_times`. NaN is for what is not known.
     """
-
-    told: str
-    """A letter for each kind of information (:data:`TOLD`)."""
-    runs: int
-    solved: int
-    """Runs with a solution."""
-    reward: float
-    """Mean, ticks."""
-    reward_sd: float
-    gap: float
-    """Reward of the optimum with all joints free less the mean, ticks."""
-    gap_share: float
-    """The same as a share of that optimum."""
-    gap_still: float
-    """To the optimum with the arm that is not chosen still, where all solutions keep it so."""
-    beaten: int
-    """Runs above the optimum, which there cannot be."""
-    other_arm: str
-    """Whether it keeps ``still`` in all solutions, as executed, or ``moves``; or nothing."""
-    hands: str
-    """Hand sequences with their runs, the commonest first; alone where there is one run."""
-    corrections: int
-    """Corrective movements that the solutions needed in all."""
-    trials: float
-    movement_ticks: float
-    """Of all trials."""
-    forward_kinematics: float
-    jacobians: float
-    solver_iterations: float
-    build_s: float
-    """Wall time of what is built once."""
-    solve_s: float
-    """:func:`solve_times`."""
-    evaluations: float
-    """Forward kinematics and Jacobians together."""
+    frame = pd.DataFrame([described(study, cell) for cell in study.cells.values()])
+    tasks = list(study.tasks)
+    frame["task_place"] = frame.task.map(tasks.index)
+    frame["is_search"] = frame.label.str.startswith(SEARCH)
+    order = ["task_place", "is_search", "reward"]
+    frame = frame.sort_values(order, ascending=[True, False, False], kind="stable")
+    return frame.drop(columns=order[:2]).set_index(["task", "label"])
 
 
-def knows(told: str) -> str:
-    """What letters of :data:`TOLD` say that a method knows of the reward: of :data:`GROUPS`."""
+def described(study: Study, cell: CellRuns) -> dict[str, object]:
+    """A row of :func:`method_rows`."""
+    good, runs, rewards = cell.good, cell.runs, cell.rewards
+    mean = float(rewards.mean()) if len(rewards) else math.nan
+    best = None if locks_base(runs) else study.optima.get((cell.task, "free"))
+    told = set(runs.told.iloc[0].split(", ")) if len(runs) else set()
+    hands = tally(good.hands.value_counts().to_dict())
+    arm = "still" if keeps_still(good) else "moves"
+    return {
+        "task": cell.task,
+        "label": cell.label,
+        "told": "".join(letter for item, letter in TOLD.items() if item.value in told),
+        "runs": len(runs),
+        "solved": len(good),
+        "reward": mean,
+        "reward_sd": standard_deviation(rewards),
+        "gap": float(gap_share(mean, best.reward)) if best and best.reward else math.nan,
+        "hands": hands if len(good) > 1 else "".join(good.hands),
+        "corrections": int(good.solution_corrections.sum()),
+        "other_arm": arm if len(good) else "",
+        "trials": median(runs.trials),
+        "movement_ticks": median(runs.movement_ticks),
+        "forward_kinematics": median(runs.forward_kinematics),
+        "jacobians": median(runs.jacobians),
+        "solve_s": median(solve_times(good)),
+    }
+
+
+def group_of(study: Study, label: str) -> str:
+    """Which of :data:`GROUPS` a method belongs to.
+
+    One that makes a single trial on every task makes no use of the reward that it is told. The
+    learner's conditions together are told what each of them is.
+    """
+    label = EC1 if label.startswith(TOGETHER) else label
+    rows = method_rows(study).xs(label, level="label")
+    told = "".join(rows.told)
     if TOLD[Information.REWARD_FORMULA] in told:
         return BY_FORMULA
-    return BY_TRIAL if TOLD[Information.REWARD_BY_TRIAL] in told else UNTOLD
-
-
-@cached
-def method_rows(study: Study) -> dict[CellKey, MethodRow]:
-    """Every method on every task: within a task the optimum, then the best mean reward first."""
-    order = {name: place for place, name in enumerate(study.tasks)}
-
-    def place(row: MethodRow) -> tuple[int, bool, float]:
-        worst_last = math.inf if math.isnan(row.reward) else -row.reward
-        return order[row.task], not row.method.startswith(SEARCH), worst_last
-
-    rows = sorted((_row(study, cell) for cell in study.cells.values()), key=place)
-    return {(row.task, row.label): row for row in rows}
+    learns = TOLD[Information.REWARD_BY_TRIAL] in told and not (rows.trials <= 1).all()
+    return BY_TRIAL if learns else UNTOLD
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
@@ -111,41 +109,10 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     ``runs`` have a solution. Their whole time stands for methods that mark no solving.
     """
     warm = runs.warm.to_numpy(dtype=bool, na_value=False)
-    solving, whole = numbers(runs.solve_s), numbers(runs.wall_s)
-    marked = np.where(solving > 0, solving, whole)
+    solving, all_in_all = numbers(runs.solve_s), numbers(runs.wall_s)
+    marked = np.where(solving > 0, solving, all_in_all)
     times = pd.Series(marked, runs.index, dtype=runs.solve_s.dtype)
     return times[warm] if warm.any() else times
-
-
-def _row(study: Study, cell: CellRuns) -> MethodRow:
-    good, runs = cell.good, cell.runs
-    rewards = cell.rewards
-    mean = float(rewards.mean()) if len(rewards) else math.nan
-    still = bool(len(good)) and keeps_still(good)
-    locked = locks_base(runs)
-    best = None if locked else study.optima.get((cell.task, "free"))
-    best_still = study.optima.get((cell.task, "still")) if still and not locked else None
-    told = set(runs.told.iloc[0].split(", ")) if len(runs) else set()
-    return MethodRow(
-        task=cell.task,
-        method=cell.method,
-        variant=cell.variant,
-        told="".join(letter for item, letter in TOLD.items() if item.value in told),
-        runs=len(runs),
-        solved=len(good),
-        reward=mean,
-        reward_sd=sd(rewards),
-        gap=best.reward - mean if best else math.nan,
-        gap_share=(best.reward - mean) / -best.reward if best and best.reward else math.nan,
-        gap_still=best_still.reward - mean if best_still else math.nan,
-        beaten=sum(int((rewards > known.reward).sum()) for known in (best, best_still) if known),
-        other_arm="still" if still else "moves" if len(good) else "",
-        hands=tally(good.hands.value_counts().to_dict()) if len(good) > 1 else "".join(good.hands),
-        corrections=int(good.solution_corrections.sum()),
-        **{name: median(runs[name]) for name in _SPENT},
-        solve_s=median(solve_times(good)),
-        evaluations=_median(numbers(runs.forward_kinematics) + numbers(runs.jacobians)),
-    )
 
 
 def keeps_still(good: pd.DataFrame) -> bool:
@@ -155,15 +122,11 @@ def keeps_still(good: pd.DataFrame) -> bool:
 
 def median(values: pd.Series) -> float:
     """Of the values that are known; NaN where none is, as for runs that crashed."""
-    return _median(numbers(values))
-
-
-def _median(values: Array) -> float:
-    known = values[~np.isnan(values)]
+    known = numbers(values)
+    known = known[~np.isnan(known)]
     return float(np.median(known)) if len(known) else math.nan
 
 
 def numbers(values: pd.Series) -> Array:
     """A column (n,), NaN where a value is missing."""
-    found: Array = values.to_numpy(dtype=np.float64, na_value=np.nan)
-    return found
+    return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))

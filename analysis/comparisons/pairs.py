@@ -9,8 +9,8 @@ Who is compared is decided before any reward is read:
   does so too. Searches for the optimum are references, no methods to compare with.
 
 So is the test. Conditions are compared as in the paper: a one-tailed bootstrap test that more
-exploration is better, with the interval of independent samples. All other pairs are tested
-two-tailed and paired by seed where runs share seeds.
+exploration is better, as independent samples. All other pairs are paired by seed where runs share
+seeds, and tested two-tailed by sign flips.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from coartic.analysis.cells import CellRuns
@@ -29,15 +30,9 @@ from coartic.analysis.methods import LEARNER, is_search
 from coartic.analysis.statistics.estimates import (
     difference_of_means,
     paired_by_seed,
-    paired_difference,
     probability_of_improvement,
 )
-from coartic.analysis.statistics.hypotheses import (
-    bootstrap_test,
-    holm,
-    permutation_test,
-    sign_flip_test,
-)
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
 from coartic.analysis.study import Study, cached
 from coartic.learner.conditions import CONDITIONS
 from coartic.robot import Array
@@ -48,25 +43,8 @@ COLUMNS = (
     *("better", "better_low", "better_high", "p", "p_holm", "note"),
 )
 """Of :func:`pairs_table`."""
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two cells of a task; the first is the learner's."""
-
-    kind: str
-    """``conditions``, ``variant`` or ``method``."""
-    first: CellRuns
-    second: CellRuns
-
-    @property
-    def known(self) -> bool:
-        """Whether the second is run once because it always does the same.
-
-        Its reward then is a number, not a sample. Where the learner has one run as well
-        nothing tells.
-        """
-        return len(self.second.runs) == 1 < len(self.first.runs)
+Pair = tuple[str, CellRuns, CellRuns]
+"""``conditions``, ``variant`` or ``method``, and two cells of a task; the first the learner's."""
 
 
 def pairs(study: Study) -> Iterator[Pair]:
@@ -77,19 +55,26 @@ def pairs(study: Study) -> Iterator[Pair]:
         if not plain:
             continue
         for less, more in itertools.combinations(plain.values(), 2):
-            yield Pair("conditions", more, less)
+            yield "conditions", more, less
         most = list(plain)[-1]
-        still = _keeping_still(most)
+        without_other_arm = replace(CONDITIONS[most], modify_other=False)
         for label, cell in cells.items():
             if label.removeprefix(LEARNER) in plain or is_search(label):
                 continue
             condition = cell.method.removeprefix(LEARNER).split("-")[0]
             if cell.method.startswith(LEARNER) and condition in plain:
-                yield Pair("variant", plain[condition], cell)
+                yield "variant", plain[condition], cell
                 continue
-            yield Pair("method", plain[most], cell)
-            if still in plain and method_rows(study)[task, label].other_arm == "still":
-                yield Pair("method", plain[str(still)], cell)
+            yield "method", plain[most], cell
+            for name in plain:
+                keeps_still = CONDITIONS[name] == replace(without_other_arm, id=name)
+                if name != most and keeps_still and still(study, task, label):
+                    yield "method", plain[name], cell
+
+
+def still(study: Study, task: str, label: str) -> bool:
+    """Whether a method keeps still the arm that is not chosen."""
+    return bool(method_rows(study).other_arm[task, label] == "still")
 
 
 @cached
@@ -98,48 +83,54 @@ def pairs_table(study: Study) -> pd.DataFrame:
 
     ``difference``: mean reward of the first less the second's with its 95 % BCa interval;
     ``pairs``: runs that share a seed, if it is paired; ``better``: probability that a run of the
-    first has the higher reward, a tie counting half; ``p_holm``: ``p`` adjusted over the task's
-    pairs that are not of conditions; ``note``: why there is no interval or test.
+    first has the higher reward, a tie counting half; ``p`` of a test of the same
+    difference, ``p_holm`` adjusted over the task's pairs that are not of conditions; ``note``: why
+    there is no interval or test.
     """
     rows = []
-    for pair in pairs(study):
+    for kind, first, second in pairs(study):
         rows.append(
             {
-                "task": pair.first.task,
-                "kind": pair.kind,
-                "first": pair.first.label,
-                "second": pair.second.label,
-                "runs_first": len(pair.first.good),
-                "runs_second": len(pair.second.good),
+                "task": first.task,
+                "kind": kind,
+                "first": first.label,
+                "second": second.label,
+                "runs_first": len(first.good),
+                "runs_second": len(second.good),
                 "note": "no run with a solution",
-                **(_compared(pair) if len(pair.first.good) and len(pair.second.good) else {}),
+                **(compared(kind, first, second) if len(first.good) and len(second.good) else {}),
             }
         )
     frame = pd.DataFrame(rows, columns=list(COLUMNS))
-    tested = frame[frame.kind != "conditions"]
-    for _, own in tested.groupby("task", sort=False):
+    for _, own in frame[frame.kind != "conditions"].groupby("task", sort=False):
         frame.loc[own.index, "p_holm"] = holm(own.p.astype(float).tolist())
     return frame
 
 
-def _compared(pair: Pair) -> dict[str, Any]:
-    """Difference and test of two samples of rewards."""
-    a, b = pair.first.rewards, pair.second.rewards
-    x, y = paired_by_seed(pair.first.good, pair.second.good)
-    paired = len(x) > 0 and pair.kind != "conditions" and not pair.known
-    second: Array | float = float(b[0]) if pair.known else b
-    difference = paired_difference(x, y) if paired else difference_of_means(a, second)
-    if pair.kind == "conditions":
-        test = bootstrap_test(a, second)
+def compared(kind: str, first: CellRuns, second: CellRuns) -> dict[str, Any]:
+    """Difference and test of two cells' rewards.
+
+    A second that is run once always does the same: its reward is a number, not a sample.
+    """
+    once = len(second.runs) == 1 < len(first.runs)
+    samples: tuple[Array, Array | float]
+    samples = first.rewards, float(second.rewards[0]) if once else second.rewards
+    better = probability_of_improvement(*samples)
+    x, y = paired_by_seed(first.good, second.good)
+    shared = len(x) if kind != "conditions" and not once else 0
+    if shared:
+        samples = x - y, 0.0
+    difference = difference_of_means(*samples)
+    if shared or once:
+        test = sign_flip_test(np.subtract(*samples))
     else:
-        test = (sign_flip_test if pair.known else permutation_test)(a, second, "two-sided")
-    better = probability_of_improvement(a, second)
+        test = bootstrap_test(*samples, "greater" if kind == "conditions" else "two-sided")
     notes = dict.fromkeys(found.note for found in (difference, test, better) if found.note)
     return {
         "difference": difference.estimate,
         "difference_low": difference.low,
         "difference_high": difference.high,
-        "pairs": len(x) if paired else 0,
+        "pairs": shared,
         "better": better.estimate,
         "better_low": better.low,
         "better_high": better.high,
@@ -147,12 +138,3 @@ def _compared(pair: Pair) -> dict[str, Any]:
         "p_holm": math.nan,
         "note": "; ".join(notes),
     }
-
-
-def _keeping_still(condition: str) -> str | None:
-    """The condition that differs in keeping still the arm that is not chosen, if any."""
-    most = CONDITIONS[condition]
-    for name, other in reversed(CONDITIONS.items()):
-        if most.modify_other and other == replace(most, id=name, modify_other=False):
-            return name
-    return None

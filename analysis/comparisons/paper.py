@@ -36,11 +36,6 @@ class PaperRow:
         """Of :class:`Equivalence`, for runs that are comparable."""
         return self.difference.verdict if self.difference and self.comparable else None
 
-    @property
-    def margin(self) -> float | None:
-        """Of that verdict, ticks."""
-        return self.difference.margin if self.difference and self.comparable else None
-
 
 @dataclass(frozen=True)
 class SequenceRow:

@@ -13,7 +13,7 @@ from coartic.analysis.optima import locks_base
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
-SPENDS = ("trials", "movement_ticks", "forward_kinematics", "solve_s")
+SPENDS = ("trials", "forward_kinematics", "solve_s")
 """What can be spent: columns of ``runs``; ``solve_s`` is wall time in s."""
 
 
@@ -53,35 +53,30 @@ class BestSoFar:
 def best_so_far(study: Study) -> dict[str, BestSoFar]:
     """:class:`BestSoFar` of every run of a folder, by run id.
 
-    Trials are counted from 1. A completed trial took as many control ticks as its reward
-    is negative; the ticks of failed trials are known as a sum only and spread evenly over
-    them. Kinematics evaluations and time are known as totals of the run and spread evenly
-    over its trials, which is not exact: over the first 10, 100 and 1000 of 10 000 trials,
-    evaluations were 0.6 to 1.5 times their even share, 3.4 times for the first 10 trials of
-    CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
+    Trials are counted from 1. Kinematics evaluations and time are known as totals of the run and
+    spread evenly over its trials, which is not exact: over the first 10, 100 and 1000 of 10 000
+    trials, evaluations were 0.6 to 1.5 times their even share, 3.4 times for the first 10 trials
+    of CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
     a learner without its corrective process spends most of them on its first trial. Times
     are those of :func:`coartic.analysis.comparisons.methods.solve_times`: without building.
     """
     trials_of = dict(study.rewards())
     found = {}
     for cell in study.cells.values():
-        runs = cell.runs
-        own_times = solve_times(cell.good).reindex(runs.index)
-        columns = (own_times if name == "solve_s" else runs[name] for name in SPENDS)
-        table = zip(*(numbers(column).tolist() for column in columns), strict=True)
-        rows = zip(map(str, runs.run_id), table, runs.status, runs.reward, strict=True)
+        runs = cell.runs.assign(solve_s=solve_times(cell.good).reindex(cell.runs.index))
+        totals = zip(*(numbers(runs[name]).tolist() for name in SPENDS), strict=True)
+        rows = zip(map(str, runs.run_id), totals, runs.status, runs.reward, strict=True)
         for run_id, spent, status, reward in rows:
-            total = dict(zip(SPENDS, spent, strict=True))
-            trials = trials_of.get(run_id)
+            total, trials = dict(zip(SPENDS, spent, strict=True)), trials_of.get(run_id)
             if status != "ok":
                 none = np.empty(0)
-                learns = trials is not None
-                found[run_id] = BestSoFar(none, dict.fromkeys(SPENDS, none), total, learns)
+                steps = none, dict.fromkeys(SPENDS, none)
             elif trials is None:
-                at_once = {name: np.array([value]) for name, value in total.items()}
-                found[run_id] = BestSoFar(np.array([float(reward)]), at_once, total, False)
+                spent_at_once = {name: np.array([value]) for name, value in total.items()}
+                steps = np.array([float(reward)]), spent_at_once
             else:
-                found[run_id] = by_trial(trials, total)
+                steps = improvements(trials, total)
+            found[run_id] = BestSoFar(*steps, total, learns=trials is not None)
     return found
 
 
@@ -98,16 +93,10 @@ def cells_by_spend(study: Study) -> Iterator[tuple[CellRuns, str, list[BestSoFar
             yield cell, spend, [run for run in runs if run.known(spend)]
 
 
-def by_trial(rewards: Array, total: dict[str, float]) -> BestSoFar:
-    """A run from the reward of each of its trials (n,), NaN where it failed."""
-    failed = np.isnan(rewards)
-    best = np.maximum.accumulate(np.where(failed, -np.inf, rewards))
+def improvements(rewards: Array, total: dict[str, float]) -> tuple[Array, dict[str, Array]]:
+    """Rewards and spends of a run's steps, from the reward of each of its trials, NaN if failed."""
+    best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards))
     steps = np.flatnonzero(best > np.concatenate([[-np.inf], best[:-1]]))
     number = (steps + 1).astype(np.float64)
-    ticks = np.where(failed, 0.0, -rewards)
-    if failed.any():
-        ticks[failed] = (total["movement_ticks"] - ticks.sum()) / failed.sum()
-    share = number / len(rewards)
-    spent = {name: total[name] * share for name in SPENDS}
-    spent |= {"trials": number, "movement_ticks": np.cumsum(ticks)[steps]}
-    return BestSoFar(best[steps], spent, total, True)
+    spent = {name: total[name] * (number / len(rewards)) for name in SPENDS}
+    return best[steps], spent | {"trials": number}

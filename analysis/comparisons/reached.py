@@ -7,24 +7,36 @@ been reached. Shares and the budgets that they take are exact, not read off a gr
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from coartic.analysis.comparisons.methods import group_of
 from coartic.analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
 from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps
-from coartic.analysis.methods import is_search, is_variant
+from coartic.analysis.methods import in_order, is_search, is_variant
 from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
 WAY = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
-_RESAMPLES = 1_999
-_FIGURES_AT_ONCE = 1_000_000  # weights of pairs in memory
+RESAMPLES = 1_999
+COARSE, BLOCKS = 64, 20
+"""Parts of a curve, in some of which crossings are looked for; blocks of resamples in memory."""
+PRICES = (
+    ("trials_to_quarter", "trials", 0.25),
+    ("trials_to_half", "trials", 0.5),
+    ("kinematics_to_half", "forward_kinematics", 0.5),
+    ("seconds_to_half", "solve_s", 0.5),
+)
+"""Columns of :func:`price`: what is spent to reach which share of the targets."""
 
 
 class Crossing(NamedTuple):
@@ -45,57 +57,66 @@ class Targets:
 
         Infinite where the target is not reached.
         """
-        self.runs = sum(map(len, spends))
-        weights = [np.full(own.shape, 1 / own.size / len(spends)) for own in spends]
+        self.sizes = tuple(map(len, spends))
         values = np.concatenate([own.ravel() for own in spends])
-        self._order = np.argsort(values, kind="stable")
-        self._values = values[self._order]
-        self._weights = np.concatenate([own.ravel() for own in weights])
-        self._sizes = tuple(map(len, spends))
+        weights = np.concatenate([np.full(own.size, 1 / own.size / len(spends)) for own in spends])
+        order = np.argsort(values, kind="stable")
+        self.values, self.weights = values[order], weights[order]
+        self.runs = order // len(WAY)
+        """Which run each pair is of."""
 
     def curve(self) -> tuple[Array, Array]:
         """Budgets at which the share rises, and the share from there on."""
-        last = np.append(self._values[1:] != self._values[:-1], True)
-        reached = last & np.isfinite(self._values)
-        return self._values[reached], np.cumsum(self._weights[self._order])[reached]
+        last = np.append(self.values[1:] != self.values[:-1], True)
+        reached = last & np.isfinite(self.values)
+        return self.values[reached], np.cumsum(self.weights)[reached]
 
     def share(self) -> float:
         """Share that is reached in the end."""
-        return float(self._weights[self._order][np.isfinite(self._values)].sum())
+        return float(self.weights[np.isfinite(self.values)].sum())
 
     def crossing(self, level: float) -> Crossing:
-        """The least budget within which ``level`` of the pairs are reached."""
-        budget = self._least(self._weights[None], level)[0]
-        if min(self._sizes) < FEWEST:
+        """The least budget within which ``level`` of the pairs are reached.
+
+        Runs are drawn anew within their task. No interval where a task has too few runs.
+        """
+        steps = np.append(self.values, math.inf)
+        budget = float(steps[(np.cumsum(self.weights) < level - 1e-9).sum()])
+        if min(self.sizes) < FEWEST:
             return Crossing(budget, math.nan, math.nan)
-        budgets = np.concatenate([self._least(weights, level) for weights in self._resampled()])
-        low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
+        # First between which of some places of the curve resamples cross, then at which pair.
+        places = np.unique(np.linspace(0, len(self.values), COARSE + 1).astype(int))
+        parts = [
+            np.bincount(self.runs[a:b], self.weights[a:b], minlength=sum(self.sizes))
+            for a, b in itertools.pairwise(places)
+        ]
+        reached = np.cumsum([np.zeros(sum(self.sizes)), *parts], axis=0)
+        budgets = []
+        for counts in np.array_split(resampled_counts(self.sizes), BLOCKS):
+            shares = counts @ reached.T
+            before = (shares < level - 1e-9).sum(axis=1) - 1
+            first, last = before.min(), min(before.max() + 1, len(parts))
+            near = slice(places[first], places[last])
+            shares = shares[:, [first]] + np.cumsum(
+                counts[:, self.runs[near]] * self.weights[near], axis=1
+            )
+            budgets.append(steps[near.start + (shares < level - 1e-9).sum(axis=1)])
+        low, high = np.quantile(np.concatenate(budgets), TAILS, method="inverted_cdf")
         return Crossing(budget, float(low), float(high))
 
-    def _resampled(self) -> Iterator[Array]:
-        """Weights of the pairs with runs drawn anew within their task, ``(resamples, pairs)``, some
-        resamples at a time: of thousands of runs all would fill the memory."""
-        rng = np.random.default_rng(SEED)
-        drawn = [
-            rng.multinomial(size, np.full(size, 1 / size), size=_RESAMPLES).astype(np.int32)
-            for size in self._sizes
-        ]
-        at_once = max(1, _FIGURES_AT_ONCE // len(self._weights))
-        for first in range(0, _RESAMPLES, at_once):
-            counts = np.concatenate([own[first : first + at_once] for own in drawn], axis=1)
-            yield np.repeat(counts, len(WAY), axis=1) * self._weights
 
-    def _least(self, weights: Array, level: float) -> Array:
-        """For each row of weights, the least value at which their sum reaches the level."""
-        shares = np.cumsum(weights[:, self._order], axis=1)
-        place = (shares < level - 1e-9).sum(axis=1)
-        found: Array = np.append(self._values, math.inf)[place]
-        return found
+@lru_cache(maxsize=2)
+def resampled_counts(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
+    """How often each run is in each resample, ``(RESAMPLES, runs)``, tasks by their runs."""
+    rng = np.random.default_rng(SEED)
+    draws = (rng.multinomial(size, np.full(size, 1 / size), size=RESAMPLES) for size in sizes)
+    return np.concatenate([counts.astype(np.uint8) for counts in draws], axis=1)
 
 
 @cached
 def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
-    """Pairs of run and target by task (or :data:`ALL_TASKS`), method and spend.
+    """Pairs of run and target by task, method and spend; over :data:`ALL_TASKS` where some method
+    ran on all of several.
 
     Of the tasks of :func:`~.standings.ends`, and of all methods but variants and searches for
     the optimum. A run whose steps are not known, such as the time of a cold one, has no part.
@@ -104,16 +125,18 @@ def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
     spends: dict[tuple[str, str, str], Array] = {}
     for cell, spend, runs in cells_by_spend(study):
         if cell.task in scale and runs and not is_variant(cell.label) | is_search(cell.label):
-            spends[cell.task, cell.label, spend] = _spends(runs, spend, *scale[cell.task])
+            spends[cell.task, cell.label, spend] = spent_at(runs, spend, *scale[cell.task])
     found = {}
-    for (method, labels), spend in ((m, s) for m in _everywhere(study).items() for s in SPENDS):
-        keys = [(task, label, spend) for task, label in labels.items()]
-        if len(scale) > 1 and all(key in spends for key in keys):
-            found[ALL_TASKS, method, spend] = Targets([spends[key] for key in keys])
-    return found | {key: Targets([own]) for key, own in spends.items()}
+    rows = gaps(study).drop_duplicates(["method", "task"])
+    for method, own in rows.groupby("method", sort=False):
+        for spend in SPENDS:
+            keys = [(task, label, spend) for task, label in zip(own.task, own.label, strict=True)]
+            if 1 < len(scale) == len(keys) and spends.keys() >= set(keys):
+                found[ALL_TASKS, str(method), spend] = Targets([spends[key] for key in keys])
+    return found or {key: Targets([own]) for key, own in spends.items()}
 
 
-def _spends(runs: Sequence[BestSoFar], spend: str, start: float, best: float) -> Array:
+def spent_at(runs: Sequence[BestSoFar], spend: str, start: float, best: float) -> Array:
     """What each run had spent when it reached each target, ``(runs, 20)``."""
     wanted = np.ceil(start + WAY * (best - start) - 1e-9)
     rows = [
@@ -122,11 +145,31 @@ def _spends(runs: Sequence[BestSoFar], spend: str, start: float, best: float) ->
     return np.array(rows)
 
 
-def _everywhere(study: Study) -> Mapping[str, dict[str, str]]:
-    """Methods that ran on all tasks: their labels by task."""
-    found: dict[str, dict[str, str]] = {}
-    rows: pd.DataFrame = gaps(study).drop_duplicates(["method", "task"])
-    for method, own in rows.groupby("method", sort=False):
-        if len(own) == len(ends(study)) and not is_variant(str(method)):
-            found[str(method)] = dict(zip(map(str, own.task), map(str, own.label), strict=True))
-    return found
+@cached
+def price(study: Study) -> pd.DataFrame:
+    """What it costs each method to reach a quarter and half of the targets, over all tasks.
+
+    The index is the label; over the first task where there is one only. ``task``; ``knows``: its
+    group; ``reached``: share of targets in the end; the columns of :data:`PRICES` with their
+    intervals (``_low``, ``_high``), infinite where it is not reached.
+    """
+    by_method = targets(study)
+    over = next(iter(by_method), ("",))[0]
+    labels = in_order({method for task, method, _ in by_method if task == over})
+    rows = {}
+    for label in labels:
+        if (over, label, "trials") in by_method:
+            row: dict[str, object] = {"task": over, "knows": group_of(study, label)}
+            row["reached"] = by_method[over, label, "trials"].share()
+            for name, spend, level in PRICES:
+                if (over, label, spend) in by_method:
+                    found = by_method[over, label, spend].crossing(level)
+                    row |= {
+                        name: found.budget,
+                        f"{name}_low": found.low,
+                        f"{name}_high": found.high,
+                    }
+            rows[label] = row
+    columns = [f"{name}{end}" for name, *_ in PRICES for end in ("", "_low", "_high")]
+    frame = pd.DataFrame.from_dict(rows, orient="index")
+    return frame.reindex(columns=["task", "knows", "reached", *columns])

@@ -7,15 +7,13 @@ explores one-armed and two-armed tasks under different conditions, so that one r
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.comparisons.methods import knows, method_rows
+from coartic.analysis.comparisons.methods import group_of, method_rows
 from coartic.analysis.methods import (
     EC1,
     EC3,
@@ -27,33 +25,14 @@ from coartic.analysis.methods import (
     is_search,
     is_variant,
 )
-from coartic.analysis.statistics.across_tasks import gap_share, task_mean
-from coartic.analysis.statistics.estimates import RESAMPLES, SEED, mean
-from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.statistics.estimates import mean
+from coartic.analysis.statistics.hypotheses import holm, sign_flip_test
+from coartic.analysis.statistics.instances import gap_share, task_mean
 from coartic.analysis.study import Study, cached
 from coartic.motion.initial import initial_hands
-from coartic.robot import Array
 
 ALL_TASKS = "all tasks"
 """In the column of tasks: the mean over all of them."""
-
-
-class Standing(NamedTuple):
-    """How far a method ends from the optimum on a task, or over all."""
-
-    task: str
-    """Or :data:`ALL_TASKS`."""
-    method: str
-    """Label."""
-    knows: str
-    """What it knows of the reward: one of :data:`~.methods.GROUPS`."""
-    algorithm: str
-    gap: float
-    """Mean, as a share of the optimum."""
-    low: float
-    high: float
-    """Ends of the 95 % interval over runs, NaN where there is none."""
-    runs: int
 
 
 @cached
@@ -80,15 +59,15 @@ def gaps(study: Study) -> pd.DataFrame:
     Columns ``task``, ``method`` (its label, or the learner's conditions together), ``label``,
     ``run``, ``seed``, ``gap`` as a share of the optimum, NaN for a run without a solution.
     """
-    parts = [pd.DataFrame(columns=["task", "method", "label", "run", "seed", "gap"])]
+    frame = pd.DataFrame(columns=["task", "method", "label", "run", "seed", "gap"])
+    parts = []
     for (task, label), cell in study.cells.items():
         if task in ends(study):
             rewards = cell.runs.reward.where(cell.runs.status == "ok")
-            values = rewards.to_numpy(dtype=np.float64, na_value=math.nan)
-            columns = {"run": cell.runs.run.to_numpy(), "seed": cell.runs.seed.to_numpy()}
-            columns["gap"] = gap_share(values, ends(study)[task][1])
-            parts.append(pd.DataFrame({"task": task, "method": label, "label": label, **columns}))
-    frame = pd.concat(parts[1:] or parts, ignore_index=True)
+            gap = gap_share(rewards.to_numpy(np.float64, na_value=math.nan), ends(study)[task][1])
+            own = cell.runs[["run", "seed"]].assign(task=task, method=label, label=label, gap=gap)
+            parts.append(own[frame.columns])
+    frame = pd.concat(parts or [frame], ignore_index=True)
     one_armed = frame[frame.label == EC1]
     for more in (EC4, EC3):
         two_armed = frame[frame.label == more]
@@ -102,95 +81,78 @@ def gaps(study: Study) -> pd.DataFrame:
 
 @cached
 def standings(study: Study) -> pd.DataFrame:
-    """Rows as :class:`Standing`, nearest first: over all tasks, then task by task.
+    """How far each method ends from the optimum: over all tasks, then task by task.
 
-    Of methods that solved every run; searches for the optimum and variants are left out.
+    Nearest first; of methods that solved every run, without searches for the optimum and variants.
+    Columns ``task`` (or :data:`ALL_TASKS`), ``method`` (label), ``knows`` (what it uses of the
+    reward: one of :data:`~.methods.GROUPS`), ``algorithm``, ``gap`` (mean, as a share of the
+    optimum) with the ``low`` and ``high`` end of its 95 % interval over runs, and ``runs``.
     """
-    rows = [*_over_all(study), *_by_task(study)]
-    frame = pd.DataFrame(rows, columns=Standing._fields)
-    place = {name: number for number, name in enumerate((ALL_TASKS, *study.tasks))}
-    order = frame.task.map(place)
-    return frame.assign(order=order).sort_values(
-        ["order", "gap"], kind="stable", ignore_index=True
-    ).drop(columns="order")  # fmt: skip
+    rows = [
+        (task, method, group_of(study, method), algorithm_of(method), *gap)
+        for task, method, *gap in [*over_all(study), *task_by_task(study)]
+        if not is_variant(method) and not is_search(method)
+    ]
+    columns = ["task", "method", "knows", "algorithm", "gap", "low", "high", "runs"]
+    places = [ALL_TASKS, *study.tasks]
+    rows.sort(key=lambda row: (places.index(str(row[0])), row[4]))
+    return pd.DataFrame(rows, columns=columns)
 
 
-def _over_all(study: Study) -> Iterator[Standing]:
-    frame, tasks = gaps(study), ends(study)
-    for method, runs in frame.groupby("method", sort=False):
+Standing = tuple[str, str, float, float, float, int]
+"""Task, method, gap with its interval, and runs."""
+
+
+def over_all(study: Study) -> Iterator[Standing]:
+    """Methods with a solution to every run of every task, where there are several."""
+    tasks = ends(study)
+    for name, runs in gaps(study).groupby("method", sort=False):
         by_task = {str(task): own.gap.to_numpy() for task, own in runs.groupby("task")}
-        shown = not is_variant(str(method)) and not is_search(str(method))
-        if shown and len(tasks) > 1 and len(by_task) == len(tasks) and runs.gap.notna().all():
-            found = task_mean(by_task)
-            told = method_rows(study)[str(runs.task.iloc[0]), str(runs.label.iloc[0])].told
-            yield Standing(
-                *(ALL_TASKS, str(method), knows(told), algorithm_of(str(method))),
-                *(found.estimate, found.low, found.high, len(runs)),
-            )
+        if len(tasks) > 1 and len(by_task) == len(tasks) and runs.gap.notna().all():
+            gap = task_mean(by_task)
+            yield ALL_TASKS, str(name), gap.estimate, gap.low, gap.high, len(runs)
 
 
-def _by_task(study: Study) -> Iterator[Standing]:
-    for (task, label), row in method_rows(study).items():
-        best = study.optima.get((task, "free"))
-        known = best is not None and best.reward and not math.isnan(row.gap)
-        if known and row.solved == row.runs and not is_variant(label) and not is_search(label):
-            assert best is not None
-            found = mean(study.cells[task, label].rewards)
+def task_by_task(study: Study) -> Iterator[Standing]:
+    """Methods with a solution to every run of a task."""
+    for (task, label), cell in study.cells.items():
+        known = not math.isnan(method_rows(study).gap[task, label])
+        if known and len(cell.good) == len(cell.runs):
+            best, found = study.optima[task, "free"].reward, mean(cell.rewards)
             # The higher the reward, the smaller the gap.
-            values = (found.estimate, found.high, found.low)
-            gap, low, high = ((best.reward - value) / -best.reward for value in values)
-            algorithm = algorithm_of(label)
-            yield Standing(task, label, knows(row.told), algorithm, gap, low, high, row.runs)
+            gap, low, high = gap_share([found.estimate, found.high, found.low], best).tolist()
+            yield task, label, gap, low, high, len(cell.runs)
 
 
 def leaders(study: Study, group: str) -> pd.DataFrame:
     """The best form of each algorithm of a group over all tasks (or on the one), nearest first.
 
     The learner is there by the form that explores most. Column ``p``: of the difference to the
-    first row, NaN for that row itself: paired by task and seed, sign-flip test, two-tailed,
-    after Holm's correction over the rows.
+    first row (:func:`apart_p`) after Holm's correction over the rows, NaN for the first row itself.
     """
     rows: pd.DataFrame = standings(study)
-    if len(rows):
-        rows = rows[(rows.task == rows.task.iloc[0]) & (rows.knows == group)]
-    if not len(rows):
-        return rows.assign(p=[])
-    learners = np.array([is_learner(method) for method in rows.method])
-    most = np.array(["EC4" in method for method in rows.method])
-    shown = rows[~learners | (most if (learners & most).any() else learners)]
+    rows = rows[(rows.task == rows.task.iloc[0]) & (rows.knows == group)] if len(rows) else rows
+    learners = rows.method.map(is_learner).astype(bool)
+    most = learners & rows.method.str.contains("EC4")
+    shown = rows[~learners | (most if most.any() else learners)]
     shown = shown.drop_duplicates("algorithm").reset_index(drop=True)
     p = [apart_p(study, shown.method[0], other) for other in shown.method[1:]]
-    tested: pd.DataFrame = shown.assign(p=[math.nan, *holm(p)])
-    return tested
+    return shown.assign(p=[math.nan, *holm(p)][: len(shown)])
 
 
 def apart_p(study: Study, first: str, second: str) -> float:
     """Two-tailed p of the difference of mean gaps of two methods over the tasks of both.
 
-    Runs are paired by seed within their task; a method that is run once is compared with every
-    run of the other. Sign-flip test with all tasks counting the same; NaN without pairs.
+    A sign-flip test of runs paired by seed within their task; a method that is run once is compared
+    with every run of the other. All tasks count the same; NaN without pairs on one of them.
     """
     frame = gaps(study)
     one, two = (frame[frame.method == method] for method in (first, second))
-    differences, weights = [], []
+    differences = []
     for task in (task for task in ends(study) if task in set(one.task) & set(two.task)):
-        values = _paired(one[one.task == task], two[two.task == task])
-        if not len(values):
-            return math.nan
-        differences.append(values)
-        weights.append(np.full(len(values), 1 / len(values)))
-    if sum(map(len, differences)) < 2:
+        a, b = one[one.task == task], two[two.task == task]
+        both = a.merge(b, on="seed" if min(len(a), len(b)) > 1 else "task")
+        differences.append((both.gap_x - both.gap_y).to_numpy(np.float64))
+    if not differences or not all(map(len, differences)):
         return math.nan
-    terms = np.concatenate(differences) * np.concatenate(weights)
-    signs = np.random.default_rng(SEED).choice([-1.0, 1.0], size=(RESAMPLES, len(terms)))
-    reached = np.abs(signs @ terms) >= abs(terms.sum()) - 1e-12
-    return float((1 + reached.sum()) / (1 + RESAMPLES))
-
-
-def _paired(one: pd.DataFrame, two: pd.DataFrame) -> Array:
-    """Differences of gaps of runs that share a seed, or of each run to the only one."""
-    if min(len(one), len(two)) == 1:
-        found = itertools.product(one.gap, two.gap)
-        return np.array([a - b for a, b in found])
-    both = one.merge(two, on="seed", suffixes=("_one", "_two"))
-    return (both.gap_one - both.gap_two).to_numpy(dtype=np.float64)
+    return sign_flip_test(np.concatenate([own / len(own) for own in differences])).p

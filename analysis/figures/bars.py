@@ -17,9 +17,8 @@ from coartic.analysis.figures.configurations import initial_solution
 from coartic.analysis.figures.plot import Plot, spoken, worded
 from coartic.analysis.methods import CONDITIONS, LEARNER, name_of
 from coartic.analysis.published import Summary, published_cell, published_initial
-from coartic.analysis.statistics.estimates import RESAMPLES, mean
+from coartic.analysis.statistics.estimates import RESAMPLES, Interval, mean, student
 from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.statistics.intervals import Interval, student
 from coartic.analysis.study import Study
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))

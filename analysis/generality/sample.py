@@ -10,8 +10,7 @@ import pandas as pd
 
 from coartic import Task
 from coartic.analysis.optima import locks_base
-from coartic.analysis.statistics.across_tasks import gap_share
-from coartic.analysis.statistics.instances import Runs, Scores
+from coartic.analysis.statistics.instances import Runs, Scores, gap_share
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
@@ -28,8 +27,6 @@ class ReferenceReward:
     """Highest reward of any run of the folder, or of the search for the optimum."""
     bound: int | None
     """Reward that is proven never to be exceeded; None where nothing is."""
-    searched: int | None
-    """Best reward of the search for the optimum; None where the folder has none."""
 
     @property
     def proven(self) -> bool:
@@ -70,11 +67,7 @@ class Sample:
             if optimum is not None:
                 known.append(optimum.reward)
             if known and max(known) < 0:
-                found[name] = ReferenceReward(
-                    max(known),
-                    optimum.bound if optimum else None,
-                    optimum.searched if optimum else None,
-                )
+                found[name] = ReferenceReward(max(known), optimum.bound if optimum else None)
         return found
 
     @cached_property
@@ -92,12 +85,6 @@ class Sample:
             )
         )
 
-    @cached_property
-    def searches(self) -> tuple[str, ...]:
-        """Searches for the optimum of instances with their variants, in the plan's order."""
-        known = (label for name, label in self.study.cells if name in self.tasks)
-        return tuple(dict.fromkeys(label for label in known if label.startswith(SEARCH)))
-
     def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
         """Of each solved run (n,), as a share of the best known reward; None without any.
 
@@ -111,19 +98,18 @@ class Sample:
         return None if to is None else gap_share(cell.rewards, to)
 
     def gaps(
-        self, *labels: str, families: Sequence[str] | None = None, to_bound: bool = False
+        self, label: str, *, families: Sequence[str] | None = None, to_bound: bool = False
     ) -> Scores:
-        """Gaps by family, on the instances that all of the methods solved in some run.
+        """Gaps by family, on the instances that the method solved in some run.
 
         A family without one is left out.
         """
         found: dict[str, list[Runs]] = {}
-        for family in families if families is not None else self.families:
+        for family in families or self.families:
             for name in self.families.get(family, ()):
-                own = [self.gap(name, label, to_bound=to_bound) for label in labels]
-                known = tuple(runs for runs in own if runs is not None)
-                if len(known) == len(labels):
-                    found.setdefault(family, []).append(known)
+                gap = self.gap(name, label, to_bound=to_bound)
+                if gap is not None:
+                    found.setdefault(family, []).append((gap,))
         return found
 
     def shared(self, *labels: str) -> dict[str, tuple[str, ...]]:

@@ -19,7 +19,8 @@ from coartic.analysis import tables
 from coartic.analysis.claims.judge import counts, judged
 from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD
 from coartic.analysis.comparisons.paper import paper_rows
-from coartic.analysis.comparisons.reached import Targets, targets
+from coartic.analysis.comparisons.reached import Crossing
+from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import leaders
 from coartic.analysis.generality.exploration import contrasts
 from coartic.analysis.generality.sample import one_by_one, sample
@@ -255,55 +256,35 @@ class Price:
 @cached
 def price(study: Study) -> Price | None:
     """None where the learner did not run on tasks with a known optimum."""
-    known = targets(study)
-    over = next(iter(known), ("",))[0]
-    labels = list(dict.fromkeys(method for task, method, _ in known if task == over))
-    learners = [label for label in main_methods(labels) if is_learner(label)]
+    rows = price_by_method(study)
+    learners = [label for label in main_methods(map(str, rows.index)) if is_learner(label)]
     if not learners:
         return None
-    own = learners[0]
-
-    def of(method: str, spend: str) -> Targets:
-        return known[over, method, spend]
-
-    trials = {m: of(m, "trials") for m in labels if (over, m, "trials") in known}
-    rivals = [m for m in trials if not is_learner(m) and _learns(trials[m])]
-    rival = max(rivals, key=lambda m: trials[m].share(), default="")
+    learner: Any = rows.loc[learners[0]]
+    others = [label for label in rows.index if not is_learner(str(label))]
+    rivals = rows[(rows.knows == BY_TRIAL) & rows.index.isin(others)]
+    rival: Any = rivals.sort_values("reached", kind="stable").iloc[-1] if len(rivals) else None
     levels = []
-    for level in (0.25, 0.5):
-        ours = trials[own].crossing(level)
-        theirs = trials[rival].crossing(level) if rival else None
-        if math.isfinite(ours.budget) and theirs and math.isfinite(theirs.budget):
-            levels.append(
-                {
-                    "level": level,
-                    "ours": ours,
-                    "theirs": theirs,
-                    "times": ours.budget / theirs.budget,
-                }
-            )
-    plans = {
-        m: of(m, "forward_kinematics").crossing(0.5).budget
-        for m in labels
-        if not _learns(trials[m]) and trials[m].share() >= 0.5
-    }
-    plan = min(plans, key=lambda m: plans[m], default="")
+    for level, name in ((0.25, "trials_to_quarter"), (0.5, "trials_to_half")):
+        ours, theirs = (
+            Crossing(*(row[f"{name}{end}"] for end in ("", "_low", "_high")))
+            for row in (learner, learner if rival is None else rival)
+        )
+        if rival is not None and math.isfinite(ours.budget) and math.isfinite(theirs.budget):
+            times = ours.budget / theirs.budget
+            levels.append({"level": level, "ours": ours, "theirs": theirs, "times": times})
+    plans = rows[(rows.knows != BY_TRIAL) & (rows.reached >= 0.5)].kinematics_to_half
+    plan = "" if plans.empty else str(plans.idxmin())
     return Price(
-        name_of(own),
-        name_of(rival) if rival else "",
+        name_of(learners[0]),
+        "" if rival is None else name_of(str(rival.name)),
         levels,
-        trials[own].share(),
-        trials[rival].share() if rival else math.nan,
+        learner.reached,
+        math.nan if rival is None else rival.reached,
         name_of(plan) if plan else "",
         plans.get(plan, math.nan),
-        of(own, "forward_kinematics").crossing(0.5).budget,
+        learner.kinematics_to_half,
     )
-
-
-def _learns(found: Targets) -> bool:
-    """Whether more is reached in more trials."""
-    budgets, share = found.curve()
-    return len(budgets) > 1 and share[-1] > share[0] and budgets[-1] > 20
 
 
 @cached

@@ -21,7 +21,6 @@ from coartic.analysis.signatures.context import (
 from coartic.analysis.signatures.locus import LEAST, ContextFamily, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
 from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
-from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.trajectories import Trajectories, last_ticks, postures
 from coartic.robot import HANDS, Array
@@ -91,7 +90,7 @@ def parts(contexts: TwoContexts, equivalent: Signature, other: Signature) -> Row
     first, second = contexts.postures
     task = contexts.first.task
     joints, jacobian = jacobian_of(task, contexts.hand, np.concatenate([first, second]))
-    difference = spread.mean(first) - spread.mean(second)
+    difference = first.mean(axis=0) - second.mean(axis=0)
     found = motor_equivalence(difference[joints], jacobian)
     why = "one run a context: no test" if contexts.single else ""
     signatures = equivalent, other

@@ -18,8 +18,7 @@ import numpy as np
 from coartic import Task
 from coartic.analysis.optima import KEPT
 from coartic.analysis.signatures.permutation import divisions, p_values
-from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
-from coartic.analysis.statistics.spread import mean
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred
 from coartic.robot import Array
 
 
@@ -46,7 +45,7 @@ def distance(first: Array, second: Array) -> float:
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Mixed units (see the module).
     """
-    return float(np.linalg.norm(mean(first) - mean(second)))
+    return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
 def context_dependence(first: Array, second: Array) -> float:
@@ -60,7 +59,7 @@ def context_dependence(first: Array, second: Array) -> float:
     freedom = len(first) + len(second) - 2
     if freedom < 1:
         return math.nan
-    squares = sum(((group - mean(group)) ** 2).sum() for group in (first, second))
+    squares = sum((centred(group) ** 2).sum() for group in (first, second))
     spread = float(np.sqrt(squares / freedom))
     return distance(first, second) / spread if spread else math.nan
 
@@ -88,7 +87,7 @@ def dependence_below(
         for start in range(0, resamples, 500):  # thousands of runs would fill the memory
             rows = slice(start, min(start + 500, resamples))
             drawn = group[rng.integers(len(group), size=(rows.stop - start, len(group)))]
-            means[-1][rows] = mean(drawn, 1)
+            means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
     pooled = np.sqrt(squares / (len(first) + len(second) - 2))
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
@@ -116,8 +115,7 @@ def permutation_p(
     """
     if min(len(first), len(second)) < 2:
         return np.full(first.shape[1:-1], math.nan)
-    pool = np.concatenate([first, second])
-    pool = pool - mean(pool)
+    pool = centred(np.concatenate([first, second]))
     if basis is not None:
         pool = pool @ basis
     weights, exact = divisions(len(first), len(second), rng, resamples)

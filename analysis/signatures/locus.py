@@ -22,8 +22,7 @@ from scipy.cluster.hierarchy import DisjointSet
 from coartic import Task
 from coartic.analysis.optima import KEPT
 from coartic.analysis.signatures.permutation import orders, p_values
-from coartic.analysis.statistics.intervals import Interval, student
-from coartic.analysis.statistics.spread import mean
+from coartic.analysis.statistics.estimates import Interval, centred, student, varies
 from coartic.robot import Array
 
 LEAST = 3
@@ -93,7 +92,7 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
     slopes = []
     for joint in means.T:
         slope = Interval(0.0, 0.0, 0.0, 1.0)
-        if np.ptp(joint) > 0:
+        if varies(joint):
             fit = stats.linregress(x, joint)
             value, error, p = map(float, (fit.slope, fit.stderr, fit.pvalue))
             slope = student(value, error, len(x) - 2, p)
@@ -112,9 +111,8 @@ def slope_norm(
     nothing depends on the position. Raises ValueError for fewer than three positions.
     """
     x, means = _by_position(configurations, positions)
-    means = means - mean(means)
-    centred = x - x.mean()
-    weights = centred / (centred**2).sum()
+    means, x = centred(means), centred(x)
+    weights = x / (x**2).sum()
     ways, exact = orders(len(x), rng)
     observed = np.asarray(np.linalg.norm(weights @ means))
     null = np.linalg.norm(weights[ways] @ means, axis=1)
@@ -126,4 +124,4 @@ def _by_position(configurations: Array, positions: Sequence[float] | Array) -> t
     places, of_run = np.unique(np.asarray(positions, dtype=np.float64), return_inverse=True)
     if len(places) < LEAST:
         raise ValueError(f"a slope needs {LEAST} positions of a goal that moves")
-    return places, np.array([mean(configurations[of_run == k]) for k in range(len(places))])
+    return places, np.array([configurations[of_run == k].mean(axis=0) for k in range(len(places))])

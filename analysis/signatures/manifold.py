@@ -14,8 +14,7 @@ import numpy as np
 from scipy import linalg, stats
 
 from coartic import Hand, Task
-from coartic.analysis.statistics.intervals import Interval, student
-from coartic.analysis.statistics.spread import mean, sd
+from coartic.analysis.statistics.estimates import Interval, standard_deviation, student
 from coartic.robot import Array
 
 _PROJECTED = 1e-24
@@ -31,7 +30,7 @@ def movable(task: Task, hand: Hand) -> Array:
 def jacobian_of(task: Task, hand: Hand, configurations: Array) -> tuple[Array, Array]:
     """Joints that can move a hand, and its Jacobian in these, ``(2, k)``, at the mean posture."""
     joints = movable(task, hand)
-    return joints, task.robot.jacobian(mean(configurations), hand)[:, joints]
+    return joints, task.robot.jacobian(configurations.mean(axis=0), hand)[:, joints]
 
 
 def subspaces(jacobian: Array) -> tuple[Array, Array]:
@@ -113,7 +112,7 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
         return untested
     pseudo = n * z - (n - 1) * 0.5 * np.log(left[0] / left[1])
     # About the full sample's z, not the pseudo-values' mean, so that the interval holds it.
-    error = sd(pseudo) / math.sqrt(n)
+    error = standard_deviation(pseudo) / math.sqrt(n)
     if not error:
         return untested
     p = 2.0 * float(stats.t.sf(abs(z - neutral) / error, n - 1))

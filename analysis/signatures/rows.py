@@ -10,7 +10,7 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
 from coartic.analysis.references import Key
-from coartic.analysis.statistics.intervals import Interval
+from coartic.analysis.statistics.estimates import Interval
 from coartic.runs.plan import label_of
 
 NO_RUN = "no run has a solution"

@@ -38,7 +38,7 @@ from coartic.analysis.signatures.subtasks import (
     sacrifice_p,
     sacrifices,
 )
-from coartic.analysis.statistics import intervals
+from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
 from coartic.analysis.trajectories import Trajectories, entropy, postures
 from coartic.robot import Array
 
@@ -218,9 +218,11 @@ def mean_at(
     known = given[np.isfinite(given)]
     if not len(known):
         return signature.at(place, why_not=missing if len(given) else NO_RUN)
-    return signature.estimated(place, intervals.mean(known), len(known))
+    return signature.estimated(place, student_mean(known), len(known))
 
 
 def share_at(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
-    """Share of runs, with Wilson's interval."""
-    return signature.estimated(place, intervals.share(agrees), len(agrees))
+    """Share of runs, with Wilson's interval; without one for a single run."""
+    count, total = sum(agrees), len(agrees)
+    found = wilson(count, total) if total > 1 else Interval(count / total)
+    return signature.estimated(place, found, total)

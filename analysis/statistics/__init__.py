@@ -1,1 +1,1 @@
-"""Statistics: estimates, tests, equivalence, sizes of samples, several tasks together."""
+"""Estimates with intervals, tests, and equivalence; docs/statistics.md says which is used where."""

@@ -1,0 +1,122 @@
+"""How intervals and tests do where the truth is known: ``python -m coartic.analysis.calibrate``.
+
+Samples like rewards are drawn, 500 times for each number of runs. Intervals at 95 % should
+hold the truth in 95 % of them; tests at 5 % should reject a true hypothesis in 5 % at most. The
+table is in docs/statistics.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.signatures.context import permutation_p
+from coartic.analysis.statistics import estimates
+from coartic.analysis.statistics.equivalence import difference, shares
+from coartic.analysis.statistics.estimates import LEVEL, Inference, Interval
+from coartic.analysis.statistics.hypotheses import (
+    bootstrap_test,
+    independence_test,
+    share_test,
+    sign_flip_test,
+)
+from coartic.analysis.statistics.instances import other_tasks
+from coartic.robot import Array
+
+SIMULATIONS, RESAMPLES = 500, 999
+"""Samples of each kind, and resamples of each; a rate of 5 % is known to ± 2 %."""
+RUNS = (5, 20, 100)
+Draw = Callable[[np.random.Generator, int], Array]
+POPULATIONS: dict[str, Draw] = {
+    "ticks": lambda rng, n: -300 + rng.normal(0, 3, n).round(),
+    "skewed": lambda rng, n: -300 - rng.exponential(8, n).round(),
+    "two levels": lambda rng, n: np.where(
+        rng.random(n) < 0.7, -331 + rng.normal(0, 5, n), -355 + rng.normal(0, 1, n)
+    ).round(),
+}
+"""Rewards as they occur: with ties, skewed, and on two levels, by the hands that are learned."""
+SHARE = 0.75
+
+
+def holds(found: Inference | Interval, truth: float) -> bool:
+    """Whether an interval holds a value, to rounding; no interval does not."""
+    return found.low - 1e-9 <= truth <= found.high + 1e-9
+
+
+def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dict[str, bool]:
+    """What the procedures for rewards make of two samples from one population."""
+    a, b = draw(rng, n), draw(rng, n)
+    sd = float(b.std(ddof=1))
+    improvement = estimates.probability_of_improvement(a, b, resamples=RESAMPLES)
+    return {
+        "interval of a mean (BCa)": holds(estimates.mean(a, resamples=RESAMPLES), mean),
+        "interval of a difference (BCa)": holds(
+            estimates.difference_of_means(a, b, resamples=RESAMPLES), 0
+        ),
+        "interval of paired differences (BCa)": holds(
+            estimates.mean(a - b, resamples=RESAMPLES), 0
+        ),
+        "interval of P(better) (BCa, Newcombe)": holds(improvement, 0.5),
+        "interval to a printed mean (Welch)": holds(difference(a, float(b.mean()), sd, n), 0),
+        "interval of a mean (Student)": holds(estimates.student_mean(a), mean),
+        "test of a mean (bootstrap)": bootstrap_test(a, mean, resamples=RESAMPLES).p <= LEVEL,
+        "test of two means (bootstrap)": bootstrap_test(a, b, resamples=RESAMPLES).p <= LEVEL,
+        "test of pairs (sign flips)": sign_flip_test(a - b).p <= LEVEL,
+    }
+
+
+def of_counts(rng: np.random.Generator, n: int) -> dict[str, bool]:
+    """The same of the procedures for shares and counts, at a true share of three quarters."""
+    counts = rng.multinomial(n, [SHARE, 0.15, 0.10], size=2).tolist()
+    (first, *_), (second, *_) = counts
+    return {
+        "interval of a share (Wilson)": holds(estimates.wilson(first, n), SHARE),
+        "interval of two shares (Newcombe)": holds(shares((first, n), (second, n), 0.25), 0),
+        "test of a share (exact binomial)": share_test(first, n, SHARE, "greater").p <= LEVEL,
+        "test of counts (Fisher)": independence_test(*counts).p <= LEVEL,
+    }
+
+
+def of_postures(rng: np.random.Generator, n: int) -> dict[str, bool]:
+    """The same of the permutation test of postures: two joints that vary together."""
+    first, second = rng.exponential(0.1, (2, n, 2)) @ np.array([[1.0, 0.5], [0.0, 1.0]])
+    p = permutation_p(first, second, rng, resamples=RESAMPLES)
+    return {"test of postures (permutation)": bool(p <= LEVEL)}
+
+
+def of_instances(rng: np.random.Generator, n: int) -> dict[str, bool]:
+    """The same of the mean over n random tasks, five runs each, whose gaps are skewed."""
+    centres = rng.exponential(0.1, n)
+    found = other_tasks({"a": [(centre + rng.exponential(0.02, 5),) for centre in centres]})
+    return {"interval over random tasks": holds(found, 0.12)}
+
+
+def rates() -> Iterator[tuple[str, str, int, float]]:
+    """Procedure, population, number of runs, and in what share of samples it holds or rejects."""
+    rng = np.random.default_rng(0)
+    kinds: dict[str, Callable[[int], dict[str, bool]]] = {
+        "counts": lambda n: of_counts(rng, n),
+        "skewed": lambda n: of_postures(rng, n) | of_instances(rng, n),
+    }
+    for n in RUNS:
+        for name, draw in POPULATIONS.items():
+            mean = float(draw(rng, 4_000_000).mean())
+            seen = pd.DataFrame([of_rewards(rng, draw, n, mean) for _ in range(SIMULATIONS)])
+            yield from ((str(what), name, n, rate) for what, rate in seen.mean().items())
+        for name, kind in kinds.items():
+            seen = pd.DataFrame([kind(n) for _ in range(SIMULATIONS)])
+            yield from ((str(what), name, n, rate) for what, rate in seen.mean().items())
+
+
+def main() -> None:
+    """Print the rates in per cent, a row for each procedure and population."""
+    frame = pd.DataFrame(rates(), columns=["procedure", "rewards", "n", "rate"])
+    frame["rate"] = (100 * frame.rate).map("{:.1f}".format)
+    table = frame.set_index(["procedure", "rewards", "n"]).rate.unstack()  # noqa: PD010
+    print(table.to_csv(sep="|"))
+
+
+if __name__ == "__main__":
+    main()
