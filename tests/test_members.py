@@ -6,9 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-
-from coartic import PAPER, CoarticError, TaskError, load_task
-from coartic.analysis.reconstruction import targets
 from coartic.analysis.reconstruction.constraints import try_sequences
 from coartic.analysis.reconstruction.curve import specification_curve
 from coartic.analysis.reconstruction.reconstruct import search_for
@@ -18,6 +15,9 @@ from coartic.analysis.reconstruction.specifications import (
     shares,
     specifications,
 )
+
+from coartic import PAPER, CoarticError, TaskError, load_task
+from coartic.analysis.reconstruction import targets
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.plan import DeclaredMethod
 from coartic.tasks.members import members, members_file, task_of, with_members

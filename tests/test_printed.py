@@ -3,11 +3,6 @@
 import math
 
 import pytest
-from pydantic import ValidationError
-
-from coartic import PAPER, CoarticError, Robot, corrective_trial, hand_sequences, load_task
-from coartic.analysis import printed
-from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.printed import (
     ENTRIES,
     Base,
@@ -27,6 +22,11 @@ from coartic.analysis.printed import (
     constant,
     parse_entries,
 )
+from pydantic import ValidationError
+
+from coartic import PAPER, CoarticError, Robot, corrective_trial, hand_sequences, load_task
+from coartic.analysis import printed
+from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.published import RUNS, TRIALS
 from coartic.learner.conditions import CONDITIONS
 from coartic.tasks.catalogue import builtin_tasks

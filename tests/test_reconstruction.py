@@ -10,6 +10,18 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from coartic.analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
+from coartic.analysis.reconstruction.layout import Layout, layouts
+from coartic.analysis.reconstruction.likelihood import likelihoods, together
+from coartic.analysis.reconstruction.lines import lines
+from coartic.analysis.reconstruction.reconstruct import (
+    Effort,
+    features,
+    reconstruct,
+    search_for,
+    spread_out,
+)
+from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from scipy import stats
 
 from coartic import (
@@ -23,17 +35,6 @@ from coartic import (
     parse_task,
 )
 from coartic.analysis.reconstruction import targets
-from coartic.analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
-from coartic.analysis.reconstruction.layout import Layout, layouts
-from coartic.analysis.reconstruction.likelihood import likelihoods, together
-from coartic.analysis.reconstruction.lines import lines
-from coartic.analysis.reconstruction.reconstruct import (
-    Effort,
-    features,
-    reconstruct,
-    search_for,
-    spread_out,
-)
 from coartic.analysis.reconstruction.scoring import (
     FARTHEST,
     Figure,
@@ -44,7 +45,6 @@ from coartic.analysis.reconstruction.scoring import (
     distance_error,
 )
 from coartic.analysis.reconstruction.search import Search
-from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
