@@ -10,18 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from coartic.analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
-from coartic.analysis.reconstruction.layout import Layout, layouts
-from coartic.analysis.reconstruction.likelihood import likelihoods, together
-from coartic.analysis.reconstruction.lines import lines
-from coartic.analysis.reconstruction.reconstruct import (
-    Effort,
-    features,
-    reconstruct,
-    search_for,
-    spread_out,
-)
-from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
 from scipy import stats
 
 from coartic import (
@@ -34,21 +22,45 @@ from coartic import (
     load_task,
     parse_task,
 )
-from coartic.analysis.reconstruction import targets
+from coartic.analysis.reconstruction import ensemble, readings
+from coartic.analysis.reconstruction.ensemble import (
+    Scored,
+    Wave,
+    clearly_nearer,
+    features,
+    reconstruct,
+    scored,
+    spread_out,
+)
+from coartic.analysis.reconstruction.layouts import (
+    Layout,
+    base_moves,
+    earns_more,
+    layouts,
+    reward_is,
+)
+from coartic.analysis.reconstruction.readings import likelihoods, together
 from coartic.analysis.reconstruction.scoring import (
     FARTHEST,
     Figure,
-    Learned,
     Order,
+    beside_printed,
     compared,
     distance,
     distance_error,
+    printed_tests,
 )
-from coartic.analysis.reconstruction.search import Search
+from coartic.analysis.reconstruction.search import Search, search_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
 NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
+
+
+def runs(rewards: np.ndarray, *hands: tuple[str, int]) -> pd.DataFrame:
+    """Runs with these rewards, so many of them with each hand sequence."""
+    names = [name for name, count in hands for _ in range(count)] or ["LRLR"] * len(rewards)
+    return pd.DataFrame({"reward": np.array(rewards, float), "hands": names})
 
 
 def with_a_shorter_left_arm(task: Task) -> Task:
@@ -67,18 +79,18 @@ def test_trials_are_those_that_are_made_one_by_one(task: Task) -> None:
     goals[1, :2] = goals[0, :2]  # begins as the one before
     model = PAPER._replace(max_iterations=300)  # some fail
     sequences = hand_sequences(task)
-    found = corrective_trials(task, sequences, goals, model=model)
+    together = corrective_trials(task, sequences, goals, model=model)
     failed = 0
     for (n, places), (s, hands) in itertools.product(enumerate(goals), enumerate(sequences)):
         moved = task.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
         alone = corrective_trial(moved, hands, model=model)
         if not alone.completed:
             failed += 1
-            assert math.isnan(found.rewards[n, s])
-            assert np.isnan(found.reached[n, s, -1]).all()
+            assert math.isnan(together.rewards[n, s])
+            assert np.isnan(together.reached[n, s, -1]).all()
             continue
-        assert found.rewards[n, s] == alone.reward
-        np.testing.assert_array_equal(found.reached[n, s], alone.configurations)
+        assert together.rewards[n, s] == alone.reward
+        np.testing.assert_array_equal(together.reached[n, s], alone.configurations)
     assert 0 < failed < len(goals) * len(sequences)
 
 
@@ -96,15 +108,16 @@ def test_constraints() -> None:
     rewards = np.array([[-675.0, -700.0], [-675.0, -675.0], [-674.0, np.nan]])
     reached = np.zeros((3, 2, 4, 10))
     reached[:, 0, :, 0] = [[-1, 1, 0, 2], [-1, -2, 0, 2], [0.5, 1, 2, -1]]
-    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached), start_x=0.0)
+    trials = CorrectiveTrials(rewards, reached)
     for constraint, expected in (
-        (RewardIs("RRRR", -675.0), [True, True, False]),
-        (Above("RRRR", ("LLLL",)), [True, False, True]),
-        (BaseMoves("RRRR", 0, 1, "left"), [True, True, False]),
-        (BaseMoves("RRRR", 2, 3, "left"), [True, False, False]),
-        (BaseMoves("RRRR", 0, 4, "right"), [True, True, False]),
+        (reward_is("RRRR", -675.0), [True, True, False]),
+        (reward_is("RRRR", -674.0, within=1.0), [True, True, True]),
+        (earns_more("RRRR", ["LLLL"]), [True, False, True]),
+        (base_moves("RRRR", 0, 1, "left", 0.0), [True, True, False]),
+        (base_moves("RRRR", 2, 3, "left", 0.0), [True, False, False]),
+        (base_moves("RRRR", 0, 4, "right", 0.0), [True, True, False]),
     ):
-        assert constraint.holds(tried).tolist() == expected, str(constraint)
+        assert constraint.holds(trials).tolist() == expected, constraint.says
 
 
 @pytest.fixture(scope="module")
@@ -117,9 +130,9 @@ def search() -> Search:
         },
     )  # fmt: skip
     constraints = (
-        RewardIs("RRRR", -675.0),
-        RewardIs("LRLR", -532.0),
-        BaseMoves("RRRR", 2, 3, "left"),
+        reward_is("RRRR", -675.0),
+        reward_is("LRLR", -532.0),
+        base_moves("RRRR", 2, 3, "left", start_x=0.0),
     )
     return Search(TASK, layout, constraints, jobs=1, near=45.0)
 
@@ -127,22 +140,24 @@ def search() -> Search:
 def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
     exact, near = search.grid()
     assert len(exact) < len(near)
-    found = search.admitted(search.solve(near), "solved")
-    assert len(found) > 10
-    more = search.spread(found, 20, np.random.default_rng(0), 0.02)
-    for points in (exact, found, more):
+    solved = search.admitted(search.solve(near), "solved")
+    assert len(solved) > 10
+    more = search.spread(solved, 20, np.random.default_rng(0), 0.02)
+    for points in (exact, solved, more):
         assert search.layout.allowed(points).all()
+        assert search.meets_all(search.layout.places(points)).all()
         for goals in search.layout.places(points[:5]):
             task = search.task_with(goals)
             assert corrective_trial(task, "RRRR").reward == -675
             assert corrective_trial(task, "LRLR").reward == -532
     assert search.tried["round sets of goals"] == sum(map(len, search.layout.blocks(99)))
     assert (np.abs(exact - [3.24, 2.35, 3.4, 2.96, 2.38, 7.23]) < 1e-9).all(axis=1).any()
+    assert not search.meets_all(TASK.goal_array[None] + [0.0, 0.5]).any()
 
 
 def test_a_grid_holds_what_the_layout_allows() -> None:
     layout = Layout(
-        "t", (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
+        (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
     )
     points = np.concatenate(list(layout.blocks(5)))
     wide = np.concatenate(list(replace(layout, apart=0.6).blocks(5)))
@@ -156,75 +171,69 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
 
 @pytest.mark.parametrize("first", [None, 7])
 def test_members_are_spread(first: int | None) -> None:
-    rng = np.random.default_rng(0)
-    points = rng.normal(size=(60, 3))
+    points = np.random.default_rng(0).normal(size=(60, 3))
     chosen = spread_out(points, 20, first)
     assert first in (None, chosen[0])
-    assert len(set(chosen.tolist())) == 20
     for k in range(1, 20):
         gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
         assert gaps[chosen[k]] == pytest.approx(gaps.max())
 
 
-def test_features_weigh_rewards_and_postures_alike(search: Search) -> None:
+def test_features_weigh_rewards_and_postures_alike() -> None:
     goals = NEAR_PRINTED + np.random.default_rng(0).normal(0, 0.05, (30, 4, 2))
-    sequences = ("LRLR", "RRRR")
-    trials = corrective_trials(TASK, sequences, goals)
-    found = features(Tried(sequences, trials, start_x=0.0), ("RRRR",))
-    assert found[:, :2].var(axis=0).sum() == pytest.approx(1.0)
-    assert found[:, 2:].var(axis=0).sum() == pytest.approx(1.0)
+    values = features(corrective_trials(TASK, ("LRLR", "RRRR"), goals), [1])
+    assert values[:, :2].var(axis=0).sum() == pytest.approx(1.0)
+    assert values[:, 2:].var(axis=0).sum() == pytest.approx(1.0)
 
 
 def test_distances_are_in_standard_errors() -> None:
-    rng = np.random.default_rng(0)
-    rewards = rng.normal(-500.0, 3.0, 400)
-    cell = Learned(rewards, ("LRLR",) * 300 + ("RRRR",) * 100)
+    rewards = np.random.default_rng(0).normal(-500.0, 3.0, 400)
+    cell = runs(rewards, ("LRLR", 300), ("RRRR", 100))
+    cells = {"EC3": cell, "EC4": runs(rewards + 5.0), "two": runs(rewards + 1.0)}
+
+    def off(test: Figure | Order) -> float:
+        return test.compare(cells)[1]
+
     mean = Figure("EC3", "mean", -502.0, 20, sd=3.0)
     error = math.sqrt(9 / 20 + rewards.var(ddof=1) / 400 + 1 / 12)
-    assert mean.distance(cell) == pytest.approx((rewards.mean() + 502.0) / error)
+    assert off(mean) == pytest.approx((rewards.mean() + 502.0) / error)
     sd = Figure("EC3", "sd", 3.0, 20, digits=1)
-    assert abs(sd.distance(cell)) < 1.0
-    assert Figure("EC3", "sd", 30.0, 20).distance(cell) < -10.0
+    assert abs(off(sd)) < 1.0
+    assert off(Figure("EC3", "sd", 30.0, 20)) < -10.0
     # Of normal runs; one far outlier makes SDs less certain.
     twice = Figure("EC3", "sd", float(rewards.std(ddof=1)) / 2, 20, digits=9)
     tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)))
     variance = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (20, 400))
-    assert twice.distance(cell) == pytest.approx(math.log(2) / math.sqrt(variance))
+    assert off(twice) == pytest.approx(math.log(2) / math.sqrt(variance))
     rare = np.where(np.arange(400) < 4, rewards - 40.0, rewards)
-    assert 0.0 < sd.distance(Learned(rare, cell.hands)) < 3.0
+    assert 0.0 < sd.compare({"EC3": runs(rare)})[1] < 3.0
     share = Figure("EC3", "share", 0.75, 20, "LRLR")
-    assert share.ours(cell) == 0.75
-    assert share.distance(cell) == 0.0
-    absent = Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
-    assert math.isnan(absent.distance(cell))
-    better = Learned(rewards + 5.0, cell.hands)
-    cells = {"EC3": cell, "EC4": better}
-    assert compared([Order("EC4", "EC3")], cells)[0].distance == 0.0
+    assert share.compare(cells) == (0.75, 0.0)
+    failing = pd.concat([cell, runs(np.full(400, math.nan))])
+    assert share.compare({"EC3": failing})[0] == 0.375
+    # Orders hold, or are missed by what is missing in SDs of their test.
     theirs, ours = 2 * rewards.var(ddof=1) / 20, 2 * rewards.var(ddof=1) / 400
-    missing = -5.0 / math.sqrt(theirs + ours)
-    assert compared([Order("EC3", "EC4")], cells)[0].distance == pytest.approx(missing)
+    assert off(Order("EC4", "EC3")) == 0.0
+    assert off(Order("EC3", "EC4")) == pytest.approx(-5.0 / math.sqrt(theirs + ours))
     # Printed with a p, it has to be so clear with the printed runs, on average.
-    clear = Order("EC4", "EC3", p_below=0.01)
-    assert compared([clear], cells)[0].distance == 0.0
-    two = Learned(rewards + 1.0, cell.hands)
+    assert off(Order("EC4", "EC3", p_below=0.01)) == 0.0
     short = 1.0 - stats.norm.isf(0.01) * math.sqrt(theirs)
-    assert compared([clear], {"EC3": cell, "EC4": two})[0].distance == pytest.approx(
-        short / math.sqrt(theirs + ours)
-    )
+    expected = pytest.approx(short / math.sqrt(theirs + ours))
+    assert off(Order("two", "EC3", p_below=0.01)) == expected
     of_hands = Order("EC3", "EC3", (11, 9), "LRLR", "RRRR")
-    assert compared([of_hands], cells)[0].ours == rewards[:300].mean() - rewards[300:].mean()
-    assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
+    assert of_hands.compare(cells)[0] == rewards[:300].mean() - rewards[300:].mean()
     # To lose a sequence is never better than to learn it with figures far off.
+    absent = Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
     far = Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
+    assert math.isnan(off(absent))
+    assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
     assert distance(compared([far], cells)) == distance(compared([absent], cells)) == FARTHEST
     # What follows from other figures is shown and not counted.
-    assert distance(compared([replace(far, implied=True), share], cells)) == 0.0
-    failing = Learned(rewards, cell.hands, failed=400)
-    assert share.ours(failing) == 0.375
+    assert distance(compared([replace(far, counted=False), share], cells)) == 0.0
 
 
 def test_chance_of_printed_counts_is_multinomial() -> None:
-    cell = Learned(np.zeros(40), ("RRRR",) * 10 + ("RLRR",) * 30)
+    cell = runs(np.zeros(40), ("RRRR", 10), ("RLRR", 30))
     printed = [Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
     (counts,) = likelihoods(printed, cell)
     model = stats.multinomial(4, np.array([10.5, 30.5, 0.5]) / 41.5)
@@ -237,12 +246,12 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
 
 def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
-    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 500)
+    monkeypatch.setattr(readings, "DRAWS", 500)
     rng = np.random.default_rng(0)
-    own = Learned(rng.normal(-300.0, 3.0, 1000), ("RRR",) * 1000)
+    own = runs(rng.normal(-300.0, 3.0, 1000))
 
-    def p(runs: np.ndarray) -> float:
-        mean, sd = round(float(runs.mean())), round(float(runs.std(ddof=1)), 1)
+    def p(rewards: np.ndarray) -> float:
+        mean, sd = round(float(rewards.mean())), round(float(rewards.std(ddof=1)), 1)
         figures = [
             Figure("EC1", "mean", mean, 20, sd=sd),
             Figure("EC1", "sd", sd, 20, digits=1),
@@ -259,27 +268,38 @@ def test_a_chance_is_that_of_the_rounded_figures() -> None:
     rng = np.random.default_rng(1)
     rewards = np.round(rng.normal(-300.0, 3.0, 1000))
     figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
-    (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
+    (part,) = likelihoods(figures, runs(rewards))
     drawn = rng.choice(rewards, (60_000, 20))
     alike = (np.round(drawn.mean(axis=1)) == -301) & (np.round(drawn.std(axis=1, ddof=1), 1) == 2.9)
     assert math.exp(part.log_chance) == pytest.approx(alike.mean(), rel=0.2)
-    (part,) = likelihoods(figures[:1], Learned(np.full(100, -301.0), ("R",) * 100))
+    (part,) = likelihoods(figures[:1], runs(np.full(100, -301.0)))
     assert math.exp(part.log_chance) == pytest.approx(1.0, abs=0.1)
 
 
 def test_runs_that_fail_speak_against_a_reading() -> None:
-    cell = Learned(np.random.default_rng(0).normal(-300, 3, 500), ("R",) * 500, failed=500)
+    completed = runs(np.random.default_rng(0).normal(-300, 3, 500))
     figures = [Figure("EC1", "mean", -300.0, 20, sd=3.0)]
-    assert together(likelihoods(figures, cell)).p < 1e-3
-    assert together(likelihoods(figures, cell._replace(failed=0))).p > 0.1
+    assert together(likelihoods(figures, completed)).p > 0.1
+    failing = pd.concat([completed, runs(np.full(500, math.nan))])
+    assert together(likelihoods(figures, failing)).p < 1e-3
+
+
+def test_a_gain_is_as_likely_as_its_rounding_allows() -> None:
+    """A mean that rounds to -303 and a gain of 16 over -319: certain; of 17 over it: hardly."""
+    mean = Figure("EC1", "mean", -303.0, 20)
+    assert readings.likelihood_of_gain(16.0, -319.0, mean) == []
+    (border,) = readings.likelihood_of_gain(17.0, -319.0, mean)
+    assert border.p == 1 / 20  # exactly -302.5
+    (never,) = readings.likelihood_of_gain(18.0, -319.0, mean)
+    assert never.p < 1e-6
 
 
 def test_a_task_with_other_goals_is_another_task() -> None:
     assert TASK.goal_array is not None  # kept from now on
     search = Search(TASK, layouts()["two-armed-1"], (), jobs=1)
+    points = search.layout.points(np.array([TASK.goal_array, NEAR_PRINTED]))
     first, second = (
-        result.cells["EC3"].rewards
-        for result in scored(search, [TASK.goal_array, NEAR_PRINTED], wave=1, runs=3, trials=50)
+        result.cells["EC3"].reward for result in scored(search, points, wave=1, runs=3, trials=50)
     )
     changed = load_task("two-armed-1").model_dump() | {"goals": NEAR_PRINTED.tolist()}
     task = parse_task(changed, "test")
@@ -291,46 +311,42 @@ def test_a_task_with_other_goals_is_another_task() -> None:
 def test_a_reconstruction_is_found_and_scored(
     search: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coartic.analysis.reconstruction.reconstruct._MOST_NEAR", 30)
-    monkeypatch.setattr("coartic.analysis.reconstruction.reconstruct._MOST_STEPS", 100)
-    effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30, last=2)
+    monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
+    monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
+    effort = {"members": 4, "runs": 2, "plan": (Wave(3, 2), Wave(2, 2, 2, 0.01)), "trials": 30}
     small = replace(search, tried=Counter())
-    found = reconstruct(small, effort=effort)
-    members = found.members
+    members = reconstruct(small, **effort, last=2)
     # Four that are spread, and the nearest where it is none of them.
     ours = members.member.str.startswith("m")
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
     assert ours.sum() in (4, 5)
     assert list(members.member[~ours]) == list(search.layout.known)
-    assert members.distance[0] == round(found.nearest.distance, 3)
     known = members.set_index("member").loc["F2", ["x3", "y3"]]
     assert known.tolist() == [2.38, 2.96]
     for _, row in members[ours].iterrows():
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = reconstruct(replace(search, tried=Counter(), jobs=2), effort=effort)
-    pd.testing.assert_frame_equal(again.members, found.members)
+    again = reconstruct(replace(search, tried=Counter(), jobs=2), **effort, last=2)
+    pd.testing.assert_frame_equal(again, members)
 
 
 def test_what_is_printed_is_what_is_searched_for() -> None:
-    found = {str(c) for c in search_for("two-armed-1").constraints}
-    assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < found
-    tests = targets.tests_of("two-armed-2")
+    constraints = {constraint.says for constraint in search_for("two-armed-1").constraints}
+    assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < constraints
+    tests = printed_tests("two-armed-2")
     assert len({test.label for test in tests}) == len(tests) == 10
     # All 20 runs have what their parts have.
-    implied = [test.label for test in tests if isinstance(test, Figure) and test.implied]
-    assert implied == ["EC3 mean", "EC3 sd"]
-    beside = [test for test in targets.tests_of("two-armed-1") if isinstance(test, Figure)]
-    assert not any(test.implied for test in beside)
-    clear = [test.p_below for test in tests if isinstance(test, Order)]
-    assert clear == [0.01, 0.01]
+    assert [test.label for test in tests if not test.counted] == ["EC3 mean", "EC3 sd"]
+    assert all(test.counted for test in printed_tests("two-armed-1"))
+    assert [test.p_below for test in tests if isinstance(test, Order)] == [0.01, 0.01]
     with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
 
 
-def test_lines_stand_beside_what_is_printed() -> None:
-    table = lines(["two-armed-1-F2", "ascending"], runs=4, trials=60).set_index(["task", "figure"])
+def test_printed_results_stand_beside_fresh_runs() -> None:
+    names = ["two-armed-1-F2", "ascending"]
+    table = beside_printed(names, runs=4, trials=60).set_index(["task", "figure"])
     assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
     row = table.loc["ascending", "EC1 mean"]
     seeds = range(800_000_000, 800_000_004)
@@ -342,24 +358,25 @@ def test_lines_stand_beside_what_is_printed() -> None:
     assert row.low == pytest.approx(np.mean(own) + 303 - half)
     assert row.verdict == "different"
     assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
-    with pytest.raises(CoarticError, match="unknown task 'nope'"):
-        lines(["nope"], runs=3)
+    with pytest.raises(CoarticError, match="prints nothing of task 'long/v1/i001'"):
+        beside_printed(["long/v1/i001"], runs=3)
 
 
 def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:
     rng = np.random.default_rng(1)
     mean = Figure("EC3", "mean", -500.0, 20, sd=4.0)
 
-    def scored_at(offset: float, runs: int) -> Scored:
-        cell = Learned(rng.normal(-500.0 + offset, 4.0, runs), ("LRLR",) * runs)
-        return Scored(np.zeros((4, 2)), {"EC3": cell}, compared([mean], {"EC3": cell}))
+    def at(offset: float, count: int) -> Scored:
+        cells = {"EC3": runs(rng.normal(-500.0 + offset, 4.0, count))}
+        comparisons = compared([mean], cells)
+        return Scored(np.zeros(6), cells, comparisons, distance(comparisons))
 
-    near, far = scored_at(0.5, 300), scored_at(4.0, 300)
-    assert clearly_nearer(near, far)
-    assert not clearly_nearer(far, near)
-    assert not clearly_nearer(scored_at(0.5, 300), scored_at(0.7, 300))
+    near, far = at(0.5, 300), at(4.0, 300)
+    assert clearly_nearer(near, far, [mean])
+    assert not clearly_nearer(far, near, [mean])
+    assert not clearly_nearer(at(0.5, 300), at(0.7, 300), [mean])
     # Of few runs the same difference is no more than chance.
-    assert not clearly_nearer(scored_at(0.5, 4), scored_at(2.0, 4))
+    assert not clearly_nearer(at(0.5, 4), at(2.0, 4), [mean])
     # A distance in units of the error of a mean of n runs has that error over it.
     error = math.sqrt(16 / 20 + 16 / 300 + 1 / 12)
     assert distance_error([mean], far.cells) == pytest.approx(4 / math.sqrt(300) / error, rel=0.3)

@@ -9,8 +9,9 @@ of the best is searched.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ from coartic.analysis.reconstruction.scoring import (
     distance,
     distance_error,
     learned,
-    tests_of,
+    printed_tests,
 )
 from coartic.analysis.reconstruction.search import Search
 from coartic.learner.learning import threads_for
@@ -34,21 +35,16 @@ from coartic.motion.sequences import CorrectiveTrials
 from coartic.robot import Array
 from coartic.tasks.readings import condition_under
 
-DECIMALS = 3
-"""Of coordinates."""
+DECIMALS = 3  # of coordinates
 MOST_NEAR = 20_000
 """Points of the grid, drawn at random, that are moved to where the printed rewards come out."""
 RANDOM_STEPS = 4_000
-STEP = 0.15
-"""SD of the random steps, length unit."""
-POOL = 8_000
-"""Points among which members are spread."""
-WAVE_SEEDS = 1_000_000
-"""Seeds of a wave begin at a multiple of this."""
+STEP = 0.15  # SD of the random steps, length unit
+POOL = 8_000  # points among which members are spread
+WAVE_SEEDS = 1_000_000  # seeds of a wave begin at a multiple of this
 ENSEMBLE, LAST = 0, 99
 """Waves that score the members of the ensemble, and the nearest point beside one that stands."""
-CLEARLY = 2.0
-"""Standard errors by which another point has to be nearer."""
+CLEARLY = 2.0  # standard errors by which another point has to be nearer
 
 
 class Wave(NamedTuple):
@@ -74,10 +70,11 @@ PLAN = (
 
 
 class Scored(NamedTuple):
-    """Goals, what was learned there by condition, and how far that is from what is printed."""
+    """A point ``(P,)``, what was learned there, and how far that is from what is printed."""
 
-    goals: Array
+    point: Array
     cells: Mapping[str, pd.DataFrame]
+    """Runs by condition."""
     comparisons: pd.DataFrame
     distance: float
     """Root mean square over the printed figures, standard errors."""
@@ -103,41 +100,42 @@ def reconstruct(
     nothing else.
     """
     layout = search.layout
-    known = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
-    compete = layout.points(known)
-    compete = search.admitted(compete[layout.allowed(compete)], "known")
+    goals = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
+    known = layout.points(goals)
+    compete = search.admitted(known[layout.allowed(known)], "known")
     pool = admissible_points(search, report)
     pool = np.concatenate([compete[:1], without(pool, compete[:1])])
     sequences = hand_sequences(search.task)
-    apart = features(
-        search.attempt(pool, sequences), [sequences.index(hands) for hands in search.rewards]
-    )
+    printed = [sequences.index(hands) for hands in search.rewards]
+    apart = features(search.attempt(pool, sequences), printed)
     spread = pool[spread_out(apart, members, 0 if len(compete) else None)]
 
+    score = partial(scored, search, trials=trials)
     begin = np.concatenate([spread, without(compete, spread)])
-    results = scored(search, layout.places(begin), wave=ENSEMBLE, runs=runs, trials=trials)
+    results = score(begin, wave=ENSEMBLE, runs=runs)
     report(described(results, runs))
-    nearest = best_of_waves(search, begin, results, plan=plan, trials=trials, report=report)[:1]
+    nearest = best_of_waves(search, results, plan=plan, trials=trials, report=report).point[None]
     if len(compete) and not (nearest == compete[:1]).all():
-        both = layout.places(np.concatenate([nearest, compete[:1]]))
-        challenger, standing = scored(search, both, wave=LAST, runs=last, trials=trials)
-        better = clearly_nearer(challenger, standing, tests_of(search.task.name))
+        both = np.concatenate([nearest, compete[:1]])
+        challenger, standing = score(both, wave=LAST, runs=last)
+        better = clearly_nearer(challenger, standing, printed_tests(search.task.name))
         report(
             f"the nearest {challenger.distance:.2f}, the one that stands {standing.distance:.2f}, "
             f"{last} runs a condition: {'it is replaced' if better else 'it stands'}"
         )
         nearest = nearest if better else compete[:1]
 
-    points = np.concatenate([nearest, without(spread, nearest)])
-    names = [*(f"m{k:03d}" for k in range(1, len(points) + 1)), *layout.known]
-    places = np.concatenate([layout.places(points), known])
-    by_goals = {result.goals.tobytes(): result for result in results}
-    fresh = {goals.tobytes(): goals for goals in places if goals.tobytes() not in by_goals}
-    results = scored(search, fresh.values(), wave=ENSEMBLE, runs=runs, trials=trials)
-    by_goals |= dict(zip(fresh, results, strict=True))
+    chosen = np.concatenate([nearest, without(spread, nearest)])
+    names = [*(f"m{k:03d}" for k in range(1, len(chosen) + 1)), *layout.known]
+    points = np.concatenate([chosen, known])
+    fresh = np.unique(without(points, begin), axis=0)
+    by_point = {
+        result.point.tobytes(): result
+        for result in (*results, *score(fresh, wave=ENSEMBLE, runs=runs))
+    }
     rows = [
-        member_row(name, by_goals[goals.tobytes()])
-        for name, goals in zip(names, places, strict=True)
+        member_row(name, places, by_point[point.tobytes()])
+        for name, places, point in zip(names, layout.places(points), points, strict=True)
     ]
     if search.readings:
         rows = [{"readings": " ".join(map(str, search.readings))} | row for row in rows]
@@ -194,69 +192,56 @@ def spread_out(points: Array, count: int, first: int | None = None) -> NDArray[n
 
 def scored(
     search: Search,
-    goals: Iterable[Array],
+    points: Array,
     *,
     wave: int,
     runs: int,
     trials: int = 10_000,
     before: Mapping[bytes, Scored] = MappingProxyType({}),
 ) -> list[Scored]:
-    """Learning runs at sets of goals (G, 2), with the seeds of a wave; in their order.
+    """Learning runs at points ``(N, P)``, with the seeds of a wave, beside what is printed.
 
-    Under the conditions of which something is printed, beside what is. Runs ``before``, by the
-    bytes of the goals, count with them.
+    Under the conditions of which something is printed. Runs ``before``, by the bytes of the
+    point, count with them.
     """
     seeds = range(WAVE_SEEDS * wave, WAVE_SEEDS * wave + runs)
     conditions = conditions_of(search.task.name, condition_under(search.readings))
-    tests = tests_of(search.task.name)
+    tests = printed_tests(search.task.name)
 
-    def score(places: Array) -> Scored:
-        task, earlier = search.task_with(places), before.get(places.tobytes())
-        cells = {}
+    def score(point: Array, goals: Array) -> Scored:
+        task, earlier, cells = search.task_with(goals), before.get(point.tobytes()), {}
         for name, condition in conditions.items():
             cell = learned(task, condition, seeds, model=search.model, trials=trials)
             cells[name] = cell if earlier is None else pd.concat([earlier.cells[name], cell])
         comparisons = compared(tests, cells)
-        return Scored(places, cells, comparisons, distance(comparisons))
+        return Scored(point, cells, comparisons, distance(comparisons))
 
     with ThreadPoolExecutor(threads_for(search.jobs)) as pool:
-        return list(pool.map(score, goals))
+        return list(pool.map(score, points, search.layout.places(points)))
 
 
 def best_of_waves(
     search: Search,
-    points: Array,
     results: Sequence[Scored],
     *,
     plan: Sequence[Wave] = PLAN,
     trials: int = 10_000,
     report: Callable[[str], None] = lambda text: None,
-) -> Array:
-    """Points by their distance to what is printed, the nearest first; those of the last wave.
-
-    ``points`` (N, P) are admissible and scored before; coordinates are rounded to
-    :data:`DECIMALS`.
-    """
-    scored_before = {result.goals.tobytes(): result for result in results}
+) -> Scored:
+    """The point that is nearest to what is printed after some waves, which begin with these."""
+    before = {result.point.tobytes(): result for result in results}
     for number, wave in enumerate(plan, ENSEMBLE + 1):
-        points = by_distance(points, results)[: wave.points]
+        best = sorted(results, key=lambda result: result.distance)[: wave.points]
+        points = np.array([result.point for result in best])
         if wave.around:
             rng = np.random.default_rng([number, wave.around])
             around = np.round(search.spread(points, wave.around, rng, wave.step), DECIMALS)
             around = search.admitted(around[search.layout.allowed(around)], "around the best")
             points = np.unique(np.concatenate([points, around]), axis=0)
-        goals = search.layout.places(points)
-        results = scored(
-            search, goals, wave=number, runs=wave.runs, trials=trials, before=scored_before
-        )
-        scored_before |= {result.goals.tobytes(): result for result in results}
+        results = scored(search, points, wave=number, runs=wave.runs, trials=trials, before=before)
+        before |= {result.point.tobytes(): result for result in results}
         report(f"wave {number}: {described(results, wave.runs)}")
-    return by_distance(points, results)
-
-
-def by_distance(points: Array, results: Sequence[Scored]) -> Array:
-    """Points with these results, the nearest to what is printed first."""
-    return points[np.argsort([result.distance for result in results], kind="stable")]
+    return min(results, key=lambda result: result.distance)
 
 
 def clearly_nearer(challenger: Scored, standing: Scored, tests: Sequence[Test]) -> bool:
@@ -279,10 +264,10 @@ def without(points: Array, others: Array) -> Array:
     return np.asarray(points[~(points[:, None] == others).all(axis=2).any(axis=1)])
 
 
-def member_row(name: str, result: Scored) -> dict[str, Any]:
+def member_row(name: str, goals: Array, result: Scored) -> dict[str, Any]:
     """A member's row of the table of an ensemble."""
     row: dict[str, Any] = {"member": name}
-    for number, (x, y) in enumerate(result.goals.tolist(), 1):
+    for number, (x, y) in enumerate(goals.tolist(), 1):
         row |= {f"x{number}": round(x, DECIMALS), f"y{number}": round(y, DECIMALS)}
     row["distance"] = round(result.distance, 3)
     for label, ours, apart in result.comparisons[["ours", "distance"]].itertuples():

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from coartic import MotionModel, Task, hand_sequences
 from coartic.analysis.published import entries_of
@@ -20,8 +21,7 @@ from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 from coartic.robot import Array
 
 Flags = NDArray[np.bool_]
-GOALS_A_THREAD = 500
-"""Sets of goals that a thread is given at once."""
+GOALS_A_THREAD = 500  # sets of goals that a thread is given at once
 
 
 @dataclass(frozen=True)
@@ -95,16 +95,7 @@ class Layout:
 
 def layouts() -> dict[str, Layout]:
     """The layouts by task."""
-    return {
-        task: Layout(
-            tuple(map(tuple, entry["goals"])),
-            {name: tuple(values) for name, values in entry["grid"].items()},
-            tuple(map(tuple, entry["less"])),
-            float(entry["apart"]),
-            {name: tuple(map(tuple, goals)) for name, goals in entry["known"].items()},
-        )
-        for task, entry in read_beside(__file__, "layouts").items()
-    }
+    return TypeAdapter(dict[str, Layout]).validate_python(read_beside(__file__, "layouts"))
 
 
 class Constraint(NamedTuple):
@@ -139,9 +130,7 @@ def earns_more(hands: str, others: Sequence[str]) -> Constraint:
     return Constraint(f"{hands} earns more than {than}", (hands, *others), holds)
 
 
-def base_moves(
-    hands: str, first: int, last: int, side: Literal["left", "right"], start_x: float
-) -> Constraint:
+def base_moves(hands: str, first: int, last: int, side: str, start_x: float) -> Constraint:
     """The base moves to one side between two goals; goal 0 is the start, at ``start_x``."""
 
     def holds(trials: CorrectiveTrials) -> Flags:
@@ -170,10 +159,10 @@ def constraints_of(task: Task) -> tuple[Constraint, ...]:
         elif entry.kind == "order" and entry.than.hands is not None:
             constraints.append(earns_more(hands, [entry.than.hands]))
         elif entry.kind == "base" and entry.net is not None:
-            base = partial(base_moves, start_x=float(task.q0[0]))
-            constraints += [base(hands, goal - 1, goal, "left") for goal in entry.left]
-            constraints += [base(hands, goal - 1, goal, "right") for goal in entry.right]
-            constraints.append(base(hands, 0, len(task.goals), entry.net))
+            moves = [(goal - 1, goal, "left") for goal in entry.left]
+            moves += [(goal - 1, goal, "right") for goal in entry.right]
+            moves += [(0, len(task.goals), entry.net)]
+            constraints += [base_moves(hands, *move, start_x=task.q0[0]) for move in moves]
     return tuple(sorted(constraints, key=lambda constraint: constraint.reward is None))
 
 

@@ -29,7 +29,7 @@ from coartic.analysis.reconstruction.scoring import (
     conditions_of,
     learned,
     learned_rewards,
-    tests_of,
+    printed_tests,
 )
 from coartic.learner.learning import threads_for
 from coartic.robot import Array
@@ -41,14 +41,10 @@ from coartic.tasks.readings import (
     task_under,
 )
 
-REFUTED = 0.01
-"""Chance below which a reading is refuted."""
-DRAWS = 2_000
-"""Samples of runs from which the distribution of mean and SD is estimated."""
-FEWEST = 20
-"""Runs with a hand sequence below which nothing is said about its mean and SD."""
-JUDGING_SEEDS = 900_000_000
-"""Seeds of runs that judge a reading begin here."""
+REFUTED = 0.01  # chance below which a reading is refuted
+DRAWS = 2_000  # samples of runs from which the distribution of mean and SD is estimated
+FEWEST = 20  # runs with a hand sequence below which nothing is said about its mean and SD
+JUDGING_SEEDS = 900_000_000  # seeds of runs that judge a reading begin here
 
 
 class Likelihood(NamedTuple):
@@ -123,7 +119,7 @@ def judge(texts: Sequence[str], *, runs: int, trials: int) -> tuple[dict[str, An
             seeds = range(JUDGING_SEEDS, JUDGING_SEEDS + runs)
             cell = learned(task, condition, seeds, model=model, trials=trials)
             cells[f"{task.name}/{name}"] = cell
-            figures = [test for test in tests_of(task.name) if isinstance(test, Figure)]
+            figures = [test for test in printed_tests(task.name) if isinstance(test, Figure)]
             own = likelihoods(figures, cell)
             for gain in entries_of(task.name, "test"):
                 if gain.kind == "gain" and reward is not None:

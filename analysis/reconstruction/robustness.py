@@ -20,7 +20,6 @@ import pandas as pd
 from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, Claim
 from coartic.analysis.processes import processes
-from coartic.analysis.reconstruction.layouts import try_sequences
 from coartic.analysis.reconstruction.search import search_for
 from coartic.analysis.study import Study
 from coartic.runs.plan import variant_of
@@ -101,17 +100,8 @@ def admitted_members(study: Study, task: str) -> list[str]:
             goals.setdefault(study.tasks[name].goals, name)
     if not goals:
         return []
-    search = search_for(task, jobs=1)
-    places = np.array(list(goals))
-    fits = [
-        constraint.holds(
-            try_sequences(
-                search.task, constraint.sequences, places, model=search.model, jobs=search.jobs
-            )
-        )
-        for constraint in search.constraints
-    ]
-    return [name for name, fit in zip(goals.values(), np.all(fits, axis=0), strict=True) if fit]
+    fits = search_for(task, jobs=1).meets_all(np.array(list(goals)))
+    return [name for name, fit in zip(goals.values(), fits, strict=True) if fit]
 
 
 def study_as(study: Study, names: Mapping[str, str]) -> Study:

@@ -10,7 +10,7 @@ Runs are a table: ``reward`` of each (NaN where it completed no trial) and ``han
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -27,13 +27,11 @@ from coartic.robot import Array
 from coartic.tasks.members import task_of
 from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
 
-RESAMPLES = 200
-"""Of the runs, for the standard error of a distance."""
+RESAMPLES = 200  # of the runs, for the standard error of a distance
 FARTHEST = 5.0
 """Standard errors that a figure counts at most, and where too few runs learned its hands: a
 sequence that is not learned is as bad as one with a figure far off, never better."""
-SHARES = 0.25
-"""Margin of equivalence of shares of runs."""
+SHARES = 0.25  # margin of equivalence of shares of runs
 FRESH_SEEDS = 800_000_000
 """Seeds of runs for :func:`beside_printed` begin here: they have selected nothing."""
 
@@ -132,7 +130,7 @@ class Order:
 Test = Figure | Order
 
 
-def tests_of(task: str) -> tuple[Test, ...]:
+def printed_tests(task: str) -> tuple[Test, ...]:
     """What learning runs are compared with: means, SDs, shares of hand sequences, orders."""
     entries = entries_of(task, "test")
     spreads = {(e.condition, e.hands): float(e.value) for e in entries if e.kind == "sd"}
@@ -274,27 +272,27 @@ def beside_printed(
         for label, condition in conditions.items():
             cells[label] = learned(task, condition, seeds, model=model, trials=trials, jobs=jobs)
             progress(f"{name}, {label}: {runs} runs")
-        rows += [{"task": name, **dict(_line(test, cells))} for test in tests_of(plain)]
+        for test in printed_tests(plain):
+            ours, distance = test.compare(cells)
+            row = {"task": name, "figure": test.label, "ours": ours, "distance": distance}
+            if isinstance(test, Figure):
+                row |= equivalence_row(test, cells[test.condition])
+            rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _line(test: Test, cells: Mapping[str, pd.DataFrame]) -> Iterator[tuple[str, object]]:
-    ours, distance = test.compare(cells)
-    yield from {"figure": test.label, "ours": ours, "distance": distance}.items()
-    if isinstance(test, Order):
-        return
-    runs, rewards = cells[test.condition], learned_rewards(cells[test.condition], test.hands)
-    yield "printed", test.value
-    yield "runs", len(runs) if test.kind == "share" else len(rewards)
-    if test.kind == "mean":
-        yield "sd", math.nan if test.sd is None else test.sd
-        yield "our_sd", float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
-    if test.kind == "sd" or (test.kind == "mean" and len(rewards) < 2):
-        return
-    if test.kind == "mean":
-        difference = equivalence.difference(rewards, test.value, test.sd, test.runs)
-    else:
-        theirs = round(test.value * test.runs), test.runs
+def equivalence_row(figure: Figure, runs: pd.DataFrame) -> dict[str, Any]:
+    """What is printed of a figure, and its difference from ours where it has a margin."""
+    rewards, share = learned_rewards(runs, figure.hands), figure.kind == "share"
+    row = {"printed": figure.value, "runs": len(runs) if share else len(rewards)}
+    if figure.kind == "mean":
+        row["sd"] = math.nan if figure.sd is None else figure.sd
+        row["our_sd"] = float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
+    if share:
+        theirs = round(figure.value * figure.runs), figure.runs
         difference = equivalence.shares((len(rewards), len(runs)), theirs, SHARES)
-    yield from {"low": difference.low, "high": difference.high}.items()
-    yield "verdict", difference.verdict
+    elif figure.kind == "mean" and len(rewards) > 1:
+        difference = equivalence.difference(rewards, figure.value, figure.sd, figure.runs)
+    else:
+        return row
+    return row | {name: getattr(difference, name) for name in ("low", "high", "verdict")}

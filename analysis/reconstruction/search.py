@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ import pandas as pd
 from coartic import CoarticError, MotionModel, Task, load_task
 from coartic.analysis.reconstruction.layouts import (
     Constraint,
+    Flags,
     Layout,
     constraints_of,
     layouts,
@@ -27,13 +29,11 @@ from coartic.robot import Array
 from coartic.tasks.readings import ChosenReading, load_readings, model_under, task_under
 from coartic.text import did_you_mean
 
-GRID_BLOCK = 100_000
-"""Points of the grid that are tried at once."""
+GRID_BLOCK = 100_000  # points of the grid that are tried at once
 DIFFERENCE = 0.1
 """Of the finite differences, length unit: rewards are whole ticks, some 100 a length unit."""
 SOLVER_STEPS = 12
-LONGEST_STEP = 0.5
-"""Of the solver, length unit."""
+LONGEST_STEP = 0.5  # of the solver, length unit
 
 
 @dataclass
@@ -97,6 +97,12 @@ class Search:
             points = points[constraint.holds(self.attempt(points, constraint.sequences))]
             self.tried[f"{stage}, and {constraint.says}"] += len(points)
         return points
+
+    def meets_all(self, goals: Array) -> Flags:
+        """Whether sets of goals (N, G, 2) meet every constraint, ``(N,)``."""
+        perform = partial(try_sequences, self.task, goals=goals, model=self.model, jobs=self.jobs)
+        holds = [constraint.holds(perform(constraint.sequences)) for constraint in self.constraints]
+        return np.asarray(np.all(holds, axis=0))
 
     def solve(self, points: Array) -> Array:
         """Move points to where the printed rewards come out; those for which that succeeds.

@@ -64,7 +64,7 @@ def readings(
         runs=runs,
         trials=trials,
         jobs=jobs,
-        progress=lambda combined, p: say(f"{combined}: p = {p:.2g}"),
+        progress=lambda combined, p: say(f"{combined}: p = {p:g}"),
     )
     publish(folder, {"readings.csv": csv_of(table)})
     show_frame(table[["readings", "log likelihood", "p", "verdict"]])
@@ -152,8 +152,8 @@ def claims(
     """Judge the claims under other readings and goals."""
     from coartic.analysis import load
     from coartic.analysis.figures.plot import FORMATS, picture
+    from coartic.analysis.figures.robustness import specification_curve, verdicts
     from coartic.analysis.reconstruction.robustness import judged_specifications, shares
-    from coartic.analysis.reconstruction.robustness_figures import specification_curve, verdicts
 
     check_numbers(jobs, None)
     tables = ("specifications.csv", "shares.csv")
