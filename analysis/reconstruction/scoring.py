@@ -82,7 +82,10 @@ class Figure:
             error = spread**2 / self.runs + rewards.var(ddof=1) / len(rewards) + rounding**2
             return ours, (ours - self.value) / math.sqrt(error)
         ours = float(rewards.std(ddof=1))
-        error = log_sd_variance(self.runs, rewards) + log_sd_variance(len(rewards), rewards)
+        # Variance of the logarithm of an SD of n runs, to first order (delta method), with the
+        # kurtosis that ours have: 1 / (2 (n - 1)) for normal ones, and never taken as less.
+        tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)) if np.ptp(rewards) else 3.0)
+        error = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (self.runs, len(rewards)))
         error += (rounding / self.value) ** 2
         return ours, math.log(max(ours, 1e-3) / self.value) / math.sqrt(error)
 
@@ -182,25 +185,17 @@ def learned(
     """Learned ``reward`` and ``hands`` of runs with these seeds, a row a run."""
     runs = learn_many(task, condition, seeds=seeds, trials=trials, model=model, jobs=jobs)
     rewards = [math.nan if run.reward is None else float(run.reward) for run in runs]
-    return pd.DataFrame({"reward": rewards, "hands": [run.hands or "" for run in runs]})
+    hands = pd.Series([run.hands or "" for run in runs], dtype=object)
+    return pd.DataFrame({"reward": rewards, "hands": hands})
 
 
 def learned_rewards(runs: pd.DataFrame, hands: str | None = None) -> Array:
     """Rewards of the runs that completed a trial; with ``hands``, of those that learned them."""
-    rewards = runs.reward.to_numpy()
+    rewards = runs["reward"].to_numpy()
     chosen = np.isfinite(rewards)
     if hands is not None:
-        chosen &= (runs.hands == hands).to_numpy(bool)
+        chosen &= runs["hands"].to_numpy() == hands
     return np.asarray(rewards[chosen])
-
-
-def log_sd_variance(runs: int, like: Array) -> float:
-    """Variance of the logarithm of the SD of that many runs, of a kurtosis as some have.
-
-    To first order (delta method); 1 / (2 (n - 1)) for normal ones, and never taken as less.
-    """
-    tails = max(3.0, float(stats.kurtosis(like, fisher=False)) if np.ptp(like) else 3.0)
-    return (tails - (runs - 3) / (runs - 1)) / (4 * runs)
 
 
 def compared(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -228,9 +223,8 @@ def distance_error(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> 
     rng = np.random.default_rng(0)
     distances = []
     for _ in range(RESAMPLES):
-        drawn = {
-            name: runs.iloc[rng.integers(len(runs), size=len(runs))] for name, runs in cells.items()
-        }
+        numbers = {name: rng.integers(len(runs), size=len(runs)) for name, runs in cells.items()}
+        drawn = {name: runs.iloc[numbers[name]] for name, runs in cells.items()}
         distances.append(distance(compared(tests, drawn)))
     return float(np.std(distances, ddof=1))
 
