@@ -19,35 +19,8 @@ from coartic import (
     hand_sequences,
     learn,
     load_task,
-    parse_task,
 )
-from coartic.analysis.reconstruction import ensemble, readings
-from coartic.analysis.reconstruction.ensemble import (
-    Scored,
-    Wave,
-    clearly_nearer,
-    reconstruct,
-    scored,
-    spread_out,
-)
-from coartic.analysis.reconstruction.layouts import (
-    Layout,
-    base_moves,
-    earns_more,
-    layouts,
-    reward_is,
-)
-from coartic.analysis.reconstruction.readings import likelihoods, together
-from coartic.analysis.reconstruction.scoring import (
-    FARTHEST,
-    Figure,
-    Order,
-    beside_printed,
-    compared,
-    distance,
-    distance_error,
-    printed_tests,
-)
+from coartic.analysis.reconstruction import ensemble, layouts, readings, scoring
 from coartic.analysis.reconstruction.search import Search, search_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
@@ -89,12 +62,12 @@ def test_constraints() -> None:
     reached[:, 0, :, 0] = [[-1, 1, 0, 2], [-1, -2, 0, 2], [0.5, 1, 2, -1]]
     trials = CorrectiveTrials(rewards, reached)
     for constraint, expected in (
-        (reward_is("RRRR", -675.0), [True, True, False]),
-        (reward_is("RRRR", -674.0, within=1.0), [True, True, True]),
-        (earns_more("RRRR", ["LLLL"]), [True, False, True]),
-        (base_moves("RRRR", 0, 1, "left", 0.0), [True, True, False]),
-        (base_moves("RRRR", 2, 3, "left", 0.0), [True, False, False]),
-        (base_moves("RRRR", 0, 4, "right", 0.0), [True, True, False]),
+        (layouts.reward_is("RRRR", -675.0), [True, True, False]),
+        (layouts.reward_is("RRRR", -674.0, within=1.0), [True, True, True]),
+        (layouts.earns_more("RRRR", ["LLLL"]), [True, False, True]),
+        (layouts.base_moves("RRRR", 0, 1, "left", 0.0), [True, True, False]),
+        (layouts.base_moves("RRRR", 2, 3, "left", 0.0), [True, False, False]),
+        (layouts.base_moves("RRRR", 0, 4, "right", 0.0), [True, True, False]),
     ):
         assert constraint.holds(trials).tolist() == expected, constraint.says
 
@@ -102,16 +75,16 @@ def test_constraints() -> None:
 @pytest.fixture(scope="module")
 def search() -> Search:
     layout = replace(
-        layouts()["two-armed-1"],
+        layouts.layouts()["two-armed-1"],
         grid={
             "y": (3.04, 3.44, 0.2), "x1": (2.15, 2.55, 0.2), "x2": (3.2, 3.6, 0.2),
             "y3": (2.76, 3.16, 0.2), "x3": (2.18, 2.58, 0.2), "x4": (7.03, 7.43, 0.2),
         },
     )  # fmt: skip
     constraints = (
-        reward_is("RRRR", -675.0),
-        reward_is("LRLR", -532.0),
-        base_moves("RRRR", 2, 3, "left", start_x=0.0),
+        layouts.reward_is("RRRR", -675.0),
+        layouts.reward_is("LRLR", -532.0),
+        layouts.base_moves("RRRR", 2, 3, "left", start_x=0.0),
     )
     return Search(TASK, layout, constraints, jobs=1, near=45.0)
 
@@ -135,7 +108,7 @@ def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
 
 
 def test_a_grid_holds_what_the_layout_allows() -> None:
-    layout = Layout(
+    layout = layouts.Layout(
         (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
     )
     points = np.concatenate(list(layout.blocks(5)))
@@ -150,63 +123,70 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
 
 def test_members_are_spread() -> None:
     points = np.random.default_rng(0).normal(size=(60, 3))
-    chosen = spread_out(points, 20, 7)
+    chosen = ensemble.spread_out(points, 20, 7)
     assert chosen[0] == 7
     for k in range(1, 20):
         gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
         assert gaps[chosen[k]] == pytest.approx(gaps.max())
 
 
-def test_distances_are_in_standard_errors() -> None:
+@pytest.mark.parametrize("kind", ["mean", "sd", "share"])
+def test_distances_are_in_standard_errors(kind: str) -> None:
+    """Of figures of 20 runs of the same kind; with 2 SDs more they are far off."""
+    rng = np.random.default_rng(3)
+    hands = np.where(np.arange(400) < 240, "LRLR", "RRRR").astype(object)
+    ours = runs(rng.normal(-500.0, 3.0, 400)).assign(hands=hands)
+    distances = []
+    for _ in range(300):
+        sample = rng.normal(-500.0, 3.0, 20)
+        sd = sample.std(ddof=1)
+        value = {"mean": sample.mean(), "sd": sd, "share": rng.binomial(20, 0.6) / 20}[kind]
+        name = "LRLR" if kind == "share" else None
+        figure = scoring.Figure("EC3", kind, value, 20, name, sd, digits=1)
+        distances.append(figure.compare({"EC3": ours})[1])
+    assert np.std(distances) == pytest.approx(1.0, abs=0.15)
+    assert abs(np.mean(distances)) < 0.3
+    other = ours.assign(reward=-500.0 + 3.0 * (ours.reward + 500.0) + 6.0, hands="RRRR")
+    assert abs(figure.compare({"EC3": other})[1]) > 3.0
+
+
+def test_an_order_is_as_clear_as_its_printed_test() -> None:
+    """With a printed p, the test of as many runs as are printed has to be so clear on average."""
     rewards = np.random.default_rng(0).normal(-500.0, 3.0, 400)
-    cell = runs(rewards, ("LRLR", 300), ("RRRR", 100))
-    cells = {"EC3": cell, "EC4": runs(rewards + 5.0), "two": runs(rewards + 1.0)}
+    cells = {"EC3": runs(rewards), "EC4": runs(rewards + 5.0), "near": runs(rewards + 1.0)}
+    error = math.sqrt(2 * rewards.var(ddof=1) / 20)
+    for above, p, expected in (
+        ("EC4", None, 0.0),
+        ("EC4", 0.01, 0.0),  # z = 5 / error = 5.3
+        ("near", None, 0.0),
+        ("near", 0.01, 1.0 / error - stats.norm.isf(0.01)),
+    ):
+        difference, off = scoring.Order(above, "EC3", p_below=p).compare(cells)
+        assert difference == pytest.approx(5.0 if above == "EC4" else 1.0)
+        assert off == pytest.approx(expected / math.sqrt(1 + 20 / 400), abs=1e-3)
+    assert scoring.Order("EC3", "EC4").compare(cells)[1] < -5.0
 
-    def off(test: Figure | Order) -> float:
-        return test.compare(cells)[1]
 
-    mean = Figure("EC3", "mean", -502.0, 20, sd=3.0)
-    error = math.sqrt(9 / 20 + rewards.var(ddof=1) / 400 + 1 / 12)
-    assert off(mean) == pytest.approx((rewards.mean() + 502.0) / error)
-    sd = Figure("EC3", "sd", 3.0, 20, digits=1)
-    assert abs(off(sd)) < 1.0
-    assert off(Figure("EC3", "sd", 30.0, 20)) < -10.0
-    # Of normal runs; one far outlier makes SDs less certain.
-    twice = Figure("EC3", "sd", float(rewards.std(ddof=1)) / 2, 20, digits=9)
-    tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)))
-    variance = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (20, 400))
-    assert off(twice) == pytest.approx(math.log(2) / math.sqrt(variance))
-    rare = np.where(np.arange(400) < 4, rewards - 40.0, rewards)
-    assert 0.0 < sd.compare({"EC3": runs(rare)})[1] < 3.0
-    share = Figure("EC3", "share", 0.75, 20, "LRLR")
+def test_a_sequence_that_is_lost_is_as_bad_as_one_far_off() -> None:
+    cells = {"EC3": runs(np.linspace(-503.0, -497.0, 400), ("LRLR", 300), ("RRRR", 100))}
+    share = scoring.Figure("EC3", "share", 0.75, 20, "LRLR")
+    absent = scoring.Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
+    far = scoring.Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
+
+    def distance(*tests: scoring.Figure) -> float:
+        return scoring.distance(scoring.compared(tests, cells))
+
     assert share.compare(cells) == (0.75, 0.0)
-    failing = pd.concat([cell, runs(np.full(400, math.nan))])
-    assert share.compare({"EC3": failing})[0] == 0.375
-    # Orders hold, or are missed by what is missing in SDs of their test.
-    theirs, ours = 2 * rewards.var(ddof=1) / 20, 2 * rewards.var(ddof=1) / 400
-    assert off(Order("EC4", "EC3")) == 0.0
-    assert off(Order("EC3", "EC4")) == pytest.approx(-5.0 / math.sqrt(theirs + ours))
-    # Printed with a p, it has to be so clear with the printed runs, on average.
-    assert off(Order("EC4", "EC3", p_below=0.01)) == 0.0
-    short = 1.0 - stats.norm.isf(0.01) * math.sqrt(theirs)
-    expected = pytest.approx(short / math.sqrt(theirs + ours))
-    assert off(Order("two", "EC3", p_below=0.01)) == expected
-    of_hands = Order("EC3", "EC3", (11, 9), "LRLR", "RRRR")
-    assert of_hands.compare(cells)[0] == rewards[:300].mean() - rewards[300:].mean()
-    # To lose a sequence is never better than to learn it with figures far off.
-    absent = Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
-    far = Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
-    assert math.isnan(off(absent))
-    assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
-    assert distance(compared([far], cells)) == distance(compared([absent], cells)) == FARTHEST
+    assert distance(far) == distance(absent) == scoring.FARTHEST
+    assert distance(absent, share) == pytest.approx(scoring.FARTHEST / math.sqrt(2))
     # What follows from other figures is shown and not counted.
-    assert distance(compared([replace(far, counted=False), share], cells)) == 0.0
+    assert distance(replace(far, counted=False), share) == 0.0
 
 
 def test_chance_of_printed_counts_is_multinomial() -> None:
     cell = runs(np.zeros(40), ("RRRR", 10), ("RLRR", 30))
-    printed = [Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
-    (counts,) = likelihoods(printed, cell)
+    printed = [scoring.Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
+    (counts,) = readings.likelihoods(printed, cell)
     model = stats.multinomial(4, np.array([10.5, 30.5, 0.5]) / 41.5)
     assert counts.log_chance == pytest.approx(float(model.logpmf([2, 2, 0])))
     every = [c for c in itertools.product(range(5), repeat=3) if sum(c) == 4]
@@ -224,10 +204,10 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.Monk
     def p(rewards: np.ndarray) -> float:
         mean, sd = round(float(rewards.mean())), round(float(rewards.std(ddof=1)), 1)
         figures = [
-            Figure("EC1", "mean", mean, 20, sd=sd),
-            Figure("EC1", "sd", sd, 20, digits=1),
+            scoring.Figure("EC1", "mean", mean, 20, sd=sd),
+            scoring.Figure("EC1", "sd", sd, 20, digits=1),
         ]
-        return together(likelihoods(figures, own)).p
+        return readings.together(readings.likelihoods(figures, own)).p
 
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(24)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
@@ -238,20 +218,23 @@ def test_a_chance_is_that_of_the_rounded_figures() -> None:
     """As counted among many samples, and certain where all runs are equal."""
     rng = np.random.default_rng(1)
     rewards = np.round(rng.normal(-300.0, 3.0, 1000))
-    figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
-    (part,) = likelihoods(figures, runs(rewards))
+    figures = [
+        scoring.Figure("EC1", "mean", -301.0, 20),
+        scoring.Figure("EC1", "sd", 2.9, 20, digits=1),
+    ]
+    (part,) = readings.likelihoods(figures, runs(rewards))
     drawn = rng.choice(rewards, (60_000, 20))
     alike = (np.round(drawn.mean(axis=1)) == -301) & (np.round(drawn.std(axis=1, ddof=1), 1) == 2.9)
     assert math.exp(part.log_chance) == pytest.approx(alike.mean(), rel=0.2)
-    (part,) = likelihoods(figures[:1], runs(np.full(100, -301.0)))
+    (part,) = readings.likelihoods(figures[:1], runs(np.full(100, -301.0)))
     assert math.exp(part.log_chance) == pytest.approx(1.0, abs=0.1)
     failing = pd.concat([runs(rewards), runs(np.full(1000, math.nan))])
-    assert together(likelihoods(figures, failing)).p < 1e-3
+    assert readings.together(readings.likelihoods(figures, failing)).p < 1e-3
 
 
 def test_a_gain_is_as_likely_as_its_rounding_allows() -> None:
     """A mean that rounds to -303 and a gain of 16 over -319: certain; of 17 over it: hardly."""
-    mean = Figure("EC1", "mean", -303.0, 20)
+    mean = scoring.Figure("EC1", "mean", -303.0, 20)
     assert readings.likelihood_of_gain(16.0, -319.0, mean) == []
     (border,) = readings.likelihood_of_gain(17.0, -319.0, mean)
     assert border.p == 1 / 20  # exactly -302.5
@@ -259,28 +242,19 @@ def test_a_gain_is_as_likely_as_its_rounding_allows() -> None:
     assert never.p < 1e-6
 
 
-def test_a_task_with_other_goals_is_another_task() -> None:
-    assert TASK.goal_array is not None  # kept from now on
-    search = Search(TASK, layouts()["two-armed-1"], (), jobs=1)
-    points = search.layout.points(np.array([TASK.goal_array, NEAR_PRINTED]))
-    first, second = (
-        result.cells["EC3"].reward for result in scored(search, points, wave=1, runs=3, trials=50)
-    )
-    changed = load_task("two-armed-1").model_dump() | {"goals": NEAR_PRINTED.tolist()}
-    task = parse_task(changed, "test")
-    seeds = range(1_000_000, 1_000_003)
-    own = [learn(task, "EC3", seed=seed, trials=50).reward for seed in seeds]
-    assert second.tolist() == own != first.tolist()
-
-
 def test_a_reconstruction_is_found_and_scored(
     search: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
     monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
-    effort = {"members": 4, "runs": 2, "plan": (Wave(3, 2), Wave(2, 2, 2, 0.01)), "trials": 30}
+    effort = {
+        "members": 4,
+        "runs": 2,
+        "plan": (ensemble.Wave(3, 2), ensemble.Wave(2, 2, 2, 0.01)),
+        "trials": 30,
+    }
     small = replace(search, tried=Counter())
-    members = reconstruct(small, **effort, last=2)
+    members = ensemble.reconstruct(small, **effort, last=2)
     # Four that are spread, and the nearest where it is none of them.
     ours = members.member.str.startswith("m")
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
@@ -292,56 +266,53 @@ def test_a_reconstruction_is_found_and_scored(
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = reconstruct(replace(search, tried=Counter(), jobs=2), **effort, last=2)
+    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort, last=2)
     pd.testing.assert_frame_equal(again, members)
 
 
 def test_what_is_printed_is_what_is_searched_for() -> None:
     constraints = {constraint.says for constraint in search_for("two-armed-1").constraints}
     assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < constraints
-    tests = printed_tests("two-armed-2")
+    tests = scoring.printed_tests("two-armed-2")
     assert len({test.label for test in tests}) == len(tests) == 10
     # All 20 runs have what their parts have.
     assert [test.label for test in tests if not test.counted] == ["EC3 mean", "EC3 sd"]
-    assert all(test.counted for test in printed_tests("two-armed-1"))
-    assert [test.p_below for test in tests if isinstance(test, Order)] == [0.01, 0.01]
+    assert all(test.counted for test in scoring.printed_tests("two-armed-1"))
+    assert [test.p_below for test in tests if isinstance(test, scoring.Order)] == [0.01, 0.01]
     with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
 
 
 def test_printed_results_stand_beside_fresh_runs() -> None:
     names = ["two-armed-1-F2", "ascending"]
-    table = beside_printed(names, runs=4, trials=60).set_index(["task", "figure"])
+    table = scoring.beside_printed(names, runs=4, trials=60).set_index(["task", "figure"])
     assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
     row = table.loc["ascending", "EC1 mean"]
     seeds = range(800_000_000, 800_000_004)
     own = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
     assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(own))
-    parts = np.array([np.var(own, ddof=1) / 4, 2.9**2 / 20])  # Welch's interval
-    freedom = parts.sum() ** 2 / (parts**2 / [3, 19]).sum()
-    half = stats.t.ppf(0.975, freedom) * math.sqrt(parts.sum())
-    assert row.low == pytest.approx(np.mean(own) + 303 - half)
     assert row.verdict == "different"
     assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
     with pytest.raises(CoarticError, match="prints nothing of task 'long/v1/i001'"):
-        beside_printed(["long/v1/i001"], runs=3)
+        scoring.beside_printed(["long/v1/i001"], runs=3)
 
 
 def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:
     rng = np.random.default_rng(1)
-    mean = Figure("EC3", "mean", -500.0, 20, sd=4.0)
+    mean = scoring.Figure("EC3", "mean", -500.0, 20, sd=4.0)
 
-    def at(offset: float, count: int) -> Scored:
+    def at(offset: float, count: int) -> ensemble.Scored:
         cells = {"EC3": runs(rng.normal(-500.0 + offset, 4.0, count))}
-        comparisons = compared([mean], cells)
-        return Scored(np.zeros(6), cells, comparisons, distance(comparisons))
+        comparisons = scoring.compared([mean], cells)
+        return ensemble.Scored(np.zeros(6), cells, comparisons, scoring.distance(comparisons))
 
     near, far = at(0.5, 300), at(4.0, 300)
-    assert clearly_nearer(near, far, [mean])
-    assert not clearly_nearer(far, near, [mean])
-    assert not clearly_nearer(at(0.5, 300), at(0.7, 300), [mean])
+    assert ensemble.clearly_nearer(near, far, [mean])
+    assert not ensemble.clearly_nearer(far, near, [mean])
+    assert not ensemble.clearly_nearer(at(0.5, 300), at(0.7, 300), [mean])
     # Of few runs the same difference is no more than chance.
-    assert not clearly_nearer(at(0.5, 4), at(2.0, 4), [mean])
+    assert not ensemble.clearly_nearer(at(0.5, 4), at(2.0, 4), [mean])
     # A distance in units of the error of a mean of n runs has that error over it.
     error = math.sqrt(16 / 20 + 16 / 300 + 1 / 12)
-    assert distance_error([mean], far.cells) == pytest.approx(4 / math.sqrt(300) / error, rel=0.3)
+    expected = pytest.approx(4 / math.sqrt(300) / error, rel=0.3)
+    assert scoring.distance_error([mean], far.cells) == expected

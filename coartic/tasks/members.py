@@ -2,8 +2,9 @@
 
 ``members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
 (made by ``coartic paper goals``; docs/reconstruction.md). A member is a task by the name
-``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 is the one that the search chose, and the
-task itself; v0.1 is what the task was in the first release, and not admitted.
+``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 has the goals of the task itself. Members with
+other names come from earlier searches. v0.1 is what the task was in the first release, and is not
+admitted.
 """
 
 from __future__ import annotations
