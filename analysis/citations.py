@@ -1,24 +1,27 @@
-"""What to cite: the software, the paper, and the works behind methods, solvers and analysis."""
+"""What to cite: the software, the paper, and the works behind methods, solvers and analysis.
+
+The works are the entries of ``references.bib``, which are printed as they stand there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
 
 from coartic import __version__
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.analysis.references import Reference, references
 from coartic.analysis.words import slugs
 from coartic.text import one_line
 
 PAPER = "shah2013"
-_STATISTICS = (
+STATISTICS = (
     *("efron1993", "davison1997", "agarwal2021", "newcombe2006", "holm1979"),
     *("chung2013", "schuirmann1987", "cohen1988"),
 )
-
-_SPECIAL = {
+SPECIAL = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
@@ -26,11 +29,11 @@ _SPECIAL = {
     "}": r"\textbraceright{}",
     **{sign: f"\\{sign}" for sign in "%&#_$"},
 }
+"""Signs that TeX reads otherwise, and how they are written."""
 
 
-@dataclass(frozen=True)
-class MethodSource:
-    """A method as a plan or the registry declares it."""
+class MethodSource(NamedTuple):
+    """A method as a results folder or the registry declares it."""
 
     id: str
     title: str
@@ -39,27 +42,31 @@ class MethodSource:
     built_in: bool
 
 
-def software(environment: Mapping[str, Any] | None = None) -> Reference:
-    """This software; the facts are CITATION.cff's.
+@cache
+def references() -> Mapping[str, str]:
+    """The entries of ``references.bib`` by key, in BibTeX."""
+    text = (resources.files("coartic.analysis") / "references.bib").read_text(encoding="utf-8")
+    entries = re.finditer(r"^@\w+\{([^,]+),\n(?: .+\n)+\}", text, re.MULTILINE)
+    return {entry[1]: entry[0] for entry in entries}
 
-    Version and commit are those of a study's ``environment``; without one, of this version.
+
+def software(made_with: Mapping[str, Any] | None = None) -> str:
+    """This software in BibTeX; the facts are CITATION.cff's.
+
+    Version and commit are those of a results folder's environment; without one, of this version.
     """
-    environment = environment or {}
-    note = f"Version {environment.get('coartic') or __version__}"
-    commit = environment.get("commit")
+    made_with = made_with or {}
+    note = f"Version {made_with.get('coartic') or __version__}"
+    commit = made_with.get("commit")
     if commit:
         note += f", commit {commit['id']}{' with changes' * commit['dirty']}"
-    return Reference(
+    return misc(
         "coartic",
-        "misc",
-        {
-            "author": "{The coartic developers}",
-            "title": "coartic: a comparative benchmark of coarticulation in motor skill "
-            "acquisition",
-            "year": "2026",
-            "howpublished": "Computer software",
-            "note": _escaped(note),
-        },
+        author="{The coartic developers}",
+        title="coartic: a comparative benchmark of coarticulation in motor skill acquisition",
+        year="2026",
+        howpublished="Computer software",
+        note=escaped(note),
     )
 
 
@@ -68,11 +75,11 @@ def behind_analysis() -> tuple[str, ...]:
     from coartic.analysis.signatures.register import REGISTER  # with all that measures them
 
     sources = dict.fromkeys(key for signature in REGISTER.values() for key in signature.sources)
-    return (*_STATISTICS, *sources)
+    return (*STATISTICS, *sources)
 
 
 def bibliography(
-    methods: list[MethodSource],
+    methods: Sequence[MethodSource],
     *,
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
@@ -82,10 +89,10 @@ def bibliography(
     A comment before an entry names the methods that rest on it. Of methods of others, and of
     built-in ones without a row in ``methods.toml``, there is no more than the citation that they
     declare: it is printed as a comment and as the note of a ``@misc``. With ``analysis`` the
-    works behind statistics and signatures follow. ``environment`` is a study's, for
+    works behind statistics and signatures follow. ``environment`` is a results folder's, for
     :func:`software`.
     """
-    known = {**references(), "coartic": software(environment)}
+    works = {**references(), "coartic": software(environment)}
     reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
     others = []
     for method in methods:
@@ -95,35 +102,36 @@ def bibliography(
             continue
         for key in (*row.works, *row.solvers):
             reasons.setdefault(key, []).append(method.id)
-    if analysis:
-        for key in behind_analysis():
-            reasons.setdefault(key, []).append("the analysis")
-    entries = [
-        f"{_comment(', '.join(reason))}\n{known[key].to_bibtex()}"
-        for key, reason in reasons.items()
-    ]
+    for key in behind_analysis() if analysis else ():
+        reasons.setdefault(key, []).append("the analysis")
+    entries = [f"{comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
     slug = slugs(method.id for method in others)
-    return "\n\n".join([*entries, *(_other(item, slug[item.id]) for item in others)]) + "\n"
+    entries += [declared_entry(method, f"method-{slug[method.id]}") for method in others]
+    return "\n\n".join(entries) + "\n"
 
 
-def _other(method: MethodSource, key: str) -> str:
+def declared_entry(method: MethodSource, key: str) -> str:
+    """A method with no more than what it declares, in BibTeX."""
     citation = " ".join(method.citation.split())
     if not citation:
-        return _comment(f"{method.id}: it declares no citation; ask its authors what to cite")
-    fields = {
-        "title": _escaped(" ".join(method.title.split()) or method.id),
-        "note": _escaped(citation),
-    }
-    entry = Reference(f"method-{key}", "misc", fields)
+        return comment(f"{method.id}: it declares no citation; ask its authors what to cite")
     whose = "built in, without a row in methods.toml" if method.built_in else "a method of others"
-    comment = _comment(f"{method.id}, {whose}, cites: {citation}")
-    return f"{comment}\n{entry.to_bibtex()}"
+    title = escaped(" ".join(method.title.split()) or method.id)
+    words = comment(f"{method.id}, {whose}, cites: {citation}")
+    return f"{words}\n{misc(key, title=title, note=escaped(citation))}"
 
 
-def _comment(text: str) -> str:
-    # BibTeX knows no comments: between entries it skips everything but an @.
+def misc(key: str, **fields: str) -> str:
+    """A ``@misc`` in BibTeX, one field a line."""
+    lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
+    return "\n".join([f"@misc{{{key},", *lines, "}"])
+
+
+def comment(text: str) -> str:
+    """A line that BibTeX skips: between entries it skips everything but an @."""
     return f"% {one_line(text)}".replace("@", "(at)")
 
 
-def _escaped(text: str) -> str:
-    return "".join(_SPECIAL.get(sign, sign) for sign in one_line(text))
+def escaped(text: str) -> str:
+    """A text as TeX shows it."""
+    return "".join(SPECIAL.get(sign, sign) for sign in one_line(text))

@@ -12,7 +12,6 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from coartic import Task
-from coartic.analysis.references import Key
 from coartic.analysis.words import read_beside
 from coartic.learner import conditions
 from coartic.learner.learning import METHOD_PREFIX
@@ -47,9 +46,9 @@ class KnownMethod(BaseModel):
     """Colour, dash and matplotlib's marker in all figures; None: one that is free."""
     headline: bool = False
     """Whether it stands for its algorithm where no methods are named."""
-    works: tuple[Key, ...]
+    works: tuple[str, ...]
     """Keys of ``references.bib``, the most telling first; none for this software's own."""
-    solvers: tuple[Key, ...] = ()
+    solvers: tuple[str, ...] = ()
     """Keys of the works behind what poses and solves its programmes."""
 
 

@@ -12,6 +12,7 @@ from threading import Thread
 from typing import Any
 
 from coartic.learner.learning import threads_for
+from coartic.threads import one_thread_each
 
 
 @contextmanager
@@ -23,18 +24,21 @@ def processes(jobs: int, pieces: int) -> Iterator[Callable[..., Any]]:
         return
     methods = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_begin) as pool:
+    with (
+        one_thread_each(),
+        ProcessPoolExecutor(workers, mp_context=context, initializer=begin_worker) as pool,
+    ):
         yield pool.map
 
 
-def _begin() -> None:
+def begin_worker() -> None:
     """A worker ends with the process that it works for, however that ends."""
+
+    def end_with_parent() -> None:
+        parent = multiprocessing.parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    Thread(target=_follow, daemon=True).start()
-
-
-def _follow() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    Thread(target=end_with_parent, daemon=True).start()

@@ -1,68 +1,203 @@
-"""The numbers printed in Shah, Barto & Fagg (2013), put together by task and condition."""
+"""What Shah, Barto & Fagg (2013) print (``published.toml``), and its numbers by task and condition.
+
+An entry says one thing of a task, or of the model. What it is said of is a task, a condition
+(none: the corrective process alone) and a hand sequence (none: all runs).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeVar
+import tomllib
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
 
-from coartic.analysis.printed import (
-    ENTRIES,
-    Best,
-    Count,
-    Entry,
-    InitialHands,
-    Order,
-    Reward,
-    Sd,
-    constant,
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+Hands = Annotated[str, Field(pattern="^[LR]+$")]
+Role = Literal["setting", "constraint", "test"]
+
+
+class Solved(BaseModel):
+    """Solutions of a task: all runs under a condition, or those with a hand sequence.
+
+    Without a condition: what the corrective process alone does with the hands.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    condition: Literal["EC1", "EC2", "EC3", "EC4"] | None = None
+    hands: Hands | None = None
+
+
+class Entry(Solved):
+    """What every entry says."""
+
+    id: str
+    task: str | None
+    """None: the model, or every task."""
+    role: Role
+    """A ``constraint`` may select what the paper does not print, a ``test`` never does."""
+    quote: str
+    """Words of the paper."""
+    place: str
+    """Section or figure of the paper."""
+    claims: tuple[str, ...] = ()
+    """Claims of the register that judge it."""
+    sample: bool = False
+    """Said of a sample run, not of all."""
+
+
+class Number(Entry):
+    """A constant (length unit, rad), or a reward, SD or number of runs.
+
+    A ``gain`` is a mean reward less that of ``than``. A reward of the corrective process is one
+    reward, else it is a mean.
+    """
+
+    kind: Literal["constant", "reward", "sd", "count", "gain"]
+    value: Decimal
+    """With the decimals that are printed."""
+    rounding: float
+    """The value's half-width as printed: half a unit of its last decimal, more where derived."""
+    difference_of: tuple[str, ...] = ()
+    """Entries from which the value is computed, first less second; none: it is printed."""
+    than: Solved | None = None
+
+    @property
+    def digits(self) -> int:
+        """Decimals that are printed."""
+        return max(0, -int(self.value.as_tuple().exponent))
+
+    @property
+    def number(self) -> float:
+        """The value; an integer where no decimals are printed."""
+        return float(self.value) if self.digits else int(self.value)
+
+
+class Order(Entry):
+    """The mean reward is above (less negative than) that of ``than``."""
+
+    kind: Literal["order"]
+    than: Solved
+    p_below: Decimal | None = None
+    """Printed bound of the one-tailed bootstrap test's p-value, where one is."""
+    goal: int | None = None
+    """Compared is the movement to this goal alone."""
+
+
+class Fact(Entry):
+    """Anything else; which fields an entry has depends on its kind."""
+
+    kind: Literal[
+        "best of all sequences", "initial hands", "hand sequences", "base", "layout", "goals",
+        "posture", "lock", "context", "statement",
+    ]  # fmt: skip
+    found: tuple[Hands, ...] = ()
+    """Hand sequences: every one that is named; the paper names no other."""
+    mixed: bool = False
+    """Hand sequences: there are several, and they are not named."""
+    left: tuple[int, ...] = ()
+    """Base: goals (from 1) to whose hits it moves left, from where it was at the hit before."""
+    right: tuple[int, ...] = ()
+    net: Literal["left", "right"] | None = None
+    """Base: where it moves from the start to the last hit."""
+    goals: tuple[int, ...] = ()
+    """Layout: goals on one line,"""
+    same: Literal["x", "y"] | None = None
+    """their common coordinate,"""
+    going: Literal["up", "down"] | None = None
+    """the direction of their order, where it is said,"""
+    apart: int | None = None
+    """the goal that is off the line,"""
+    side: Literal["left", "right", "above", "below"] | None = None
+    """and on which side."""
+    points: tuple[tuple[float, float], ...] = ()
+    """Goals: positions of all, length unit."""
+    base: tuple[float, float] | None = None
+    """Posture at the start: position of the base, length unit."""
+    arms: Literal["extended to the right", "steeple"] | None = None
+    """Posture at the start. In a steeple the arms are up and the hands at one point."""
+    locked_base: tuple[Literal["x", "y"], ...] = ()
+    """Lock: coordinates in which the base cannot move."""
+    goal: int | None = None
+    """Context: the learned configuration at this goal is another one than in"""
+    other_task: str | None = None
+    """that task."""
+    text: str = ""
+    """Statement: what is said in words only."""
+
+
+def parse_entries(text: str) -> dict[str, Number | Order | Fact]:
+    """Entries by id from the text of a table such as ``published.toml``, in its order."""
+    rows: dict[str, dict[str, Any]] = {}
+    for task, entries in tomllib.loads(text, parse_float=Decimal).items():
+        for name, row in entries.items():
+            about = {"id": f"{task}.{name}", "task": None if task == "general" else task}
+            rows[f"{task}.{name}"] = row | about
+            if "value" in row:
+                exact = row["kind"] in ("count", "constant")
+                exponent = int(Decimal(row["value"]).as_tuple().exponent)
+                rows[f"{task}.{name}"]["rounding"] = (
+                    0.0 if exact else 0.5 * 10.0 ** min(0, exponent)
+                )
+    for row in rows.values():
+        if "difference_of" in row:
+            parts = [n if n in rows else f"{row['task']}.{n}" for n in row["difference_of"]]
+            first, second = (rows[part] for part in parts)
+            row["value"] = first["value"] - second["value"]
+            row["rounding"] = (
+                0.0 if row["kind"] == "count" else first["rounding"] + second["rounding"]
+            )
+    kinds = Annotated[Number | Order | Fact, Field(discriminator="kind")]
+    return TypeAdapter(dict[str, kinds]).validate_python(rows)
+
+
+ENTRIES: Mapping[str, Number | Order | Fact] = parse_entries(
+    Path(__file__).with_name("published.toml").read_text("utf-8")
 )
+"""Every entry by id, in the paper's order of tasks."""
+
+
+def entries_of(task: str, role: Role) -> list[Number | Order | Fact]:
+    """What is printed of a task and has a role; none for a task that the paper lacks."""
+    return [e for e in ENTRIES.values() if e.task == task and e.role == role]
+
+
+def constant(name: str) -> float:
+    """A general constant that the paper prints; KeyError for another."""
+    entry = ENTRIES[f"general.{name}"]
+    assert isinstance(entry, Number)
+    return entry.number
+
 
 RUNS = int(constant("runs"))  # of every experiment
 TRIALS = int(constant("trials"))  # of every run
 
 
-@dataclass(frozen=True)
-class Summary:
+class Summary(NamedTuple):
     """A printed mean reward with what is printed about its spread."""
 
     mean: float
     sd: float | None
     runs: int
+    """As printed, or the paper's general 20."""
+    printed_runs: int | None = None
+    """Runs with the hand sequence, where their number stands beside the mean."""
     derived: bool = False
     """Computed from other printed numbers rather than printed itself."""
-    runs_printed: bool = True
-    """Whether the number of runs stands beside it; else we take it as the paper's general 20."""
-    digits: tuple[int, int] | None = None
-    """Decimals of mean and SD as they are printed; None for what is derived."""
-
-    @property
-    def source(self) -> Literal["paper", "derived"]:
-        """What mean and SD rest on."""
-        return "derived" if self.derived else "paper"
+    digits: int = 0
+    """Decimals of the mean as it is printed."""
 
 
-@dataclass(frozen=True)
-class SequenceResult:
-    """A hand sequence the paper reports for a cell."""
-
-    hands: str
-    summary: Summary
-
-    @property
-    def runs(self) -> int | None:
-        """Printed number of runs that learned it."""
-        return self.summary.runs if self.summary.runs_printed else None
-
-
-@dataclass(frozen=True)
-class PublishedCell:
+class PublishedCell(NamedTuple):
     """What the paper prints about one task under one condition."""
 
     summary: Summary | None
-    sequences: tuple[SequenceResult, ...]
-    remark: str = ""
+    """Over all runs."""
+    sequences: dict[str, Summary]
+    """By hand sequence, where they are told apart."""
 
 
 class InitialSolution(NamedTuple):
@@ -72,50 +207,56 @@ class InitialSolution(NamedTuple):
     reward: float
     derived: bool
     """Whether the reward is computed from other printed numbers."""
-    place: str
-    """Section of the paper."""
 
 
 def published_initial(task: str) -> InitialSolution | None:
     """Of a task; None where the paper prints nothing of it."""
-    for entry in _said(task, InitialHands):
-        reward = _corrective_reward(task, entry.hands)
-        return InitialSolution(entry.hands, reward.number, reward.derived, reward.place)
+    for entry in ENTRIES.values():
+        if entry.kind == "initial hands" and entry.task == task:
+            reward = _number("reward", task, None, entry.hands)
+            assert entry.hands is not None
+            assert reward is not None
+            return InitialSolution(entry.hands, reward.number, bool(reward.difference_of))
     return None
 
 
 def published_exhaustive(task: str) -> tuple[str, float] | None:
     """Best hands and reward of the corrective process alone over all sequences."""
-    for entry in _said(task, Best):
-        return entry.hands, _corrective_reward(task, entry.hands).number
+    for entry in ENTRIES.values():
+        if entry.kind == "best of all sequences" and entry.task == task:
+            reward = _number("reward", task, None, entry.hands)
+            assert entry.hands is not None
+            assert reward is not None
+            return entry.hands, reward.number
     return None
-
-
-def published_cells() -> tuple[tuple[str, str], ...]:
-    """Tasks and conditions of the paper, in its order: less exploration first."""
-    cells = ((e.task, e.condition) for e in ENTRIES.values() if e.task and e.condition)
-    return tuple(dict.fromkeys(cells))
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
     """What is printed about a cell; None for a cell that the paper does not have."""
-    if (task, condition) not in published_cells():
+    entries = [e for e in ENTRIES.values() if (e.task, e.condition) == (task, condition)]
+    if not entries:
         return None
-    rewards = [entry for entry in _said(task, Reward) if entry.condition == condition]
-    sequences = tuple(SequenceResult(e.hands, _summary(e)) for e in rewards if e.hands)
-    over_all = [_summary(entry) for entry in rewards if entry.hands is None]
-    whole = over_all[0] if over_all else pooled([s.summary for s in sequences])
-    lower = [e.than.condition for e in _said(task, Order) if e.condition == condition]
-    remark = f"higher than {lower[-1]}" if whole is None and lower else ""
-    return PublishedCell(whole, sequences, remark)
+    summaries: dict[str | None, Summary] = {}
+    for entry in entries:
+        if entry.kind == "reward":
+            sd = _number("sd", task, condition, entry.hands)
+            count = _number("count", task, condition, entry.hands)
+            runs = None if count is None else int(count.number)
+            summaries[entry.hands] = Summary(
+                entry.number,
+                None if sd is None else float(sd.value),
+                RUNS if runs is None else runs,
+                RUNS if entry.hands is None else runs,
+                digits=entry.digits,
+            )
+    sequences = {hands: summary for hands, summary in summaries.items() if hands}
+    return PublishedCell(summaries.get(None) or pooled([*sequences.values()]), sequences)
 
 
 def pooled(parts: list[Summary]) -> Summary | None:
     """Mean and SD over all runs of several groups, from each group's own."""
-    if not parts:
-        return None
-    if len(parts) == 1:
-        return parts[0]
+    if len(parts) < 2:
+        return parts[0] if parts else None
     runs = sum(part.runs for part in parts)
     mean = sum(part.runs * part.mean for part in parts) / runs
     if any(part.sd is None for part in parts):
@@ -127,35 +268,9 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-Kind = TypeVar("Kind", bound=Entry)
-
-
-def _said(task: str, kind: type[Kind]) -> Iterator[Kind]:
-    """Entries of one kind on a task."""
-    return (e for e in ENTRIES.values() if isinstance(e, kind) and e.task == task)
-
-
-def _corrective_reward(task: str, hands: str) -> Reward:
-    """What is printed of the corrective process alone with the hands."""
-    (reward,) = (e for e in _said(task, Reward) if (e.condition, e.hands) == (None, hands))
-    return reward
-
-
-def _summary(reward: Reward) -> Summary:
-    """A reward with the SD and the number of runs that are printed beside it."""
-    sd, count = _beside(reward, Sd), _beside(reward, Count)
-    return Summary(
-        reward.number,
-        float(sd.value) if sd else None,
-        int(count.value) if count else RUNS,
-        runs_printed=count is not None or reward.hands is None,
-        digits=(reward.digits, sd.digits if sd else 0),
-    )
-
-
-def _beside(reward: Reward, kind: type[Kind]) -> Kind | None:
-    """The entry of a kind that is said of the same runs."""
-    same = {"task", "condition", "hands"}
-    of = reward.model_dump(include=same)
-    found = (e for e in _said(reward.task or "", kind) if e.model_dump(include=same) == of)
-    return next(found, None)
+def _number(kind: str, task: str, condition: str | None, hands: str | None) -> Number | None:
+    for entry in ENTRIES.values():
+        about = entry.kind, entry.task, entry.condition, entry.hands
+        if isinstance(entry, Number) and about == (kind, task, condition, hands):
+            return entry
+    return None

@@ -36,7 +36,7 @@ def collect(study: Study) -> list[ShippedOptimum]:
             first = good.iloc[int(good.reward.astype(int).argmax())].run_id
             rows = study.solutions[study.solutions.run_id == first].drop(columns="run_id")
             facts = {key: getattr(best, key) for key in ("reward", "hands", "bound")}
-            facts |= {"searches": dict(best.searches), "solution": rows.to_dict("records")}
+            facts |= {"searches": best.searches, "solution": rows.to_dict("records")}
         entry = ShippedOptimum(
             task=name,
             essence=essence(study.tasks[name]),

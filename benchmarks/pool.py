@@ -27,11 +27,11 @@ from typing import Any, Protocol, runtime_checkable
 
 from pebble import ProcessExpired, ProcessPool
 
-from coartic.benchmarks.provenance import THREADS
 from coartic.benchmarks.worker import Answer, Job, learns, perform, prepare
 from coartic.errors import CoarticError
 from coartic.learner.learning import threads_for
 from coartic.text import plain
+from coartic.threads import one_thread_each
 
 _LOOK_S = 1.0  # between looks at the pool
 _AHEAD = 2  # jobs a worker that wait for it
@@ -81,7 +81,7 @@ class Local:
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
         tasks = [(task, own) for (_, own), task in kernels.items()]
-        with tempfile.TemporaryDirectory(prefix="coartic-") as folder, _one_thread_each():
+        with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
                 workers, initializer=_begin, initargs=(folder, foreign, workers, tasks),
                 context=_context(),
@@ -206,21 +206,6 @@ def confine(folder: Path) -> None:
     libc.prctl(no_new_privileges, 1, 0, 0, 0)
     libc.syscall(restrict, rules, 0)
     os.close(rules)
-
-
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Workers that begin meanwhile have one thread for BLAS each."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(THREADS)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
 
 
 _START = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"

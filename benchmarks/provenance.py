@@ -19,6 +19,7 @@ from coartic.motion.compiled import PACKAGE, source_fingerprint
 from coartic.runs.plan import hash_of
 from coartic.runs.store import Environment
 from coartic.text import LONGEST_LINE, plain
+from coartic.threads import ONE_THREAD
 
 _LIBRARIES = (
     "casadi",
@@ -34,17 +35,6 @@ _LIBRARIES = (
     "scipy",
 )
 """Those that results may hang on."""
-THREADS = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    ),
-    "1",
-)
-"""Environment of a worker. One run, one core: BLAS threads would get in each other's way."""
 
 
 @cache
@@ -62,7 +52,7 @@ def environment() -> Environment:
             "platform": plain(platform.platform(), LONGEST_LINE),
             "processor": plain(_processor(), LONGEST_LINE),
             "cores": threads_for(-1),
-            "threads": THREADS,
+            "threads": ONE_THREAD,
         },
         commit=None if commit is None else commit["id"] + "+" * commit["dirty"],
         packages=hash_of([python, packages])[:8],

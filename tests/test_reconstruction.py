@@ -15,111 +15,76 @@ from scipy import stats
 from coartic import (
     PAPER,
     CoarticError,
-    Task,
     corrective_trial,
     hand_sequences,
     learn,
     load_task,
-    parse_task,
 )
-from coartic.analysis.reconstruction import targets
-from coartic.analysis.reconstruction.constraints import Above, BaseMoves, RewardIs, Tried
-from coartic.analysis.reconstruction.layout import Layout, layouts
-from coartic.analysis.reconstruction.likelihood import likelihoods, together
-from coartic.analysis.reconstruction.lines import lines
-from coartic.analysis.reconstruction.reconstruct import (
-    Effort,
-    features,
-    reconstruct,
-    search_for,
-    spread_out,
-)
-from coartic.analysis.reconstruction.scoring import (
-    FARTHEST,
-    Figure,
-    Learned,
-    Order,
-    compared,
-    distance,
-    distance_error,
-)
-from coartic.analysis.reconstruction.search import Search
-from coartic.analysis.reconstruction.waves import Scored, Wave, clearly_nearer, scored
+from coartic.analysis.reconstruction import ensemble, layouts, readings, scoring
+from coartic.analysis.reconstruction.search import Search, search_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
 NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
 
 
-def with_a_shorter_left_arm(task: Task) -> Task:
-    """Its left arm has two links of the length of all."""
-    content = task.model_dump(mode="json")
-    half = sum(task.robot.left_links) / 2
-    robot = {**content["robot"], "left_links": [half, half]}
-    start = {**content["start"], "left": content["start"]["left"][:2]}
-    return parse_task({**content, "robot": robot, "start": start}, "uneven")
+def runs(rewards: np.ndarray, *hands: tuple[str, int]) -> pd.DataFrame:
+    """Runs with these rewards, so many of them with each hand sequence."""
+    names = [name for name, count in hands for _ in range(count)] or ["LRLR"] * len(rewards)
+    hands = pd.Series(names, dtype=object)
+    return pd.DataFrame({"reward": np.array(rewards, float), "hands": hands})
 
 
-@pytest.mark.parametrize("task", [TASK, with_a_shorter_left_arm(TASK)], ids=["even", "uneven"])
-def test_trials_are_those_that_are_made_one_by_one(task: Task) -> None:
+def test_trials_are_those_that_are_made_one_by_one() -> None:
     rng = np.random.default_rng(1)
-    goals = task.goal_array + rng.uniform(-0.4, 0.4, (3, 4, 2))
+    goals = TASK.goal_array + rng.uniform(-0.4, 0.4, (3, 4, 2))
     goals[1, :2] = goals[0, :2]  # begins as the one before
     model = PAPER._replace(max_iterations=300)  # some fail
-    sequences = hand_sequences(task)
-    found = corrective_trials(task, sequences, goals, model=model)
+    sequences = hand_sequences(TASK)
+    together = corrective_trials(TASK, sequences, goals, model=model)
     failed = 0
     for (n, places), (s, hands) in itertools.product(enumerate(goals), enumerate(sequences)):
-        moved = task.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
+        moved = TASK.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
         alone = corrective_trial(moved, hands, model=model)
         if not alone.completed:
             failed += 1
-            assert math.isnan(found.rewards[n, s])
-            assert np.isnan(found.reached[n, s, -1]).all()
+            assert math.isnan(together.rewards[n, s])
+            assert np.isnan(together.reached[n, s, -1]).all()
             continue
-        assert found.rewards[n, s] == alone.reward
-        np.testing.assert_array_equal(found.reached[n, s], alone.configurations)
+        assert together.rewards[n, s] == alone.reward
+        np.testing.assert_array_equal(together.reached[n, s], alone.configurations)
     assert 0 < failed < len(goals) * len(sequences)
-
-
-def test_trials_refuse_what_does_not_fit() -> None:
-    for goals, hands in (
-        (TASK.goal_array, "RRRR"),
-        (np.full((1, 4, 2), np.nan), "RRRR"),
-        (TASK.goal_array[None], "RRR"),
-    ):
-        with pytest.raises(ValueError, match="goal"):
-            corrective_trials(TASK, [hands], goals)
 
 
 def test_constraints() -> None:
     rewards = np.array([[-675.0, -700.0], [-675.0, -675.0], [-674.0, np.nan]])
     reached = np.zeros((3, 2, 4, 10))
     reached[:, 0, :, 0] = [[-1, 1, 0, 2], [-1, -2, 0, 2], [0.5, 1, 2, -1]]
-    tried = Tried(("RRRR", "LLLL"), CorrectiveTrials(rewards, reached), start_x=0.0)
+    trials = CorrectiveTrials(rewards, reached)
     for constraint, expected in (
-        (RewardIs("RRRR", -675.0), [True, True, False]),
-        (Above("RRRR", ("LLLL",)), [True, False, True]),
-        (BaseMoves("RRRR", 0, 1, "left"), [True, True, False]),
-        (BaseMoves("RRRR", 2, 3, "left"), [True, False, False]),
-        (BaseMoves("RRRR", 0, 4, "right"), [True, True, False]),
+        (layouts.reward_is("RRRR", -675.0), [True, True, False]),
+        (layouts.reward_is("RRRR", -674.0, within=1.0), [True, True, True]),
+        (layouts.earns_more("RRRR", ["LLLL"]), [True, False, True]),
+        (layouts.base_moves("RRRR", 0, 1, "left", 0.0), [True, True, False]),
+        (layouts.base_moves("RRRR", 2, 3, "left", 0.0), [True, False, False]),
+        (layouts.base_moves("RRRR", 0, 4, "right", 0.0), [True, True, False]),
     ):
-        assert constraint.holds(tried).tolist() == expected, str(constraint)
+        assert constraint.holds(trials).tolist() == expected, constraint.says
 
 
 @pytest.fixture(scope="module")
 def search() -> Search:
     layout = replace(
-        layouts()["two-armed-1"],
+        layouts.layouts()["two-armed-1"],
         grid={
             "y": (3.04, 3.44, 0.2), "x1": (2.15, 2.55, 0.2), "x2": (3.2, 3.6, 0.2),
             "y3": (2.76, 3.16, 0.2), "x3": (2.18, 2.58, 0.2), "x4": (7.03, 7.43, 0.2),
         },
     )  # fmt: skip
     constraints = (
-        RewardIs("RRRR", -675.0),
-        RewardIs("LRLR", -532.0),
-        BaseMoves("RRRR", 2, 3, "left"),
+        layouts.reward_is("RRRR", -675.0),
+        layouts.reward_is("LRLR", -532.0),
+        layouts.base_moves("RRRR", 2, 3, "left", start_x=0.0),
     )
     return Search(TASK, layout, constraints, jobs=1, near=45.0)
 
@@ -127,22 +92,24 @@ def search() -> Search:
 def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
     exact, near = search.grid()
     assert len(exact) < len(near)
-    found = search.admitted(search.solve(near), "solved")
-    assert len(found) > 10
-    more = search.spread(found, 20, np.random.default_rng(0), 0.02)
-    for points in (exact, found, more):
+    solved = search.admitted(search.solve(near), "solved")
+    assert len(solved) > 10
+    more = search.spread(solved, 20, np.random.default_rng(0), 0.02)
+    for points in (exact, solved, more):
         assert search.layout.allowed(points).all()
+        assert search.meets_all(search.layout.places(points)).all()
         for goals in search.layout.places(points[:5]):
             task = search.task_with(goals)
             assert corrective_trial(task, "RRRR").reward == -675
             assert corrective_trial(task, "LRLR").reward == -532
     assert search.tried["round sets of goals"] == sum(map(len, search.layout.blocks(99)))
     assert (np.abs(exact - [3.24, 2.35, 3.4, 2.96, 2.38, 7.23]) < 1e-9).all(axis=1).any()
+    assert not search.meets_all(TASK.goal_array[None] + [0.0, 0.5]).any()
 
 
 def test_a_grid_holds_what_the_layout_allows() -> None:
-    layout = Layout(
-        "t", (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
+    layout = layouts.Layout(
+        (("x", "y"), ("x", "z")), dict.fromkeys("xyz", (0.0, 1.0, 0.5)), (("z", "y", 0.5),)
     )
     points = np.concatenate(list(layout.blocks(5)))
     wide = np.concatenate(list(replace(layout, apart=0.6).blocks(5)))
@@ -154,79 +121,72 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
     np.testing.assert_array_equal(layout.points(layout.places(points)), points)
 
 
-@pytest.mark.parametrize("first", [None, 7])
-def test_members_are_spread(first: int | None) -> None:
-    rng = np.random.default_rng(0)
-    points = rng.normal(size=(60, 3))
-    chosen = spread_out(points, 20, first)
-    assert first in (None, chosen[0])
-    assert len(set(chosen.tolist())) == 20
+def test_members_are_spread() -> None:
+    points = np.random.default_rng(0).normal(size=(60, 3))
+    chosen = ensemble.spread_out(points, 20, 7)
+    assert chosen[0] == 7
     for k in range(1, 20):
         gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
         assert gaps[chosen[k]] == pytest.approx(gaps.max())
 
 
-def test_features_weigh_rewards_and_postures_alike(search: Search) -> None:
-    goals = NEAR_PRINTED + np.random.default_rng(0).normal(0, 0.05, (30, 4, 2))
-    sequences = ("LRLR", "RRRR")
-    trials = corrective_trials(TASK, sequences, goals)
-    found = features(Tried(sequences, trials, start_x=0.0), ("RRRR",))
-    assert found[:, :2].var(axis=0).sum() == pytest.approx(1.0)
-    assert found[:, 2:].var(axis=0).sum() == pytest.approx(1.0)
+@pytest.mark.parametrize("kind", ["mean", "sd", "share"])
+def test_distances_are_in_standard_errors(kind: str) -> None:
+    """Of figures of 20 runs of the same kind; with 2 SDs more they are far off."""
+    rng = np.random.default_rng(3)
+    hands = np.where(np.arange(400) < 240, "LRLR", "RRRR").astype(object)
+    ours = runs(rng.normal(-500.0, 3.0, 400)).assign(hands=hands)
+    distances = []
+    for _ in range(300):
+        sample = rng.normal(-500.0, 3.0, 20)
+        sd = sample.std(ddof=1)
+        value = {"mean": sample.mean(), "sd": sd, "share": rng.binomial(20, 0.6) / 20}[kind]
+        name = "LRLR" if kind == "share" else None
+        figure = scoring.Figure("EC3", kind, value, 20, name, sd, digits=1)
+        distances.append(figure.compare({"EC3": ours})[1])
+    assert np.std(distances) == pytest.approx(1.0, abs=0.15)
+    assert abs(np.mean(distances)) < 0.3
+    other = ours.assign(reward=-500.0 + 3.0 * (ours.reward + 500.0) + 6.0, hands="RRRR")
+    assert abs(figure.compare({"EC3": other})[1]) > 3.0
 
 
-def test_distances_are_in_standard_errors() -> None:
-    rng = np.random.default_rng(0)
-    rewards = rng.normal(-500.0, 3.0, 400)
-    cell = Learned(rewards, ("LRLR",) * 300 + ("RRRR",) * 100)
-    mean = Figure("EC3", "mean", -502.0, 20, sd=3.0)
-    error = math.sqrt(9 / 20 + rewards.var(ddof=1) / 400 + 1 / 12)
-    assert mean.distance(cell) == pytest.approx((rewards.mean() + 502.0) / error)
-    sd = Figure("EC3", "sd", 3.0, 20, digits=1)
-    assert abs(sd.distance(cell)) < 1.0
-    assert Figure("EC3", "sd", 30.0, 20).distance(cell) < -10.0
-    # Of normal runs; one far outlier makes SDs less certain.
-    twice = Figure("EC3", "sd", float(rewards.std(ddof=1)) / 2, 20, digits=9)
-    tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)))
-    variance = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (20, 400))
-    assert twice.distance(cell) == pytest.approx(math.log(2) / math.sqrt(variance))
-    rare = np.where(np.arange(400) < 4, rewards - 40.0, rewards)
-    assert 0.0 < sd.distance(Learned(rare, cell.hands)) < 3.0
-    share = Figure("EC3", "share", 0.75, 20, "LRLR")
-    assert share.ours(cell) == 0.75
-    assert share.distance(cell) == 0.0
-    absent = Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
-    assert math.isnan(absent.distance(cell))
-    better = Learned(rewards + 5.0, cell.hands)
-    cells = {"EC3": cell, "EC4": better}
-    assert compared([Order("EC4", "EC3")], cells)[0].distance == 0.0
-    theirs, ours = 2 * rewards.var(ddof=1) / 20, 2 * rewards.var(ddof=1) / 400
-    missing = -5.0 / math.sqrt(theirs + ours)
-    assert compared([Order("EC3", "EC4")], cells)[0].distance == pytest.approx(missing)
-    # Printed with a p, it has to be so clear with the printed runs, on average.
-    clear = Order("EC4", "EC3", p_below=0.01)
-    assert compared([clear], cells)[0].distance == 0.0
-    two = Learned(rewards + 1.0, cell.hands)
-    short = 1.0 - stats.norm.isf(0.01) * math.sqrt(theirs)
-    assert compared([clear], {"EC3": cell, "EC4": two})[0].distance == pytest.approx(
-        short / math.sqrt(theirs + ours)
-    )
-    of_hands = Order("EC3", "EC3", (11, 9), "LRLR", "RRRR")
-    assert compared([of_hands], cells)[0].ours == rewards[:300].mean() - rewards[300:].mean()
-    assert distance(compared([absent, share], cells)) == pytest.approx(FARTHEST / math.sqrt(2))
-    # To lose a sequence is never better than to learn it with figures far off.
-    far = Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
-    assert distance(compared([far], cells)) == distance(compared([absent], cells)) == FARTHEST
+def test_an_order_is_as_clear_as_its_printed_test() -> None:
+    """With a printed p, the test of as many runs as are printed has to be so clear on average."""
+    rewards = np.random.default_rng(0).normal(-500.0, 3.0, 400)
+    cells = {"EC3": runs(rewards), "EC4": runs(rewards + 5.0), "near": runs(rewards + 1.0)}
+    error = math.sqrt(2 * rewards.var(ddof=1) / 20)
+    for above, p, expected in (
+        ("EC4", None, 0.0),
+        ("EC4", 0.01, 0.0),  # z = 5 / error = 5.3
+        ("near", None, 0.0),
+        ("near", 0.01, 1.0 / error - stats.norm.isf(0.01)),
+    ):
+        difference, off = scoring.Order(above, "EC3", p_below=p).compare(cells)
+        assert difference == pytest.approx(5.0 if above == "EC4" else 1.0)
+        assert off == pytest.approx(expected / math.sqrt(1 + 20 / 400), abs=1e-3)
+    assert scoring.Order("EC3", "EC4").compare(cells)[1] < -5.0
+
+
+def test_a_sequence_that_is_lost_is_as_bad_as_one_far_off() -> None:
+    cells = {"EC3": runs(np.linspace(-503.0, -497.0, 400), ("LRLR", 300), ("RRRR", 100))}
+    share = scoring.Figure("EC3", "share", 0.75, 20, "LRLR")
+    absent = scoring.Figure("EC3", "mean", -502.0, 20, "LLLL", 3.0)
+    far = scoring.Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
+
+    def distance(*tests: scoring.Figure) -> float:
+        return scoring.distance(scoring.compared(tests, cells))
+
+    assert share.compare(cells) == (0.75, 0.0)
+    assert distance(far) == distance(absent) == scoring.FARTHEST
+    assert distance(absent, share) == pytest.approx(scoring.FARTHEST / math.sqrt(2))
     # What follows from other figures is shown and not counted.
-    assert distance(compared([replace(far, implied=True), share], cells)) == 0.0
-    failing = Learned(rewards, cell.hands, failed=400)
-    assert share.ours(failing) == 0.375
+    assert distance(replace(far, counted=False), share) == 0.0
 
 
 def test_chance_of_printed_counts_is_multinomial() -> None:
-    cell = Learned(np.zeros(40), ("RRRR",) * 10 + ("RLRR",) * 30)
-    printed = [Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
-    (counts,) = likelihoods(printed, cell)
+    cell = runs(np.zeros(40), ("RRRR", 10), ("RLRR", 30))
+    printed = [scoring.Figure("EC3", "share", 0.5, 4, hands) for hands in ("RRRR", "RLRR")]
+    (counts,) = readings.likelihoods(printed, cell)
     model = stats.multinomial(4, np.array([10.5, 30.5, 0.5]) / 41.5)
     assert counts.log_chance == pytest.approx(float(model.logpmf([2, 2, 0])))
     every = [c for c in itertools.product(range(5), repeat=3) if sum(c) == 4]
@@ -237,17 +197,17 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
 
 def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
-    monkeypatch.setattr("coartic.analysis.reconstruction.likelihood.DRAWS", 500)
+    monkeypatch.setattr(readings, "DRAWS", 500)
     rng = np.random.default_rng(0)
-    own = Learned(rng.normal(-300.0, 3.0, 1000), ("RRR",) * 1000)
+    own = runs(rng.normal(-300.0, 3.0, 1000))
 
-    def p(runs: np.ndarray) -> float:
-        mean, sd = round(float(runs.mean())), round(float(runs.std(ddof=1)), 1)
+    def p(rewards: np.ndarray) -> float:
+        mean, sd = round(float(rewards.mean())), round(float(rewards.std(ddof=1)), 1)
         figures = [
-            Figure("EC1", "mean", mean, 20, sd=sd),
-            Figure("EC1", "sd", sd, 20, digits=1),
+            scoring.Figure("EC1", "mean", mean, 20, sd=sd),
+            scoring.Figure("EC1", "sd", sd, 20, digits=1),
         ]
-        return together(likelihoods(figures, own)).p
+        return readings.together(readings.likelihoods(figures, own)).p
 
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(24)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
@@ -258,108 +218,101 @@ def test_a_chance_is_that_of_the_rounded_figures() -> None:
     """As counted among many samples, and certain where all runs are equal."""
     rng = np.random.default_rng(1)
     rewards = np.round(rng.normal(-300.0, 3.0, 1000))
-    figures = [Figure("EC1", "mean", -301.0, 20), Figure("EC1", "sd", 2.9, 20, digits=1)]
-    (part,) = likelihoods(figures, Learned(rewards, ("R",) * 1000))
+    figures = [
+        scoring.Figure("EC1", "mean", -301.0, 20),
+        scoring.Figure("EC1", "sd", 2.9, 20, digits=1),
+    ]
+    (part,) = readings.likelihoods(figures, runs(rewards))
     drawn = rng.choice(rewards, (60_000, 20))
     alike = (np.round(drawn.mean(axis=1)) == -301) & (np.round(drawn.std(axis=1, ddof=1), 1) == 2.9)
     assert math.exp(part.log_chance) == pytest.approx(alike.mean(), rel=0.2)
-    (part,) = likelihoods(figures[:1], Learned(np.full(100, -301.0), ("R",) * 100))
+    (part,) = readings.likelihoods(figures[:1], runs(np.full(100, -301.0)))
     assert math.exp(part.log_chance) == pytest.approx(1.0, abs=0.1)
+    failing = pd.concat([runs(rewards), runs(np.full(1000, math.nan))])
+    assert readings.together(readings.likelihoods(figures, failing)).p < 1e-3
 
 
-def test_runs_that_fail_speak_against_a_reading() -> None:
-    cell = Learned(np.random.default_rng(0).normal(-300, 3, 500), ("R",) * 500, failed=500)
-    figures = [Figure("EC1", "mean", -300.0, 20, sd=3.0)]
-    assert together(likelihoods(figures, cell)).p < 1e-3
-    assert together(likelihoods(figures, cell._replace(failed=0))).p > 0.1
-
-
-def test_a_task_with_other_goals_is_another_task() -> None:
-    assert TASK.goal_array is not None  # kept from now on
-    search = Search(TASK, layouts()["two-armed-1"], (), jobs=1)
-    first, second = (
-        result.cells["EC3"].rewards
-        for result in scored(search, [TASK.goal_array, NEAR_PRINTED], wave=1, runs=3, trials=50)
-    )
-    changed = load_task("two-armed-1").model_dump() | {"goals": NEAR_PRINTED.tolist()}
-    task = parse_task(changed, "test")
-    seeds = range(1_000_000, 1_000_003)
-    own = [learn(task, "EC3", seed=seed, trials=50).reward for seed in seeds]
-    assert second.tolist() == own != first.tolist()
+def test_a_gain_is_as_likely_as_its_rounding_allows() -> None:
+    """A mean that rounds to -303 and a gain of 16 over -319: certain; of 17 over it: hardly."""
+    mean = scoring.Figure("EC1", "mean", -303.0, 20)
+    assert readings.likelihood_of_gain(16.0, -319.0, mean) == []
+    (border,) = readings.likelihood_of_gain(17.0, -319.0, mean)
+    assert border.p == 1 / 20  # exactly -302.5
+    (never,) = readings.likelihood_of_gain(18.0, -319.0, mean)
+    assert never.p < 1e-6
 
 
 def test_a_reconstruction_is_found_and_scored(
     search: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coartic.analysis.reconstruction.reconstruct._MOST_NEAR", 30)
-    monkeypatch.setattr("coartic.analysis.reconstruction.reconstruct._MOST_STEPS", 100)
-    effort = Effort(members=4, runs=2, plan=(Wave(3, 2), Wave(2, 2, 2, 0.01)), trials=30, last=2)
+    monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
+    monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
+    effort = {
+        "members": 4,
+        "runs": 2,
+        "plan": (ensemble.Wave(3, 2), ensemble.Wave(2, 2, 2, 0.01)),
+        "trials": 30,
+    }
     small = replace(search, tried=Counter())
-    found = reconstruct(small, effort=effort)
-    members = found.members
+    members = ensemble.reconstruct(small, **effort, last=2)
     # Four that are spread, and the nearest where it is none of them.
     ours = members.member.str.startswith("m")
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
     assert ours.sum() in (4, 5)
     assert list(members.member[~ours]) == list(search.layout.known)
-    assert members.distance[0] == round(found.nearest.distance, 3)
     known = members.set_index("member").loc["F2", ["x3", "y3"]]
     assert known.tolist() == [2.38, 2.96]
     for _, row in members[ours].iterrows():
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = reconstruct(replace(search, tried=Counter(), jobs=2), effort=effort)
-    pd.testing.assert_frame_equal(again.members, found.members)
+    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort, last=2)
+    pd.testing.assert_frame_equal(again, members)
 
 
 def test_what_is_printed_is_what_is_searched_for() -> None:
-    found = {str(c) for c in search_for("two-armed-1").constraints}
-    assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < found
-    tests = targets.tests_of("two-armed-2")
+    constraints = {constraint.says for constraint in search_for("two-armed-1").constraints}
+    assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < constraints
+    tests = scoring.printed_tests("two-armed-2")
     assert len({test.label for test in tests}) == len(tests) == 10
     # All 20 runs have what their parts have.
-    implied = [test.label for test in tests if isinstance(test, Figure) and test.implied]
-    assert implied == ["EC3 mean", "EC3 sd"]
-    beside = [test for test in targets.tests_of("two-armed-1") if isinstance(test, Figure)]
-    assert not any(test.implied for test in beside)
-    clear = [test.p_below for test in tests if isinstance(test, Order)]
-    assert clear == [0.01, 0.01]
+    assert [test.label for test in tests if not test.counted] == ["EC3 mean", "EC3 sd"]
+    assert all(test.counted for test in scoring.printed_tests("two-armed-1"))
+    assert [test.p_below for test in tests if isinstance(test, scoring.Order)] == [0.01, 0.01]
     with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
 
 
-def test_lines_stand_beside_what_is_printed() -> None:
-    table = lines(["two-armed-1-F2", "ascending"], runs=4, trials=60).set_index(["task", "figure"])
+def test_printed_results_stand_beside_fresh_runs() -> None:
+    names = ["two-armed-1-F2", "ascending"]
+    table = scoring.beside_printed(names, runs=4, trials=60).set_index(["task", "figure"])
     assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
     row = table.loc["ascending", "EC1 mean"]
     seeds = range(800_000_000, 800_000_004)
     own = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
     assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(own))
-    parts = np.array([np.var(own, ddof=1) / 4, 2.9**2 / 20])  # Welch's interval
-    freedom = parts.sum() ** 2 / (parts**2 / [3, 19]).sum()
-    half = stats.t.ppf(0.975, freedom) * math.sqrt(parts.sum())
-    assert row.low == pytest.approx(np.mean(own) + 303 - half)
     assert row.verdict == "different"
     assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
-    with pytest.raises(CoarticError, match="unknown task 'nope'"):
-        lines(["nope"], runs=3)
+    with pytest.raises(CoarticError, match="prints nothing of task 'long/v1/i001'"):
+        scoring.beside_printed(["long/v1/i001"], runs=3)
 
 
 def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:
     rng = np.random.default_rng(1)
-    mean = Figure("EC3", "mean", -500.0, 20, sd=4.0)
+    mean = scoring.Figure("EC3", "mean", -500.0, 20, sd=4.0)
 
-    def scored_at(offset: float, runs: int) -> Scored:
-        cell = Learned(rng.normal(-500.0 + offset, 4.0, runs), ("LRLR",) * runs)
-        return Scored(np.zeros((4, 2)), {"EC3": cell}, compared([mean], {"EC3": cell}))
+    def at(offset: float, count: int) -> ensemble.Scored:
+        cells = {"EC3": runs(rng.normal(-500.0 + offset, 4.0, count))}
+        comparisons = scoring.compared([mean], cells)
+        return ensemble.Scored(np.zeros(6), cells, comparisons, scoring.distance(comparisons))
 
-    near, far = scored_at(0.5, 300), scored_at(4.0, 300)
-    assert clearly_nearer(near, far)
-    assert not clearly_nearer(far, near)
-    assert not clearly_nearer(scored_at(0.5, 300), scored_at(0.7, 300))
+    near, far = at(0.5, 300), at(4.0, 300)
+    assert ensemble.clearly_nearer(near, far, [mean])
+    assert not ensemble.clearly_nearer(far, near, [mean])
+    assert not ensemble.clearly_nearer(at(0.5, 300), at(0.7, 300), [mean])
     # Of few runs the same difference is no more than chance.
-    assert not clearly_nearer(scored_at(0.5, 4), scored_at(2.0, 4))
+    assert not ensemble.clearly_nearer(at(0.5, 4), at(2.0, 4), [mean])
     # A distance in units of the error of a mean of n runs has that error over it.
     error = math.sqrt(16 / 20 + 16 / 300 + 1 / 12)
-    assert distance_error([mean], far.cells) == pytest.approx(4 / math.sqrt(300) / error, rel=0.3)
+    expected = pytest.approx(4 / math.sqrt(300) / error, rel=0.3)
+    assert scoring.distance_error([mean], far.cells) == expected

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import integrate, stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
-from coartic.analysis.references import references
+from coartic.analysis.citations import references
 from coartic.analysis.signatures.context import (
     context_dependence,
     context_pairs,

@@ -15,8 +15,7 @@ from coartic.analysis.claims.data import SMOOTH, Data
 from coartic.analysis.claims.register import MARGINS, Claim, Finding
 from coartic.analysis.claims.rules import all_hold, exceeds, shown
 from coartic.analysis.methods import name_of
-from coartic.analysis.printed import ENTRIES, Order, Solved
-from coartic.analysis.published import Summary, published_cell
+from coartic.analysis.published import ENTRIES, Order, Solved, Summary, published_cell
 from coartic.analysis.signatures.manifold import movable
 from coartic.analysis.signatures.subtasks import postures_before
 from coartic.analysis.statistics.estimates import SEED
@@ -178,14 +177,14 @@ def _printed(task: str | None, of: Solved) -> Summary | None:
     cell = published_cell(task or "", of.condition or "")
     if cell is None:
         return None
-    by_hands = {s.hands: s.summary for s in cell.sequences}
+    by_hands = cell.sequences
     found = by_hands.get(of.hands) if of.hands and len(by_hands) > 1 else cell.summary
     return None if found is None or found.sd is None else found
 
 
 def _welch(first: Summary, second: Summary, off: float) -> float:
     """One-tailed p that the first mean is higher; ``off`` half units of their last decimals."""
-    apart = sum(0.5 * 10.0 ** -(s.digits[0] if s.digits else 0) for s in (first, second))
+    apart = sum(0.5 * 10.0**-s.digits for s in (first, second))
     both = ((s.runs, s.mean, math.nan if s.sd is None else s.sd**2) for s in (first, second))
     (n, mean, variance), other = both
     return _welch_p(n, mean + off * apart, variance, *other)

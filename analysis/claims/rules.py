@@ -13,8 +13,13 @@ from scipy import stats
 
 from coartic.analysis.claims.data import Data
 from coartic.analysis.claims.register import MARGINS, Claim, Finding
-from coartic.analysis.printed import ENTRIES, Count
-from coartic.analysis.published import published_cell, published_exhaustive, published_initial
+from coartic.analysis.published import (
+    ENTRIES,
+    Number,
+    published_cell,
+    published_exhaustive,
+    published_initial,
+)
 from coartic.analysis.statistics.estimates import (
     Inference,
     difference_of_means,
@@ -110,9 +115,9 @@ printed ones"""
     words, count, found = _count(data, task, text)
     total, printed = found.total(), printed_count(task, condition, hands)
     derived = any(
-        (entry.task, entry.condition, entry.hands) == (task, condition, hands)
+        (entry.kind, entry.task, entry.condition, entry.hands) == ("count", task, condition, hands)
         for entry in ENTRIES.values()
-        if isinstance(entry, Count) and entry.derived
+        if isinstance(entry, Number) and entry.difference_of
     )
     low, high = stats.binomtest(count, total).proportion_ci()
     share = count / total
@@ -176,7 +181,7 @@ def printed_count(task: str, condition: str, hands: str) -> tuple[int, int]:
     """Runs that the paper prints for a hand sequence, and out of how many."""
     cell = published_cell(task, condition)
     assert cell is not None
-    known = {s.hands: s.summary.runs for s in cell.sequences}
+    known = {name: summary.runs for name, summary in cell.sequences.items()}
     return known[hands], sum(known.values())
 
 
@@ -194,7 +199,7 @@ def _as_printed(task: str, side: Side) -> str | None:
         value = printed_known(task, side)
     else:
         cell = published_cell(task, side.name)
-        of_hands = {s.hands: s.summary for s in cell.sequences} if cell else {}
+        of_hands = cell.sequences if cell else {}
         summary = of_hands.get(side.hands) if side.hands else cell and cell.summary
         value, derived = (summary.mean, summary.derived) if summary else (None, False)
     return None if value is None else f"{number(value)}{' (derived)' * derived}"

@@ -6,13 +6,7 @@ from dataclasses import dataclass
 
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import LEARNER
-from coartic.analysis.published import (
-    RUNS,
-    TRIALS,
-    PublishedCell,
-    Summary,
-    published_cell,
-)
+from coartic.analysis.published import RUNS, TRIALS, PublishedCell, Summary, published_cell
 from coartic.analysis.statistics.equivalence import Equivalence, difference
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
@@ -82,13 +76,13 @@ def sequence_rows(study: Study) -> list[SequenceRow]:
         paper, hands = published_of(cell), cell.good.hands
         if paper is None or not (paper.sequences or hands.nunique() > 1):
             continue
-        printed = {sequence.hands: sequence for sequence in paper.sequences}
-        complete = sum(sequence.runs or 0 for sequence in paper.sequences) == RUNS
+        printed = paper.sequences
+        complete = sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS
         for name in dict.fromkeys([*printed, *hands.value_counts().index]):
             rewards = cell.rewards[(hands == name).to_numpy(bool)]
             summary, runs = None, 0 if complete else None
             if name in printed:
-                summary, runs = printed[name].summary, printed[name].runs
+                summary, runs = printed[name], printed[name].printed_runs
             apart = _apart(rewards, summary)
             rows.append(SequenceRow(cell, str(name), summary, runs, rewards, apart))
     return rows

@@ -72,9 +72,13 @@ def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
         counts = solved(study, task, label).good.hands.value_counts()
         rows += [(task, label, "ours", str(hands), int(n)) for hands, n in counts.items()]
         paper = published_of(study.cells[task, label])
-        printed = [(s.hands, s.runs) for s in paper.sequences if s.runs] if paper else []
-        if sum(runs for _, runs in printed) == RUNS:
-            rows += [(task, label, "published", hands, runs) for hands, runs in printed]
+        printed = paper.sequences if paper else {}
+        if sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS:
+            rows += [
+                (task, label, "published", hands, summary.runs)
+                for hands, summary in printed.items()
+                if summary.printed_runs
+            ]
     frame = pd.DataFrame(rows, columns=["task", "method", "source", "hands", "runs"])
     totals = frame.groupby(["method", "source"]).runs.transform("sum")
     return frame.assign(share=frame.runs / totals)

@@ -1,58 +1,39 @@
-"""How far a reconstruction's learned figures are from the printed ones.
+"""How near learned results are to the printed ones.
 
 Every printed mean, SD and number of runs is one figure; its distance is the difference in
 units of its own uncertainty and that of our runs (the implausibility of history matching:
 Craig et al. 1997; Gonçalves et al. 2020, doi:10.7554/eLife.56261).
+
+Runs are a table: ``reward`` of each (NaN where it completed no trial) and ``hands``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
 from scipy import special, stats
 
-from coartic import PAPER, MotionModel, Task, learn_many
+from coartic import CONDITIONS, PAPER, CoarticError, MotionModel, Task, learn_many, load_task
+from coartic.analysis.published import RUNS, entries_of
+from coartic.analysis.reconstruction.layouts import constraints_of, try_sequences
+from coartic.analysis.statistics import equivalence
 from coartic.learner.conditions import ExplorationCondition
+from coartic.robot import Array
+from coartic.tasks.members import task_of
+from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
 
-
-class Learned(NamedTuple):
-    """What the runs of a cell learned."""
-
-    rewards: NDArray[np.float64]
-    """Learned reward of each run that completed a trial, ``(N,)``."""
-    hands: tuple[str, ...]
-    """The hand sequence of each."""
-    failed: int = 0
-    """Runs that completed no trial."""
-
-    @property
-    def runs(self) -> int:
-        """All of them."""
-        return len(self.hands) + self.failed
-
-    def drawn(self, rng: np.random.Generator) -> Learned:
-        """As many of its runs, drawn with replacement."""
-        chosen = rng.integers(self.runs, size=self.runs)
-        good = chosen[chosen < len(self.hands)]
-        hands = tuple(self.hands[number] for number in good)
-        return Learned(self.rewards[good], hands, len(chosen) - len(good))
-
-    def beside(self, others: Learned) -> Learned:
-        """These runs and others of the same cell."""
-        rewards = np.concatenate([self.rewards, others.rewards])
-        return Learned(rewards, self.hands + others.hands, self.failed + others.failed)
-
-    def with_hands(self, hands: str | None) -> NDArray[np.float64]:
-        """Rewards of the runs that learned a sequence; of all for None."""
-        if hands is None:
-            return self.rewards
-        chosen = np.array([hands == own for own in self.hands], dtype=bool)
-        return np.asarray(self.rewards[chosen])
+RESAMPLES = 200  # of the runs, for the standard error of a distance
+FARTHEST = 5.0
+"""Standard errors that a figure counts at most, and where too few runs learned its hands: a
+sequence that is not learned is as bad as one with a figure far off, never better."""
+SHARES = 0.25  # margin of equivalence of shares of runs
+FRESH_SEEDS = 800_000_000
+"""Seeds of runs for :func:`beside_printed` begin here: they have selected nothing."""
 
 
 @dataclass(frozen=True)
@@ -70,44 +51,43 @@ class Figure:
     """Printed SD of the runs, for a mean."""
     digits: int = 0
     """Decimals that are printed."""
-    implied: bool = False
-    """It follows from others, as the mean of all runs from those of their parts: not counted."""
+    counted: bool = True
+    """Not where it follows from others, as the mean of all runs from those of their parts."""
 
     @property
     def label(self) -> str:
         """Such as ``EC2 RRLR mean``."""
         return " ".join(filter(None, (self.condition, self.hands, self.kind)))
 
-    def ours(self, learned: Learned) -> float:
-        """The same figure of our runs; NaN where too few runs learned the sequence."""
-        rewards = learned.with_hands(self.hands)
-        if not learned.runs:
-            return math.nan
-        if self.kind == "share":
-            return len(rewards) / learned.runs
-        if self.kind == "mean":
-            return float(rewards.mean()) if len(rewards) else math.nan
-        return float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
+    def compare(self, cells: Mapping[str, pd.DataFrame]) -> tuple[float, float]:
+        """The same figure of our runs, and its difference in standard errors.
 
-    def distance(self, learned: Learned) -> float:
-        """Difference in standard errors, positive where ours is the larger; NaN as above."""
-        ours, own, runs = self.ours(learned), learned.with_hands(self.hands), learned.runs
+        ``cells``: runs by condition. NaN where too few runs learned the sequence.
+        """
+        runs, rewards = cells[self.condition], learned_rewards(cells[self.condition], self.hands)
+        if not len(runs):
+            return math.nan, math.nan
         rounding = 10.0**-self.digits / math.sqrt(12.0)
-        if not runs:
-            return math.nan
         if self.kind == "share":
-            pooled = (self.value * self.runs + len(own) + 1.0) / (self.runs + runs + 2.0)
-            variance = pooled * (1.0 - pooled) * (1.0 / self.runs + 1.0 / runs)
-            return (ours - self.value) / math.sqrt(variance)
-        if len(own) < 2:
-            return math.nan
+            ours = len(rewards) / len(runs)
+            pooled = (self.value * self.runs + len(rewards) + 1.0) / (self.runs + len(runs) + 2.0)
+            variance = pooled * (1.0 - pooled) * (1.0 / self.runs + 1.0 / len(runs))
+            return ours, (ours - self.value) / math.sqrt(variance)
+        if len(rewards) < 2:
+            mean = float(rewards.mean()) if self.kind == "mean" and len(rewards) else math.nan
+            return mean, math.nan
         if self.kind == "mean":
-            spread = self.sd or float(own.std(ddof=1))
-            error = spread**2 / self.runs + own.var(ddof=1) / len(own) + rounding**2
-            return (ours - self.value) / math.sqrt(error)
-        error = _of_log_sd(self.runs, own) + _of_log_sd(len(own), own)
+            ours = float(rewards.mean())
+            spread = self.sd or float(rewards.std(ddof=1))
+            error = spread**2 / self.runs + rewards.var(ddof=1) / len(rewards) + rounding**2
+            return ours, (ours - self.value) / math.sqrt(error)
+        ours = float(rewards.std(ddof=1))
+        # Variance of the logarithm of an SD of n runs, to first order (delta method), with the
+        # kurtosis that ours have: 1 / (2 (n - 1)) for normal ones, and never taken as less.
+        tails = max(3.0, float(stats.kurtosis(rewards, fisher=False)) if np.ptp(rewards) else 3.0)
+        error = sum((tails - (n - 3) / (n - 1)) / (4 * n) for n in (self.runs, len(rewards)))
         error += (rounding / self.value) ** 2
-        return math.log(max(ours, 1e-3) / self.value) / math.sqrt(error)
+        return ours, math.log(max(ours, 1e-3) / self.value) / math.sqrt(error)
 
 
 @dataclass(frozen=True)
@@ -122,6 +102,7 @@ class Order:
     than_hands: str | None = None
     p_below: float | None = None
     """What the printed p of the one-tailed test lies below; None where none is printed."""
+    counted: bool = True
 
     @property
     def label(self) -> str:
@@ -130,14 +111,14 @@ class Order:
         second = " ".join(filter(None, (self.than, self.than_hands)))
         return f"{first} above {second}"
 
-    def seen(self, cells: Mapping[str, Learned]) -> tuple[float, float]:
+    def compare(self, cells: Mapping[str, pd.DataFrame]) -> tuple[float, float]:
         """Difference of our means, and how far the printed test falls short of its p.
 
         In SDs of its z, ours being as uncertain as our runs are; 0 where it would not on
         average. NaN with too few runs.
         """
-        above = cells[self.condition].with_hands(self.hands)
-        below = cells[self.than].with_hands(self.than_hands)
+        above = learned_rewards(cells[self.condition], self.hands)
+        below = learned_rewards(cells[self.than], self.than_hands)
         if min(len(above), len(below)) < 2:
             return math.nan, math.nan
         difference = float(above.mean() - below.mean())
@@ -150,30 +131,46 @@ class Order:
 
 
 Test = Figure | Order
-RESAMPLES = 200
-"""Of the runs, for the standard error of a distance."""
-FARTHEST = 5.0
-"""Standard errors that a figure counts at most, and where too few runs learned its hands: a
-sequence that is not learned is as bad as one with a figure far off, never better."""
 
 
-def _of_log_sd(runs: int, like: NDArray[np.float64]) -> float:
-    """Variance of the logarithm of the SD of that many runs, of a kurtosis as some have.
+def printed_tests(task: str) -> tuple[Test, ...]:
+    """What learning runs are compared with: means, SDs, shares of hand sequences, orders."""
+    entries = entries_of(task, "test")
+    spreads = {(e.condition, e.hands): float(e.value) for e in entries if e.kind == "sd"}
+    counts = {(e.condition, e.hands): int(e.value) for e in entries if e.kind == "count"}
+    tests: list[Test] = []
+    for entry in entries:
+        condition, hands = entry.condition, entry.hands
+        if condition is None:
+            continue
+        runs = counts.get((condition, hands), RUNS)
+        told_apart = sum(n for (name, _), n in counts.items() if name == condition)
+        counted = hands is not None or told_apart != RUNS
+        if entry.kind == "reward":
+            mean, sd = float(entry.value), spreads.get((condition, hands))
+            tests.append(Figure(condition, "mean", mean, runs, hands, sd, entry.digits, counted))
+        elif entry.kind == "sd":
+            sd = float(entry.value)
+            tests.append(Figure(condition, "sd", sd, runs, hands, None, entry.digits, counted))
+        elif entry.kind == "count":
+            tests.append(Figure(condition, "share", runs / RUNS, RUNS, hands))
+        elif entry.kind == "hand sequences" and len(entry.found) == 1:
+            tests.append(Figure(condition, "share", 1.0, RUNS, entry.found[0]))
+        elif entry.kind == "order" and not (entry.sample or entry.goal):
+            than = entry.than
+            if than.condition is not None:
+                both = runs, counts.get((than.condition, than.hands), RUNS)
+                p_below = None if entry.p_below is None else float(entry.p_below)
+                tests.append(Order(condition, than.condition, both, hands, than.hands, p_below))
+    return tuple(dict.fromkeys(tests))
 
-    To first order (delta method); 1 / (2 (n - 1)) for normal ones, and never taken as less.
-    """
-    tails = max(3.0, float(stats.kurtosis(like, fisher=False)) if np.ptp(like) else 3.0)
-    return (tails - (runs - 3) / (runs - 1)) / (4 * runs)
 
-
-@dataclass(frozen=True)
-class Compared:
-    """A printed figure and ours."""
-
-    test: Test
-    ours: float
-    distance: float
-    """In standard errors; positive where ours is the larger."""
+def conditions_of(
+    task: str, fields: Mapping[str, Any] | None = None
+) -> dict[str, ExplorationCondition]:
+    """Exploration conditions of which something is printed, with these fields of readings."""
+    names = sorted({entry.condition for entry in entries_of(task, "test") if entry.condition})
+    return {name: replace(CONDITIONS[name], **(fields or {})) for name in names}
 
 
 def learned(
@@ -184,45 +181,112 @@ def learned(
     model: MotionModel = PAPER,
     trials: int = 10_000,
     jobs: int = 1,
-) -> Learned:
-    """Learned rewards and hand sequences of runs with these seeds."""
+) -> pd.DataFrame:
+    """Learned ``reward`` and ``hands`` of runs with these seeds, a row a run."""
     runs = learn_many(task, condition, seeds=seeds, trials=trials, model=model, jobs=jobs)
-    completed = [run for run in runs if run.reward is not None]
-    return Learned(
-        np.array([run.reward for run in completed], dtype=np.float64),
-        tuple(run.hands or "" for run in completed),
-        len(runs) - len(completed),
-    )
+    rewards = [math.nan if run.reward is None else float(run.reward) for run in runs]
+    hands = pd.Series([run.hands or "" for run in runs], dtype=object)
+    return pd.DataFrame({"reward": rewards, "hands": hands})
 
 
-def compared(tests: Sequence[Test], cells: Mapping[str, Learned]) -> list[Compared]:
-    """Each printed figure beside that of our runs, ``cells`` by condition."""
-    return [_compared(test, cells) for test in tests]
+def learned_rewards(runs: pd.DataFrame, hands: str | None = None) -> Array:
+    """Rewards of the runs that completed a trial; with ``hands``, of those that learned them."""
+    rewards = runs["reward"].to_numpy()
+    chosen = np.isfinite(rewards)
+    if hands is not None:
+        chosen &= runs["hands"].to_numpy() == hands
+    return np.asarray(rewards[chosen])
 
 
-def _compared(test: Test, cells: Mapping[str, Learned]) -> Compared:
-    if isinstance(test, Figure):
-        cell = cells[test.condition]
-        return Compared(test, test.ours(cell), test.distance(cell))
-    return Compared(test, *test.seen(cells))
+def compared(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """A row for each printed figure, by its label: ``ours``, ``distance`` and ``counted``.
+
+    Distances are in standard errors, positive where ours is the larger.
+    """
+    rows = [(*test.compare(cells), test.counted) for test in tests]
+    labels = [test.label for test in tests]
+    return pd.DataFrame(rows, labels, columns=["ours", "distance", "counted"])
 
 
-def distance(comparisons: Iterable[Compared]) -> float:
+def distance(comparisons: pd.DataFrame) -> float:
     """Root mean square of the distances, standard errors; none counts as more than FARTHEST.
 
     What follows from other figures is not counted a second time.
     """
-    values = [
-        abs(each.distance)
-        for each in comparisons
-        if not (isinstance(each.test, Figure) and each.test.implied)
-    ]
-    squares = [FARTHEST**2 if math.isnan(value) else min(value, FARTHEST) ** 2 for value in values]
+    values = comparisons.distance[comparisons.counted].abs().fillna(FARTHEST)
+    squares = [min(value, FARTHEST) ** 2 for value in values]
     return math.sqrt(sum(squares) / len(squares))
 
 
-def distance_error(tests: Sequence[Test], cells: Mapping[str, Learned]) -> float:
+def distance_error(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> float:
     """Standard error of :func:`distance` by the bootstrap over the runs of each cell."""
     rng = np.random.default_rng(0)
-    drawn = ({name: cell.drawn(rng) for name, cell in cells.items()} for _ in range(RESAMPLES))
-    return float(np.std([distance(compared(tests, own)) for own in drawn], ddof=1))
+    distances = []
+    for _ in range(RESAMPLES):
+        numbers = {name: rng.integers(len(runs), size=len(runs)) for name, runs in cells.items()}
+        drawn = {name: runs.iloc[numbers[name]] for name, runs in cells.items()}
+        distances.append(distance(compared(tests, drawn)))
+    return float(np.std(distances, ddof=1))
+
+
+def beside_printed(
+    names: Sequence[str],
+    *,
+    readings: Sequence[str] = (),
+    runs: int = 100,
+    trials: int = 10_000,
+    jobs: int = 2,
+    progress: Callable[[str], None] = lambda text: None,
+) -> pd.DataFrame:
+    """What is printed of tasks beside fresh runs of them, or of members: a row a figure.
+
+    Columns ``task``, ``figure``, ``printed``, ``sd`` (printed), ``ours``, ``our_sd``, ``runs``
+    (those that the figure rests on), ``low`` and ``high`` (of the difference) and ``verdict``
+    of equivalence: means within 1 %, shares within :data:`SHARES`. SDs and orders have no margin:
+    ``distance`` says by how many standard errors they, and all others, are off. Raises
+    CoarticError for a task of which nothing is printed.
+    """
+    chosen, rows = load_readings(readings), []
+    model, fields = model_under(chosen), condition_under(chosen)
+    for name in names:
+        task, plain = task_under(chosen, load_task(name)), task_of(name) or name
+        conditions = conditions_of(plain, fields)
+        if not conditions:
+            raise CoarticError(f"the paper prints nothing of task {name!r}")
+        for constraint in constraints_of(load_task(plain)):
+            if constraint.reward is not None:
+                (hands,) = constraint.sequences
+                tried = try_sequences(task, [hands], task.goal_array[None], model=model, jobs=1)
+                rows.append({
+                    "task": name, "figure": f"{hands}, corrective process alone",
+                    "printed": constraint.reward, "ours": float(tried.rewards[0, 0]), "runs": 1,
+                    "verdict": "same" if constraint.holds(tried)[0] else "different",
+                })  # fmt: skip
+        seeds, cells = range(FRESH_SEEDS, FRESH_SEEDS + runs), {}
+        for label, condition in conditions.items():
+            cells[label] = learned(task, condition, seeds, model=model, trials=trials, jobs=jobs)
+            progress(f"{name}, {label}: {runs} runs")
+        for test in printed_tests(plain):
+            ours, distance = test.compare(cells)
+            row = {"task": name, "figure": test.label, "ours": ours, "distance": distance}
+            if isinstance(test, Figure):
+                row |= equivalence_row(test, cells[test.condition])
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def equivalence_row(figure: Figure, runs: pd.DataFrame) -> dict[str, Any]:
+    """What is printed of a figure, and its difference from ours where it has a margin."""
+    rewards, share = learned_rewards(runs, figure.hands), figure.kind == "share"
+    row = {"printed": figure.value, "runs": len(runs) if share else len(rewards)}
+    if figure.kind == "mean":
+        row["sd"] = math.nan if figure.sd is None else figure.sd
+        row["our_sd"] = float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
+    if share:
+        theirs = round(figure.value * figure.runs), figure.runs
+        difference = equivalence.shares((len(rewards), len(runs)), theirs, SHARES)
+    elif figure.kind == "mean" and len(rewards) > 1:
+        difference = equivalence.difference(rewards, figure.value, figure.sd, figure.runs)
+    else:
+        return row
+    return row | {name: getattr(difference, name) for name in ("low", "high", "verdict")}

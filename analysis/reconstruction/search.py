@@ -1,4 +1,4 @@
-"""Coordinates that give everything printed about the corrective process alone.
+"""Goals that give everything printed about the corrective process alone.
 
 First a round grid, then the continuum: points of the grid that come near the printed rewards
 are moved, by the shortest way, to where these come out as printed; what is found is spread by
@@ -10,25 +10,30 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
+import pandas as pd
 
-from coartic import MotionModel, Task, hand_sequences
-from coartic.analysis.reconstruction.constraints import (
+from coartic import CoarticError, MotionModel, Task, load_task
+from coartic.analysis.reconstruction.layouts import (
     Constraint,
-    RewardIs,
-    Tried,
-    sequences_of,
+    Flags,
+    Layout,
+    constraints_of,
+    layouts,
     try_sequences,
 )
-from coartic.analysis.reconstruction.layout import Layout
+from coartic.motion.sequences import CorrectiveTrials
 from coartic.robot import Array
-from coartic.tasks.readings import ChosenReading, model_under
+from coartic.tasks.readings import ChosenReading, load_readings, model_under, task_under
+from coartic.text import did_you_mean
 
-_DIFFERENCE = 0.1  # of the finite differences: rewards are whole ticks, some 100 a length unit
-_STEPS = 12
-_LONGEST = 0.5  # of a step, length unit
-_BLOCK = 100_000  # points of the grid at once
+GRID_BLOCK = 100_000  # points of the grid that are tried at once
+DIFFERENCE = 0.1
+"""Of the finite differences, length unit: rewards are whole ticks, some 100 a length unit."""
+SOLVER_STEPS = 12
+LONGEST_STEP = 0.5  # of the solver, length unit
 
 
 @dataclass
@@ -51,32 +56,37 @@ class Search:
         """As the readings have it."""
         return model_under(self.readings)
 
-    def attempt(self, points: Array, sequences: Sequence[str]) -> Tried:
-        """Corrective trials at points ``(N, P)``."""
-        goals = self.layout.places(points)
-        return try_sequences(self.task, sequences, goals, model=self.model, jobs=self.jobs)
+    @property
+    def rewards(self) -> dict[str, float]:
+        """The rewards that have to come out, by hand sequence in alphabetical order."""
+        rewards = {c.sequences[0]: c.reward for c in self.constraints if c.reward is not None}
+        return dict(sorted(rewards.items()))
+
+    @property
+    def tried_table(self) -> pd.DataFrame:
+        """What was tried: stage, number of sets of goals."""
+        return pd.DataFrame(self.tried.items(), columns=["stage", "sets of goals"])
 
     def task_with(self, goals: Array) -> Task:
         """The task with other goals, ``(G, 2)``."""
         return self.task.model_copy(update={"goals": tuple(map(tuple, goals.tolist()))})
 
-    @property
-    def printed(self) -> tuple[RewardIs, ...]:
-        """The rewards that have to come out."""
-        return tuple(c for c in self.constraints if isinstance(c, RewardIs))
+    def attempt(self, points: Array, sequences: Sequence[str]) -> CorrectiveTrials:
+        """Corrective trials at points ``(N, P)``."""
+        goals = self.layout.places(points)
+        return try_sequences(self.task, sequences, goals, model=self.model, jobs=self.jobs)
 
-    def grid(
-        self, progress: Callable[[int, int], None] = lambda done, size: None
-    ) -> tuple[Array, Array]:
+    def grid(self, report: Callable[[str], None] = lambda text: None) -> tuple[Array, Array]:
         """The round points that meet every constraint, and those that come near."""
-        exact, near, done = [], [], 0
-        for points in self.layout.blocks(_BLOCK):
-            done += _BLOCK
-            progress(min(done, self.layout.size), self.layout.size)
+        exact, near, tenths = [], [], 0
+        for number, points in enumerate(self.layout.blocks(GRID_BLOCK), 1):
+            if (tenth := min(10, 10 * number * GRID_BLOCK // self.layout.size)) > tenths:
+                report(f"{10 * tenth} % of the grid")
+                tenths = tenth
             self.tried["round sets of goals"] += len(points)
-            for printed in self.printed:
-                reward = self.attempt(points, [printed.hands]).reward(printed.hands)
-                points = points[np.abs(reward - printed.value) <= self.near]
+            for hands, reward in self.rewards.items():
+                missing = self.attempt(points, [hands]).rewards[:, 0] - reward
+                points = points[np.abs(missing) <= self.near]
             near.append(points)
             exact.append(self.admitted(points, "round"))
         return np.concatenate(exact), np.concatenate(near)
@@ -84,10 +94,15 @@ class Search:
     def admitted(self, points: Array, stage: str) -> Array:
         """The points that meet every constraint, counted by the first that they miss."""
         for constraint in sorted(self.constraints, key=lambda each: len(each.sequences)):
-            tried = self.attempt(points, sorted(constraint.sequences))
-            points = points[constraint.holds(tried)]
-            self.tried[f"{stage}, and {constraint}"] += len(points)
+            points = points[constraint.holds(self.attempt(points, constraint.sequences))]
+            self.tried[f"{stage}, and {constraint.says}"] += len(points)
         return points
+
+    def meets_all(self, goals: Array) -> Flags:
+        """Whether sets of goals (N, G, 2) meet every constraint, ``(N,)``."""
+        perform = partial(try_sequences, self.task, goals=goals, model=self.model, jobs=self.jobs)
+        holds = [constraint.holds(perform(constraint.sequences)) for constraint in self.constraints]
+        return np.asarray(np.all(holds, axis=0))
 
     def solve(self, points: Array) -> Array:
         """Move points to where the printed rewards come out; those for which that succeeds.
@@ -95,29 +110,29 @@ class Search:
         Steps are the shortest that would do if rewards were linear (Gauss-Newton with the
         pseudoinverse); gradients are finite differences.
         """
-        hands = sequences_of(self.printed)
-        wanted = np.array([c.value for c in sorted(self.printed, key=lambda c: c.hands)])
+        printed = np.array(list(self.rewards.values()))
         width = points.shape[1]
-        solved = []
-        for _ in range(_STEPS):
+        solved = [points[:0]]
+        for _ in range(SOLVER_STEPS):
             if not len(points):
                 break
-            shifts = np.vstack([np.zeros(width), _DIFFERENCE * np.eye(width)])
+            shifts = np.vstack([np.zeros(width), DIFFERENCE * np.eye(width)])
             around = (points[:, None] + shifts).reshape(-1, width)
-            rewards = self.attempt(around, hands).trials.rewards
-            rewards = rewards.reshape(len(points), width + 1, len(hands))
-            missing = wanted - rewards[:, 0]
-            done = (missing == 0.0).all(axis=1)
-            solved.append(points[done])
-            gradient = (rewards[:, 1:] - rewards[:, :1]) / _DIFFERENCE
-            going = ~done & np.isfinite(gradient).all(axis=(1, 2))
+            rewards = self.attempt(around, list(self.rewards)).rewards
+            rewards = rewards.reshape(len(points), width + 1, len(printed))
+            missing = printed - rewards[:, 0]
+            exact = (missing == 0.0).all(axis=1)
+            solved.append(points[exact])
+            gradient = (rewards[:, 1:] - rewards[:, :1]) / DIFFERENCE
+            going = ~exact & np.isfinite(gradient).all(axis=(1, 2))
             step = np.einsum(
                 "nwh,nh->nw", np.linalg.pinv(gradient[going].transpose(0, 2, 1)), missing[going]
             )
             length = np.linalg.norm(step, axis=1, keepdims=True)
-            points = points[going] + step * np.minimum(1.0, _LONGEST / np.maximum(length, 1e-12))
+            step *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-12))
+            points = points[going] + step
             points = points[self.layout.allowed(points)]
-        return np.concatenate(solved) if solved else points[:0]
+        return np.concatenate(solved)
 
     def spread(self, members: Array, count: int, rng: np.random.Generator, size: float) -> Array:
         """Admissible points near members drawn at random, ``size`` away in SD, length unit."""
@@ -127,6 +142,18 @@ class Search:
         self.tried["random steps"] += len(points)
         return self.admitted(self.solve(points), "after steps")
 
-    def every_sequence(self, points: Array) -> Tried:
-        """Trials with all hand sequences."""
-        return self.attempt(points, hand_sequences(self.task))
+
+def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Search:
+    """A search for the goals of a task under readings, as ``ties=right``.
+
+    Raises CoarticError for a task whose goals are printed, and for readings that are none.
+    """
+    known = layouts()
+    if task not in known:
+        raise CoarticError(
+            f"the paper prints the goals of task {task!r}; tasks with goals that are not "
+            f"printed: {', '.join(known)}{did_you_mean(task, known)}"
+        )
+    chosen = load_readings(readings)
+    plain = task_under(chosen, load_task(task))
+    return Search(plain, known[task], constraints_of(plain), chosen, jobs)

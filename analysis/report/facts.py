@@ -398,6 +398,7 @@ def limits(study: Study) -> dict[str, Any]:
         "reconstructed": [
             t.label for n, t in study.tasks.items() if t.reconstructed and n in one_by_one(study)
         ],
+        "incumbent": study.tasks["two-armed-1"].label if "two-armed-1" in study.tasks else "",
         "trials": sorted(trials) if trials and trials != {TRIALS} else [],
         "paper_trials": TRIALS,
         "few": ours[0] if ours and ours[0] < RUNS else 0,

@@ -9,7 +9,6 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
-from coartic.analysis.references import Key
 from coartic.analysis.statistics.estimates import Interval
 from coartic.runs.plan import label_of
 
@@ -109,7 +108,7 @@ class Signature(BaseModel):
     share: bool = False
     meaning: str
     heading: str
-    sources: tuple[Key, ...] = ()
+    sources: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _says_its_range(self) -> Self:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,7 +22,7 @@ app = typer.Typer(
     no_args_is_help=True,
     help="Study what the paper leaves open.",
 )
-_TrialsOf = Annotated[
+TrialsOfRun = Annotated[
     int, typer.Option(parser=at_least(1), metavar="N", help="Trials of each run.")
 ]
 
@@ -38,7 +37,7 @@ def readings(
         int,
         typer.Option(parser=at_least(40), metavar="N", help="Runs of each reading and task."),
     ] = 1000,
-    trials: _TrialsOf = 10_000,
+    trials: TrialsOfRun = 10_000,
     pairs: Annotated[
         bool, typer.Option("--pairs", help="Also every two of them together.")
     ] = False,
@@ -56,21 +55,18 @@ def readings(
             question = " ".join(reading.question.split())
             say_pairs([(reading.id, f"{question} {reading.default.written}; or {others}")])
         return
-    from coartic.analysis.reconstruction.judge import combinations, judge_all, judged_table
+    from coartic.analysis.reconstruction.readings import combinations, judge_readings
 
     check_numbers(jobs, None)
-    folder = _folder(judge, ["readings.csv"], "--judge")
-    judged = judge_all(
-        list(combinations(pairs)),
+    folder = checked_folder(judge, ["readings.csv"], "--judge")
+    table = judge_readings(
+        combinations(pairs),
         runs=runs,
         trials=trials,
-        jobs=_threads(jobs),
-        progress=lambda each: say(
-            f"{' '.join(map(str, each.chosen)) or 'default'}: p = {each.whole.p:.2g}"
-        ),
+        jobs=jobs,
+        progress=lambda combined, p: say(f"{combined}: p = {p:g}"),
     )
-    table = judged_table(judged)
-    publish(folder, {"readings.csv": _csv(table)})
+    publish(folder, {"readings.csv": csv_of(table)})
     show_frame(table[["readings", "log likelihood", "p", "verdict"]])
     say(f"Written: {folder / 'readings.csv'}")
 
@@ -92,19 +88,18 @@ def goals(
 
     It keeps an ensemble of them.
     """
-    from coartic.analysis.reconstruction.reconstruct import Effort, reconstruct, search_for
+    from coartic.analysis.reconstruction.ensemble import reconstruct
+    from coartic.analysis.reconstruction.search import search_for
 
     check_numbers(jobs, None)
     names = [f"{task}-members.csv", f"{task}-tried.csv"]
-    search = search_for(task, readings=tuple(reading or ()), jobs=_threads(jobs))
-    out = _folder(folder, names)
-    found = reconstruct(search, effort=Effort(members=members, runs=runs), report=say)
-    tables = zip(names, (found.members, found.tried), strict=True)
-    publish(out, {name: _csv(table) for name, table in tables})
-    say(
-        f"The nearest set lies {found.nearest.distance:.2f} standard errors from the printed "
-        "results."
-    )
+    search = search_for(task, readings=tuple(reading or ()), jobs=jobs)
+    out = checked_folder(folder, names)
+    ensemble = reconstruct(search, members=members, runs=runs, report=say)
+    tables = zip(names, (ensemble, search.tried_table), strict=True)
+    publish(out, {name: csv_of(table) for name, table in tables})
+    distance = ensemble.distance[0]
+    say(f"The nearest set lies {distance:.2f} standard errors from the printed results.")
     say(f"Written: {out / names[0]} and {out / names[1]}")
 
 
@@ -116,7 +111,7 @@ def results(
     runs: Annotated[
         int, typer.Option(parser=at_least(3), metavar="N", help="Runs of each condition.")
     ] = 100,
-    trials: _TrialsOf = 10_000,
+    trials: TrialsOfRun = 10_000,
     out: Annotated[
         str | None, typer.Option(metavar="FOLDER", help="Folder for a table of it.")
     ] = None,
@@ -124,16 +119,22 @@ def results(
     jobs: given.Jobs = -1,
 ) -> None:
     """Compare every printed result of a task with fresh runs."""
-    from coartic.analysis.reconstruction.lines import lines
+    from coartic.analysis.reconstruction.scoring import beside_printed
 
     check_numbers(jobs, None)
-    folder = None if out is None else _folder(out, ["printed.csv"])
-    chosen, threads = tuple(reading or ()), _threads(jobs)
-    table = lines(tasks, readings=chosen, runs=runs, trials=trials, jobs=threads, progress=say)
+    folder = None if out is None else checked_folder(out, ["printed.csv"])
+    table = beside_printed(
+        tasks,
+        readings=tuple(reading or ()),
+        runs=runs,
+        trials=trials,
+        jobs=jobs,
+        progress=say,
+    )
     columns = ["figure", "task", "printed", "sd", "ours", "our_sd", "runs", "verdict"]
-    show_frame(table[columns].map(_short))
+    show_frame(table[columns].map(short))
     if folder is not None:
-        publish(folder, {"printed.csv": _csv(table)})
+        publish(folder, {"printed.csv": csv_of(table)})
         say(f"Written: {folder / 'printed.csv'}")
 
 
@@ -151,48 +152,47 @@ def claims(
     """Judge the claims under other readings and goals."""
     from coartic.analysis import load
     from coartic.analysis.figures.plot import FORMATS, picture
-    from coartic.analysis.reconstruction.curve import specification_curve, verdicts
-    from coartic.analysis.reconstruction.specifications import judged_specifications, shares
+    from coartic.analysis.figures.robustness import specification_curve, verdicts
+    from coartic.analysis.reconstruction.robustness import judged_specifications, shares
 
     check_numbers(jobs, None)
     tables = ("specifications.csv", "shares.csv")
     pictures = [f"{name}{kind}" for name in ("verdicts", "specification-curve") for kind in FORMATS]
-    folder = _folder(out, [*tables, *pictures])
-    studies = (load(each) for each in folders)
+    folder = checked_folder(out, [*tables, *pictures])
     table = judged_specifications(
-        studies, jobs=_threads(jobs), progress=lambda spec: say(f"Judged: {spec.label}")
+        map(load, folders),
+        jobs=jobs,
+        progress=lambda specification: say(f"Judged: {specification.label}"),
     )
     if table.empty:
         raise CoarticError(
             "no claim of the paper can be judged there. Run its conditions with 10 000 trials."
         )
-    counted = shares(table)
-    files = dict(zip(tables, map(_csv, (table, counted)), strict=True))
+    counts = shares(table)
+    files = dict(zip(tables, map(csv_of, (table, counts)), strict=True))
     figures = [verdicts(table)]
     if table.effect.notna().any():
         figures.append(specification_curve(table))
     files |= {f"{plot.id}{kind}": picture(plot, kind) for plot in figures for kind in FORMATS}
     publish(folder, files)
-    show_frame(counted)
+    show_frame(counts)
     say(f"Written: {folder}")
 
 
-def _folder(name: str, files: Sequence[str], what: str = "--out") -> Path:
+def checked_folder(name: str, files: Sequence[str], what: str = "--out") -> Path:
     """A folder in which the command may write its files, looked at before the work is done."""
     folder = folder_named(name, what)
     check_folder(folder, files)
     return folder
 
 
-def _csv(table: pd.DataFrame) -> bytes:
+def csv_of(table: pd.DataFrame) -> bytes:
+    """A table as a file."""
     return table.to_csv(index=False, lineterminator="\n").encode()
 
 
-def _short(value: object) -> str:
+def short(value: object) -> str:
+    """A cell of a table: numbers with at most three decimals, nothing for NaN."""
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{round(value, 3):g}"
     return str(value)
-
-
-def _threads(jobs: int) -> int:
-    return (os.cpu_count() or 1) if jobs == -1 else max(jobs, 1)

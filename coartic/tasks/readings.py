@@ -8,12 +8,11 @@ robot.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value, read_toml
@@ -21,18 +20,13 @@ from coartic.model import PAPER, MotionModel
 from coartic.tasks.task import Task, parse_task
 from coartic.text import did_you_mean
 
-Part = Literal["model", "condition", "robot"]
-Value = bool | int | float | str
 
-
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Choice(_Frozen):
+class Choice(BaseModel):
     """One way to read the text."""
 
-    value: Value
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    value: bool | int | float | str
     """Of the parameter; lengths in the model's length unit."""
     says: str
     """What it means, in a line."""
@@ -44,9 +38,20 @@ class Choice(_Frozen):
         """The value as it is written after a reading's id: ``0.1``, ``true``, ``left``."""
         return str(self.value).lower() if isinstance(self.value, bool) else str(self.value)
 
+    def is_meant_by(self, text: str) -> bool:
+        """Whether a text is the value; a number may be written in any way."""
+        if isinstance(self.value, bool | str):
+            return text == self.written
+        try:
+            return float(text) == self.value
+        except ValueError:
+            return False
 
-class Reading(_Frozen):
+
+class Reading(BaseModel):
     """An open question about the paper's text."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str
     question: str
@@ -57,14 +62,14 @@ class Reading(_Frozen):
     parameter: Annotated[str, Field(pattern=r"^(model|condition|robot)\.[a-z_]+$")]
     """Where it is applied: part and field."""
     default: Choice
-    alternatives: Annotated[tuple[Choice, ...], Field(min_length=1)]
+    alternatives: tuple[Choice, ...]
     why: str
     """Why the default."""
 
     @property
-    def part(self) -> Part:
-        """What has the field."""
-        return cast(Part, self.parameter.partition(".")[0])
+    def part(self) -> str:
+        """What has the field: ``model``, ``condition`` or ``robot``."""
+        return self.parameter.partition(".")[0]
 
     @property
     def field(self) -> str:
@@ -76,32 +81,12 @@ class Reading(_Frozen):
         """All choices, the default first."""
         return self.default, *self.alternatives
 
-    @model_validator(mode="after")
-    def _distinct(self) -> Reading:
-        values = [choice.written for choice in self.choices]
-        if len(set(values)) < len(values):
-            raise ValueError(f"the choices {', '.join(values)} are not all different")
-        if len({type(choice.value) for choice in self.choices}) > 1:
-            raise ValueError(f"the choices {', '.join(values)} are not of one type")
-        return self
 
-
-@dataclass(frozen=True)
-class ChosenReading:
+class ChosenReading(NamedTuple):
     """A reading with one of its choices."""
 
     reading: Reading
     choice: Choice
-
-    @property
-    def parameter(self) -> str:
-        """Where it is applied: ``condition.ties``."""
-        return self.reading.parameter
-
-    @property
-    def value(self) -> Value:
-        """Of the parameter."""
-        return self.choice.value
 
     def __str__(self) -> str:
         """As :func:`load_reading` takes it."""
@@ -122,8 +107,7 @@ def load_reading(text: str) -> ChosenReading:
     Raises CoarticError for what is not written so, an unknown reading, and a value that is not
     among its choices.
     """
-    written = text if isinstance(text, str) else ""
-    name, sign, value = (part.strip() for part in written.partition("="))
+    name, sign, value = (part.strip() for part in str(text).partition("="))
     known = {reading.id: reading for reading in readings()}
     if not sign:
         raise CoarticError(
@@ -136,7 +120,7 @@ def load_reading(text: str) -> ChosenReading:
         )
     reading = known[name]
     for choice in reading.choices:
-        if value == choice.written or _same_number(value, choice.value):
+        if choice.is_meant_by(value):
             return ChosenReading(reading, choice)
     values = [choice.written for choice in reading.choices]
     raise CoarticError(
@@ -163,36 +147,27 @@ def load_readings(texts: Iterable[str]) -> tuple[ChosenReading, ...]:
     return tuple(new for new in ordered if new.choice != new.reading.default)
 
 
-def _fields(chosen: Iterable[ChosenReading], part: Part) -> dict[str, Any]:
-    return {each.reading.field: each.value for each in chosen if each.reading.part == part}
+def fields_under(chosen: Iterable[ChosenReading], part: str) -> dict[str, Any]:
+    """Fields of the model, a condition or a robot that these readings set."""
+    return {reading.field: choice.value for reading, choice in chosen if reading.part == part}
 
 
 def model_under(chosen: Iterable[ChosenReading]) -> MotionModel:
     """The model as these readings have it."""
-    return PAPER._replace(**_fields(chosen, "model"))
+    return PAPER._replace(**fields_under(chosen, "model"))
 
 
 def condition_under(chosen: Iterable[ChosenReading]) -> dict[str, Any]:
     """Fields of an exploration condition, and parameters of the learner, that they change."""
-    return _fields(chosen, "condition")
+    return fields_under(chosen, "condition")
 
 
 def task_under(chosen: Iterable[ChosenReading], task: Task) -> Task:
     """A task with the robot that these readings have; TaskError where it then is none."""
-    height = _fields(chosen, "robot").get("shoulder_height")
+    height = fields_under(chosen, "robot").get("shoulder_height")
     if height is None:
         return task
     content = task.model_dump(mode="json")
     for side in ("left_shoulder", "right_shoulder"):
         content["robot"][side][1] = height
     return parse_task(content, f"task {task.name!r} with shoulders at {height:g}")
-
-
-def _same_number(text: str, value: Value) -> bool:
-    """Whether the text is the number, however it is written."""
-    if isinstance(value, bool | str):
-        return False
-    try:
-        return float(text) == value
-    except ValueError:
-        return False

@@ -1,0 +1,276 @@
+"""An ensemble of admissible goals, and the one of them nearest to what is printed of learning.
+
+The ensemble is spread by what the corrective process alone does. The nearest is found in waves of
+learning runs that begin there: each performs further runs of fewer points, with seeds that no
+other wave uses, and a point is judged by all its runs so far. Between the waves the neighbourhood
+of the best is searched.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from coartic import CoarticError, hand_sequences
+from coartic.analysis.reconstruction.scoring import (
+    Test,
+    compared,
+    conditions_of,
+    distance,
+    distance_error,
+    learned,
+    printed_tests,
+)
+from coartic.analysis.reconstruction.search import Search
+from coartic.learner.learning import threads_for
+from coartic.motion.sequences import CorrectiveTrials
+from coartic.robot import Array
+from coartic.tasks.readings import condition_under
+
+DECIMALS = 3  # of coordinates
+MOST_NEAR = 20_000
+"""Points of the grid, drawn at random, that are moved to where the printed rewards come out."""
+RANDOM_STEPS = 4_000
+STEP = 0.15  # SD of the random steps, length unit
+POOL = 8_000  # points among which members are spread
+WAVE_SEEDS = 1_000_000  # seeds of a wave begin at a multiple of this
+ENSEMBLE, LAST = 0, 99
+"""Waves that score the members of the ensemble, and the nearest point beside one that stands."""
+CLEARLY = 2.0  # standard errors by which another point has to be nearer
+
+
+class Wave(NamedTuple):
+    """A step of the search for the nearest point."""
+
+    points: int
+    """Of how many points, the best of the wave before."""
+    runs: int
+    """Further runs a condition."""
+    around: int = 0
+    """Further points, in random steps from them."""
+    step: float = 0.0
+    """SD of these steps, length unit."""
+
+
+PLAN = (
+    Wave(points=60, runs=20),
+    Wave(points=12, runs=20, around=60, step=0.1),
+    Wave(points=12, runs=20, around=60, step=0.03),
+    Wave(points=16, runs=60),
+    Wave(points=5, runs=200),
+)
+
+
+class Scored(NamedTuple):
+    """A point ``(P,)``, what was learned there, and how far that is from what is printed."""
+
+    point: Array
+    cells: Mapping[str, pd.DataFrame]
+    """Runs by condition."""
+    comparisons: pd.DataFrame
+    distance: float
+    """Root mean square over the printed figures, standard errors."""
+
+
+def reconstruct(
+    search: Search,
+    *,
+    members: int = 240,
+    runs: int = 20,
+    last: int = 300,
+    plan: Sequence[Wave] = PLAN,
+    trials: int = 10_000,
+    report: Callable[[str], None] = lambda text: None,
+) -> pd.DataFrame:
+    """Search, spread, score and choose.
+
+    A row a member: coordinates, distance, and every figure of ``runs`` runs a condition with its
+    distance. The first is the nearest set that was found; each of the others is as far as
+    possible from those before it. The layout's known sets of goals compete where they meet every
+    constraint, and come last; the first of them stands unless another one is nearer beyond
+    chance, by ``last`` further runs a condition. The result depends on the arguments and on
+    nothing else.
+    """
+    layout = search.layout
+    goals = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
+    known = layout.points(goals)
+    compete = search.admitted(known[layout.allowed(known)], "known")
+    pool = admissible_points(search, report)
+    pool = np.concatenate([compete[:1], without(pool, compete[:1])])
+    sequences = hand_sequences(search.task)
+    printed = [sequences.index(hands) for hands in search.rewards]
+    apart = features(search.attempt(pool, sequences), printed)
+    spread = pool[spread_out(apart, members, 0 if len(compete) else None)]
+
+    score = partial(scored, search, trials=trials)
+    begin = np.concatenate([spread, without(compete, spread)])
+    results = score(begin, wave=ENSEMBLE, runs=runs)
+    report(described(results, runs))
+    nearest = best_of_waves(search, results, plan=plan, trials=trials, report=report).point[None]
+    if len(compete) and not (nearest == compete[:1]).all():
+        both = np.concatenate([nearest, compete[:1]])
+        challenger, standing = score(both, wave=LAST, runs=last)
+        better = clearly_nearer(challenger, standing, printed_tests(search.task.name))
+        report(
+            f"the nearest {challenger.distance:.2f}, the one that stands {standing.distance:.2f}, "
+            f"{last} runs a condition: {'it is replaced' if better else 'it stands'}"
+        )
+        nearest = nearest if better else compete[:1]
+
+    chosen = np.concatenate([nearest, without(spread, nearest)])
+    names = [*(f"m{k:03d}" for k in range(1, len(chosen) + 1)), *layout.known]
+    points = np.concatenate([chosen, known])
+    fresh = np.unique(without(points, begin), axis=0)
+    by_point = {
+        result.point.tobytes(): result
+        for result in (*results, *score(fresh, wave=ENSEMBLE, runs=runs))
+    }
+    rows = [
+        member_row(name, places, by_point[point.tobytes()])
+        for name, places, point in zip(names, layout.places(points), points, strict=True)
+    ]
+    if search.readings:
+        rows = [{"readings": " ".join(map(str, search.readings))} | row for row in rows]
+    return pd.DataFrame(rows)
+
+
+def admissible_points(search: Search, report: Callable[[str], None]) -> Array:
+    """Admissible points with rounded coordinates, without repetitions, in random order."""
+    rng = np.random.default_rng(0)
+    exact, near = search.grid(report)
+    report(f"{len(exact)} round sets of goals meet every constraint, {len(near)} come near")
+    near = near[rng.permutation(len(near))[:MOST_NEAR]]
+    points = np.concatenate([exact, search.admitted(search.solve(near), "moved")])
+    if len(points):
+        points = np.concatenate([points, search.spread(points, RANDOM_STEPS, rng, STEP)])
+    points = np.unique(np.round(points, DECIMALS), axis=0)
+    points = search.admitted(points[search.layout.allowed(points)], "rounded")
+    report(f"{len(points)} sets of goals with {DECIMALS} decimals meet every constraint")
+    if not len(points):
+        raise CoarticError(f"no set of goals of {search.task.name} meets every constraint")
+    return points[rng.permutation(len(points))[:POOL]]
+
+
+def features(trials: CorrectiveTrials, printed: Sequence[int]) -> Array:
+    """What members are told apart by, ``(N, F)``: rewards and postures, which weigh the same.
+
+    The reward of every hand sequence by the corrective process alone, and the postures in which
+    some of them (``printed``, by number) hit the goals. Each group has a variance of 1 in all.
+    """
+    rewards = np.nan_to_num(trials.rewards, nan=-2e3)
+    groups = []
+    for values in (rewards, trials.reached[:, printed].reshape(len(rewards), -1)):
+        spread = values.std(axis=0)
+        varying = spread > 1e-9
+        scaled = (values - values.mean(axis=0))[:, varying] / spread[varying]
+        groups.append(scaled / np.sqrt(max(scaled.shape[1], 1)))
+    return np.hstack(groups)
+
+
+def spread_out(points: Array, count: int, first: int | None = None) -> NDArray[np.int64]:
+    """Indices of ``count`` points, each as far as possible from those before it.
+
+    They begin with ``first``, or with the one nearest to the mean; then greedily the farthest
+    (Gonzalez 1985, doi:10.1016/0304-3975(85)90224-5), so that the first k are spread for every k.
+    """
+    if first is None:
+        first = int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+    chosen, gap = [first], np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        gap = np.minimum(gap, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(np.argmax(gap)))
+    return np.array(chosen, dtype=np.int64)
+
+
+def scored(
+    search: Search,
+    points: Array,
+    *,
+    wave: int,
+    runs: int,
+    trials: int = 10_000,
+    before: Mapping[bytes, Scored] = MappingProxyType({}),
+) -> list[Scored]:
+    """Learning runs at points ``(N, P)``, with the seeds of a wave, beside what is printed.
+
+    Under the conditions of which something is printed. Runs ``before``, by the bytes of the
+    point, count with them.
+    """
+    seeds = range(WAVE_SEEDS * wave, WAVE_SEEDS * wave + runs)
+    conditions = conditions_of(search.task.name, condition_under(search.readings))
+    tests = printed_tests(search.task.name)
+
+    def score(point: Array, goals: Array) -> Scored:
+        task, earlier, cells = search.task_with(goals), before.get(point.tobytes()), {}
+        for name, condition in conditions.items():
+            cell = learned(task, condition, seeds, model=search.model, trials=trials)
+            cells[name] = cell if earlier is None else pd.concat([earlier.cells[name], cell])
+        comparisons = compared(tests, cells)
+        return Scored(point, cells, comparisons, distance(comparisons))
+
+    with ThreadPoolExecutor(threads_for(search.jobs)) as pool:
+        return list(pool.map(score, points, search.layout.places(points)))
+
+
+def best_of_waves(
+    search: Search,
+    results: Sequence[Scored],
+    *,
+    plan: Sequence[Wave] = PLAN,
+    trials: int = 10_000,
+    report: Callable[[str], None] = lambda text: None,
+) -> Scored:
+    """The point that is nearest to what is printed after some waves, which begin with these."""
+    before = {result.point.tobytes(): result for result in results}
+    for number, wave in enumerate(plan, ENSEMBLE + 1):
+        best = sorted(results, key=lambda result: result.distance)[: wave.points]
+        points = np.array([result.point for result in best])
+        if wave.around:
+            rng = np.random.default_rng([number, wave.around])
+            around = np.round(search.spread(points, wave.around, rng, wave.step), DECIMALS)
+            around = search.admitted(around[search.layout.allowed(around)], "around the best")
+            points = np.unique(np.concatenate([points, around]), axis=0)
+        results = scored(search, points, wave=number, runs=wave.runs, trials=trials, before=before)
+        before |= {result.point.tobytes(): result for result in results}
+        report(f"wave {number}: {described(results, wave.runs)}")
+    return min(results, key=lambda result: result.distance)
+
+
+def clearly_nearer(challenger: Scored, standing: Scored, tests: Sequence[Test]) -> bool:
+    """Whether a point is nearer to what is printed than one that stands, beyond chance."""
+    errors = [distance_error(tests, each.cells) for each in (challenger, standing)]
+    return standing.distance - challenger.distance > CLEARLY * math.hypot(*errors)
+
+
+def described(results: Sequence[Scored], runs: int) -> str:
+    """How many sets of goals were scored, by how many further runs, and how far they are."""
+    distances = [result.distance for result in results]
+    return (
+        f"{len(results)} sets of goals, {runs} runs a condition; "
+        f"distances {min(distances):.2f} to {max(distances):.2f}"
+    )
+
+
+def without(points: Array, others: Array) -> Array:
+    """The points that are none of the others."""
+    return np.asarray(points[~(points[:, None] == others).all(axis=2).any(axis=1)])
+
+
+def member_row(name: str, goals: Array, result: Scored) -> dict[str, Any]:
+    """A member's row of the table of an ensemble."""
+    row: dict[str, Any] = {"member": name}
+    for number, (x, y) in enumerate(goals.tolist(), 1):
+        row |= {f"x{number}": round(x, DECIMALS), f"y{number}": round(y, DECIMALS)}
+    row["distance"] = round(result.distance, 3)
+    for label, ours, apart in result.comparisons[["ours", "distance"]].itertuples():
+        row[label] = round(ours, 3 if label.endswith(" share") else 2)
+        row[f"{label}, distance"] = round(apart, 2)
+    return row

@@ -1,0 +1,171 @@
+"""The paper's claims under other readings and with other goals: which hold whatever is chosen.
+
+A specification is a set of readings and a member of an ensemble. Its runs are judged as those of
+the default are. Specifications are not independent samples of anything: shares of them are no
+probabilities, and there is no joint p-value (Simonsohn et al. 2020,
+doi:10.1038/s41562-020-0912-z).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import repeat
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
+from coartic.analysis.claims.register import CLAIMS, Claim
+from coartic.analysis.processes import processes
+from coartic.analysis.reconstruction.search import search_for
+from coartic.analysis.study import Study
+from coartic.runs.plan import variant_of
+from coartic.tasks.members import task_of, with_members
+from coartic.tasks.readings import condition_under, load_readings
+
+COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
+PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
+VERDICTS = ("supported", "not supported", "undecided")
+
+
+class Specification(NamedTuple):
+    """Choices that the paper leaves open."""
+
+    readings: str
+    """Those that are not the default, as ``ties=right``, with spaces between them."""
+    task: str
+    """Whose goals are of a member; empty where all goals are the default ones."""
+    member: str
+
+    @property
+    def label(self) -> str:
+        """Such as ``two-armed-1-m017, ties=right``; ``default`` where nothing differs."""
+        return ", ".join(filter(None, (self.member, *self.readings.split()))) or "default"
+
+
+def judged_specifications(
+    studies: Iterable[Study],
+    *,
+    claims: Iterable[Claim] = PAPERS,
+    jobs: int = 1,
+    progress: Callable[[Specification], None] = lambda specification: None,
+) -> pd.DataFrame:
+    """A row a specification and claim of the paper that its runs can judge.
+
+    Columns ``readings``, ``task``, ``member``, ``claim``, ``verdict``; ``effect``, ``low``,
+    ``high`` and ``p`` of the claim's first test, positive as claimed, NaN where it has none. Of
+    a member are the claims that some member's runs can judge; where another's cannot, it is
+    *undecided*. p-values are not corrected: of most of a family's claims there are no runs here. In
+    ``jobs`` processes; the result is the same.
+    """
+    rows: list[dict[str, Any]] = []
+    judgeable: set[tuple[str, str]] = set()
+    names = [claim.id for claim in claims]
+    views = dict(view for study in studies for view in specifications(study))  # each once
+    with processes(jobs, len(views)) as do:
+        for specification, judged, own in do(judge_view, views, views.values(), repeat(names)):
+            rows += judged
+            judgeable |= {(specification.task, name) for name in own}
+            progress(specification)
+    kept = [row for row in rows if (row["task"], row["claim"]) in judgeable]
+    return pd.DataFrame(kept, columns=list(COLUMNS))
+
+
+def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
+    """The specifications in a folder, each as a study of the paper's tasks under it.
+
+    Members that are not admitted are none of them, nor are those with goals that another one has.
+    Beside a member of one task are the default goals of the others, where the folder has them.
+    """
+    readings = " ".join(study.plan.readings)
+    tasks = {name: task_of(name) for name in study.plan.tasks}
+    plain = {name: name for name, task in tasks.items() if task is None}
+    if plain:
+        yield Specification(readings, "", ""), study_as(study, plain)
+    default = {task: task if task in tasks else f"{task}-m001" for task in with_members()}
+    for task in with_members():
+        others = {at: t for t, at in default.items() if t != task and at in tasks}
+        for name in admitted_members(study, task):
+            yield Specification(readings, task, name), study_as(study, {name: task} | others)
+
+
+def admitted_members(study: Study, task: str) -> list[str]:
+    """Members in a folder that meet every constraint, the first of those with the same goals."""
+    goals: dict[Any, str] = {}
+    for name in study.plan.tasks:
+        if task_of(name) == task:
+            goals.setdefault(study.tasks[name].goals, name)
+    if not goals:
+        return []
+    fits = search_for(task, jobs=1).meets_all(np.array(list(goals)))
+    return [name for name, fit in zip(goals.values(), fits, strict=True) if fit]
+
+
+def study_as(study: Study, names: Mapping[str, str]) -> Study:
+    """A study of some of its tasks alone, by other names.
+
+    Parameters of the learner that the folder's readings set are no variants.
+    """
+    plan = study.plan
+    fields = condition_under(load_readings(plan.readings))
+    cells, variants = [], {}
+    for cell in plan.cells:
+        if cell.task not in names:
+            continue
+        parameters = {
+            key: value for key, value in cell.parameters.items() if fields.get(key) != value
+        }
+        variant = variant_of(parameters, plan.methods[cell.method].defaults)
+        variants[cell.task, cell.method, cell.variant] = variant
+        task = names[cell.task]
+        cells.append(replace(cell, task=task, variant=variant, parameters=parameters))
+    runs = study.runs[study.runs.task.isin(list(names))].copy()
+    keys = zip(runs.task, runs.method, runs.variant, strict=True)
+    runs["variant"] = pd.Series([variants[key] for key in keys], runs.index, "string")
+    runs["task"] = runs.task.map(names).astype(runs.task.dtype)
+    tasks = {new: {**plan.tasks[name], "name": new} for name, new in names.items()}
+    view = replace(plan, tasks=tasks, cells=tuple(cells))
+    return Study(study.folder, view, study.made_with, runs)
+
+
+def judge_view(
+    specification: Specification, view: Study, names: Sequence[str]
+) -> tuple[Specification, list[dict[str, Any]], list[str]]:
+    """Rows of a specification, and the claims that its own runs can judge."""
+    task, rows, own = specification.task, [], []
+    wanted = [CLAIMS[name] for name in names]
+    if task:  # what the default goals of the other task do is no matter of a member's
+        alone = [{t: pairs for t, pairs in claim.pairs.items() if t == task} for claim in wanted]
+        wanted = [
+            claim.model_copy(update={"pairs": pairs}) if pairs else claim
+            for claim, pairs in zip(wanted, alone, strict=True)
+        ]
+    its_runs = set(view.runs.run_id[view.runs.task == task] if task else view.runs.run_id)
+    for judged in judge(view, wanted):
+        claim, finding = judged.claim, judged.finding
+        if its_runs.intersection(judged.run_ids):
+            own.append(claim.id)
+        row = {**specification._asdict(), "claim": claim.id}
+        row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
+        row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
+        if finding.tests:
+            first = finding.tests[0]
+            row |= {"effect": first.estimate, "low": first.low, "high": first.high, "p": first.p}
+        rows.append(row)
+    return specification, rows, own
+
+
+def shares(table: pd.DataFrame) -> pd.DataFrame:
+    """Verdicts of each claim, counted over specifications of one kind.
+
+    ``kind`` is ``readings`` (default goals) or the task whose goals are of members.
+    """
+    kind = table.task.where(table.task != "", "readings")
+    counts = pd.crosstab([table.claim, kind.rename("kind")], table.verdict)
+    counts = counts.reindex(columns=list(VERDICTS), fill_value=0)
+    order = list(dict.fromkeys(zip(table.claim, kind, strict=True)))
+    counts["specifications"] = counts.sum(axis=1)
+    return counts.loc[order].reset_index().rename_axis(columns=None)
