@@ -101,14 +101,14 @@ def _compared(a: CellRuns, b: CellRuns, same_task: bool) -> dict[str, Any]:
     samples: tuple[Array, Array | float] = (b.rewards, a.rewards)
     if len(x) >= FEWEST:
         samples = y - x, 0.0
-    found = difference_of_means(*samples)
+    difference = difference_of_means(*samples)
     test = sign_flip_test(y - x) if len(x) >= FEWEST else bootstrap_test(*samples, "two-sided")
     few = min(len(a.good), len(b.good)) < FEWEST
     agreement = equivalence(*samples, MARGIN * abs(a.rewards.mean()))
     return row | {
-        "difference": found.estimate,
-        "difference_low": found.low,
-        "difference_high": found.high,
+        "difference": difference.estimate,
+        "difference_low": difference.low,
+        "difference_high": difference.high,
         "p": test.p,
         "verdict": "too few runs" if few else agreement.verdict,
     }

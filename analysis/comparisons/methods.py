@@ -122,9 +122,9 @@ def keeps_still(good: pd.DataFrame) -> bool:
 
 def median(values: pd.Series) -> float:
     """Of the values that are known; NaN where none is, as for runs that crashed."""
-    known = numbers(values)
-    known = known[~np.isnan(known)]
-    return float(np.median(known)) if len(known) else math.nan
+    present = numbers(values)
+    present = present[~np.isnan(present)]
+    return float(np.median(present)) if len(present) else math.nan
 
 
 def numbers(values: pd.Series) -> Array:

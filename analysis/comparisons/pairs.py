@@ -102,8 +102,8 @@ def pairs_table(study: Study) -> pd.DataFrame:
             }
         )
     frame = pd.DataFrame(rows, columns=list(COLUMNS))
-    for _, own in frame[frame.kind != "conditions"].groupby("task", sort=False):
-        frame.loc[own.index, "p_holm"] = holm(own.p.astype(float).tolist())
+    for _, of_task in frame[frame.kind != "conditions"].groupby("task", sort=False):
+        frame.loc[of_task.index, "p_holm"] = holm(of_task.p.astype(float).tolist())
     return frame
 
 
@@ -125,7 +125,9 @@ def compared(kind: str, first: CellRuns, second: CellRuns) -> dict[str, Any]:
         test = sign_flip_test(np.subtract(*samples))
     else:
         test = bootstrap_test(*samples, "greater" if kind == "conditions" else "two-sided")
-    notes = dict.fromkeys(found.note for found in (difference, test, better) if found.note)
+    notes = dict.fromkeys(
+        inference.note for inference in (difference, test, better) if inference.note
+    )
     return {
         "difference": difference.estimate,
         "difference_low": difference.low,

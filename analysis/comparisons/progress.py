@@ -61,7 +61,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     are those of :func:`coartic.analysis.comparisons.methods.solve_times`: without building.
     """
     trials_of = dict(study.rewards())
-    found = {}
+    by_run = {}
     for cell in study.cells.values():
         runs = cell.runs.assign(solve_s=solve_times(cell.good).reindex(cell.runs.index))
         totals = zip(*(numbers(runs[name]).tolist() for name in SPENDS), strict=True)
@@ -76,8 +76,8 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
                 steps = np.array([float(reward)]), spent_at_once
             else:
                 steps = improvements(trials, total)
-            found[run_id] = BestSoFar(*steps, total, learns=trials is not None)
-    return found
+            by_run[run_id] = BestSoFar(*steps, total, learns=trials is not None)
+    return by_run
 
 
 def cells_by_spend(study: Study) -> Iterator[tuple[CellRuns, str, list[BestSoFar]]]:

@@ -58,8 +58,10 @@ class Targets:
         Infinite where the target is not reached.
         """
         self.sizes = tuple(map(len, spends))
-        values = np.concatenate([own.ravel() for own in spends])
-        weights = np.concatenate([np.full(own.size, 1 / own.size / len(spends)) for own in spends])
+        values = np.concatenate([of_task.ravel() for of_task in spends])
+        weights = np.concatenate(
+            [np.full(of_task.size, 1 / of_task.size / len(spends)) for of_task in spends]
+        )
         order = np.argsort(values, kind="stable")
         self.values, self.weights = values[order], weights[order]
         self.runs = order // len(WAY)
@@ -126,14 +128,14 @@ def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
     for cell, spend, runs in cells_by_spend(study):
         if cell.task in scale and runs and not is_variant(cell.label) | is_search(cell.label):
             spends[cell.task, cell.label, spend] = spent_at(runs, spend, *scale[cell.task])
-    found = {}
+    over_all = {}
     rows = gaps(study).drop_duplicates(["method", "task"])
-    for method, own in rows.groupby("method", sort=False):
+    for method, cells in rows.groupby("method", sort=False):
         for spend in SPENDS:
-            keys = [(task, label, spend) for task, label in zip(own.task, own.label, strict=True)]
+            keys = [(*cell, spend) for cell in zip(cells.task, cells.label, strict=True)]
             if 1 < len(scale) == len(keys) and spends.keys() >= set(keys):
-                found[ALL_TASKS, str(method), spend] = Targets([spends[key] for key in keys])
-    return found or {key: Targets([own]) for key, own in spends.items()}
+                over_all[ALL_TASKS, str(method), spend] = Targets([spends[key] for key in keys])
+    return over_all or {key: Targets([spent]) for key, spent in spends.items()}
 
 
 def spent_at(runs: Sequence[BestSoFar], spend: str, start: float, best: float) -> Array:
@@ -163,11 +165,11 @@ def price(study: Study) -> pd.DataFrame:
             row["reached"] = by_method[over, label, "trials"].share()
             for name, spend, level in PRICES:
                 if (over, label, spend) in by_method:
-                    found = by_method[over, label, spend].crossing(level)
+                    crossing = by_method[over, label, spend].crossing(level)
                     row |= {
-                        name: found.budget,
-                        f"{name}_low": found.low,
-                        f"{name}_high": found.high,
+                        name: crossing.budget,
+                        f"{name}_low": crossing.low,
+                        f"{name}_high": crossing.high,
                     }
             rows[label] = row
     columns = [f"{name}{end}" for name, *_ in PRICES for end in ("", "_low", "_high")]

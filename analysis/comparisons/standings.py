@@ -43,13 +43,13 @@ def ends(study: Study) -> dict[str, tuple[float, int]]:
     optimum that with all joints free.
     """
     alone = study.sequences.set_index(["task", "hands"]).reward
-    found = {}
+    by_task = {}
     for name, task in study.tasks.items():
         best = study.optima.get((name, "free"))
         start = alone.get((name, initial_hands(task, model=study.model)))
         if best is not None and not pd.isna(start) and 0 != best.reward > start:
-            found[name] = float(start), best.reward
-    return found
+            by_task[name] = float(start), best.reward
+    return by_task
 
 
 @cached
@@ -65,8 +65,10 @@ def gaps(study: Study) -> pd.DataFrame:
         if task in ends(study):
             rewards = cell.runs.reward.where(cell.runs.status == "ok")
             gap = gap_share(rewards.to_numpy(np.float64, na_value=math.nan), ends(study)[task][1])
-            own = cell.runs[["run", "seed"]].assign(task=task, method=label, label=label, gap=gap)
-            parts.append(own[frame.columns])
+            of_cell = cell.runs[["run", "seed"]].assign(
+                task=task, method=label, label=label, gap=gap
+            )
+            parts.append(of_cell[frame.columns])
     frame = pd.concat(parts or [frame], ignore_index=True)
     one_armed = frame[frame.label == EC1]
     for more in (EC4, EC3):
@@ -107,7 +109,7 @@ def over_all(study: Study) -> Iterator[Standing]:
     """Methods with a solution to every run of every task, where there are several."""
     tasks = ends(study)
     for name, runs in gaps(study).groupby("method", sort=False):
-        by_task = {str(task): own.gap.to_numpy() for task, own in runs.groupby("task")}
+        by_task = {str(task): of_task.gap.to_numpy() for task, of_task in runs.groupby("task")}
         if len(tasks) > 1 and len(by_task) == len(tasks) and runs.gap.notna().all():
             gap = task_mean(by_task)
             yield ALL_TASKS, str(name), gap.estimate, gap.low, gap.high, len(runs)
@@ -116,11 +118,11 @@ def over_all(study: Study) -> Iterator[Standing]:
 def task_by_task(study: Study) -> Iterator[Standing]:
     """Methods with a solution to every run of a task."""
     for (task, label), cell in study.cells.items():
-        known = not math.isnan(method_rows(study).gap[task, label])
-        if known and len(cell.good) == len(cell.runs):
-            best, found = study.optima[task, "free"].reward, mean(cell.rewards)
+        has_gap = not math.isnan(method_rows(study).gap[task, label])
+        if has_gap and len(cell.good) == len(cell.runs):
+            best, reward = study.optima[task, "free"].reward, mean(cell.rewards)
             # The higher the reward, the smaller the gap.
-            gap, low, high = gap_share([found.estimate, found.high, found.low], best).tolist()
+            gap, low, high = gap_share([reward.estimate, reward.high, reward.low], best).tolist()
             yield task, label, gap, low, high, len(cell.runs)
 
 
@@ -155,4 +157,4 @@ def apart_p(study: Study, first: str, second: str) -> float:
         differences.append((both.gap_x - both.gap_y).to_numpy(np.float64))
     if not differences or not all(map(len, differences)):
         return math.nan
-    return sign_flip_test(np.concatenate([own / len(own) for own in differences])).p
+    return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences])).p

@@ -51,15 +51,15 @@ class Contrast(NamedTuple):
 def contrasts(study: Study) -> list[Contrast]:
     """Every contrast of :data:`CONTRASTS` in every family, then over all; none without any."""
     instances = sample(study)
-    found: list[Contrast] = []
+    rows: list[Contrast] = []
     if instances is None:
-        return found
+        return rows
     for first, second in CONTRASTS:
         names = instances.shared(first, second)
-        groups = [{family: own} for family, own in names.items()]
+        groups = [{family: of_family} for family, of_family in names.items()]
         groups += [names] if len(names) > 1 else []
-        found += [_contrast(instances, first, second, group) for group in groups]
-    return found
+        rows += [_contrast(instances, first, second, group) for group in groups]
+    return rows
 
 
 def gains(sample: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]) -> Scores:
@@ -71,8 +71,8 @@ def gains(sample: Sample, first: str, second: str, names: dict[str, tuple[str, .
         return -gap
 
     return {
-        family: [(share(name, first), share(name, second)) for name in own]
-        for family, own in names.items()
+        family: [(share(name, first), share(name, second)) for name in of_family]
+        for family, of_family in names.items()
     }
 
 
@@ -81,10 +81,11 @@ def _contrast(
 ) -> Contrast:
     scores = gains(sample, first, second, names)
     # Equal means of different runs may differ in the last bit.
-    values = np.array([value(runs) for own in scores.values() for runs in own]).round(12)
+    of_instances = [runs for of_family in scores.values() for runs in of_family]
+    values = np.array(list(map(value, of_instances))).round(12)
     hands = {
-        family: [(_by_hands(sample, n, first), _by_hands(sample, n, second)) for n in own]
-        for family, own in names.items()
+        family: [(_by_hands(sample, n, first), _by_hands(sample, n, second)) for n in of_family]
+        for family, of_family in names.items()
     }
     return Contrast(
         *(first, second, next(iter(names)) if len(names) == 1 else "", len(values)),
@@ -93,15 +94,15 @@ def _contrast(
         hands=other_tasks(hands),
         better=int((values > 0).sum()),
         worse=int((values < 0).sum()),
-        told=sum(told_apart(*runs) for own in scores.values() for runs in own),
+        told=sum(told_apart(*runs) for runs in of_instances),
     )
 
 
 def _by_hands(sample: Sample, name: str, label: str) -> Array:
     """Best known reward with the hands of each run (n,), as a share of the best known."""
-    known, best = sample.by_hands[name], sample.references[name].best
+    best_by_hands, best = sample.by_hands[name], sample.references[name].best
     hands = sample.study.cells[name, label].good.hands
-    return np.array([known[str(sequence)] for sequence in hands]) / abs(best)
+    return np.array([best_by_hands[str(sequence)] for sequence in hands]) / abs(best)
 
 
 def told_apart(first: Array, second: Array) -> bool:

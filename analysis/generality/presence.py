@@ -37,14 +37,14 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
 
     Signs by the names of :data:`SIGNS`, of the runs (n,) that have a value; without none of it.
     """
-    found = {}
+    by_cell = {}
     instances = sample(study)
     for name in instances.references if instances else ():
         for label in CONDITIONS:
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
-                found[name, label] = _values(study.trajectories(name, label))
-    return found
+                by_cell[name, label] = _values(study.trajectories(name, label))
+    return by_cell
 
 
 def _values(cell: Trajectories) -> dict[str, Array]:
@@ -53,8 +53,8 @@ def _values(cell: Trajectories) -> dict[str, Array]:
     change = cell.against_same_hands.astype(np.float64)
     values = dict(zip(("hand", "arm", "other arm"), of_runs.T, strict=True))
     values |= {"first": change[:, 0], "whole": -change.sum(axis=1)}
-    known = {name: column[~np.isnan(column)] for name, column in values.items()}
-    return {name: column for name, column in known.items() if len(column)}
+    present = {name: column[~np.isnan(column)] for name, column in values.items()}
+    return {name: column for name, column in present.items() if len(column)}
 
 
 def _of_run(cell: Trajectories, run: Trajectory) -> tuple[float, float, float]:
@@ -67,8 +67,8 @@ def _of_run(cell: Trajectories, run: Trajectory) -> tuple[float, float, float]:
     waiting = math.nan
     if two and cell.initial is not None:
         nearer = preshaping(run, cell.initial)
-        known = nearer[~np.isnan(nearer)]
-        waiting = float(known.mean()) if len(known) else math.nan
+        of_goals = nearer[~np.isnan(nearer)]
+        waiting = float(of_goals.mean()) if len(of_goals) else math.nan
     return hand, arm, waiting
 
 
@@ -91,20 +91,20 @@ rounding can make."""
 
 def presence(sample: Sample) -> list[Presence]:
     """Every signature by condition and family, and over all families."""
-    rows, found = [], signs(sample.study)
+    rows, by_cell = [], signs(sample.study)
     for label in CONDITIONS:
         for sign in SIGNS:
             scores = {}
             for family, names in sample.families.items():
-                values = [found.get((name, label), {}).get(sign) for name in names]
-                own = [(of_runs,) for of_runs in values if of_runs is not None]
-                if own:
-                    scores[family] = own
-            parts = [{family: own} for family, own in scores.items()]
+                values = [by_cell.get((name, label), {}).get(sign) for name in names]
+                instances = [(of_runs,) for of_runs in values if of_runs is not None]
+                if instances:
+                    scores[family] = instances
+            parts = [{family: instances} for family, instances in scores.items()]
             for part in [*parts, scores] if len(parts) > 1 else parts:
-                means = [float(runs[0].mean()) for own in part.values() for runs in own]
+                means = [float(runs[0].mean()) for instances in part.values() for runs in instances]
                 family = next(iter(part)) if len(part) == 1 else ""
                 there = sum(value > THERE[sign] for value in means)
-                found_in = other_tasks(part)
-                rows.append(Presence(family, label, sign, len(means), found_in, there))
+                mean = other_tasks(part)
+                rows.append(Presence(family, label, sign, len(means), mean, there))
     return rows

@@ -43,16 +43,16 @@ class Sample:
     @cached_property
     def tasks(self) -> dict[str, Task]:
         """The instances by name."""
-        found = self.study.tasks.items()
-        return {name: task for name, task in found if task.family is not None}
+        items = self.study.tasks.items()
+        return {name: task for name, task in items if task.family is not None}
 
     @cached_property
     def families(self) -> dict[str, tuple[str, ...]]:
         """Names of the instances with a reference, by family with its version."""
-        found: dict[str, list[str]] = {}
+        names_by_family: dict[str, list[str]] = {}
         for name in self.references:
-            found.setdefault(str(self.tasks[name].family), []).append(name)
-        return {family: tuple(names) for family, names in found.items()}
+            names_by_family.setdefault(str(self.tasks[name].family), []).append(name)
+        return {family: tuple(names) for family, names in names_by_family.items()}
 
     @cached_property
     def references(self) -> dict[str, ReferenceReward]:
@@ -60,15 +60,15 @@ class Sample:
         runs = self.study.runs
         solved = runs[(runs.status == "ok") & runs.task.isin(list(self.tasks))]
         highest = solved.groupby("task").reward.max()
-        found = {}
+        by_name = {}
         for name in self.tasks:
             optimum = self.study.optima.get((name, "free"))
-            known = [int(highest[name])] if name in highest.index else []
+            rewards = [int(highest[name])] if name in highest.index else []
             if optimum is not None:
-                known.append(optimum.reward)
-            if known and max(known) < 0:
-                found[name] = ReferenceReward(max(known), optimum.bound if optimum else None)
-        return found
+                rewards.append(optimum.reward)
+            if rewards and max(rewards) < 0:
+                by_name[name] = ReferenceReward(max(rewards), optimum.bound if optimum else None)
+        return by_name
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -104,23 +104,23 @@ class Sample:
 
         A family without one is left out.
         """
-        found: dict[str, list[Runs]] = {}
+        by_family: dict[str, list[Runs]] = {}
         for family in families or self.families:
             for name in self.families.get(family, ()):
                 gap = self.gap(name, label, to_bound=to_bound)
                 if gap is not None:
-                    found.setdefault(family, []).append((gap,))
-        return found
+                    by_family.setdefault(family, []).append((gap,))
+        return by_family
 
     def shared(self, *labels: str) -> dict[str, tuple[str, ...]]:
         """Names of the instances that all of the methods solved in some run, by family."""
-        found = {
+        by_family = {
             family: tuple(
                 n for n in names if all(self.gap(n, label) is not None for label in labels)
             )
             for family, names in self.families.items()
         }
-        return {family: names for family, names in found.items() if names}
+        return {family: names for family, names in by_family.items() if names}
 
     @cached_property
     def by_hands(self) -> dict[str, dict[str, int]]:
@@ -134,11 +134,11 @@ class Sample:
         solved = runs[runs.status == "ok"][columns]
         every = pd.concat([solved, sequences[sequences.reward.notna()][columns]])
         every = every[every.task.isin(list(self.references))]
-        found: dict[str, dict[str, int]] = {}
-        for name, own in every.groupby("task"):
-            best = own.groupby("hands").reward.max()
-            found[str(name)] = {str(hands): int(reward) for hands, reward in best.items()}
-        return found
+        by_name: dict[str, dict[str, int]] = {}
+        for name, of_instance in every.groupby("task"):
+            best = of_instance.groupby("hands").reward.max()
+            by_name[str(name)] = {str(hands): int(reward) for hands, reward in best.items()}
+        return by_name
 
 
 def one_by_one(study: Study) -> set[str]:
@@ -150,5 +150,5 @@ def one_by_one(study: Study) -> set[str]:
 @cached
 def sample(study: Study) -> Sample | None:
     """The instances of a folder; None where it has none with a solution."""
-    found = Sample(study)
-    return found if found.tasks and found.references else None
+    instances = Sample(study)
+    return instances if instances.tasks and instances.references else None

@@ -83,19 +83,19 @@ def _welch(value: float, variances: list[tuple[float, int]], margin: float) -> E
     """
     n = tuple(count for _, count in variances)
     name = "Welch's interval" if len(n) > 1 else "Student's interval, the other mean as exact"
-    found = Equivalence(value, n, f"difference of means, {name}", margin=margin)
+    inference = Equivalence(value, n, f"difference of means, {name}", margin=margin)
     if min(n) < 2:
-        return replace(found, note="no interval: fewer than 2 values")
+        return replace(inference, note="no interval: fewer than 2 values")
     parts = [variance / count for variance, count in variances]
     total = sum(parts)
     if total == 0.0:
-        return replace(found, low=value, high=value, note=NO_SPREAD)
+        return replace(inference, low=value, high=value, note=NO_SPREAD)
     free = [count - 1 for count in n]
     freedom = total**2 / sum(part**2 / k for part, k in zip(parts, free, strict=True))
     error = math.sqrt(total)
     interval = student(value, error, freedom)
     p = float(special.stdtr(freedom, (abs(value) - margin) / error))
-    return replace(found, low=interval.low, high=interval.high, p=p)
+    return replace(inference, low=interval.low, high=interval.high, p=p)
 
 
 def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:

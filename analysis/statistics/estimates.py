@@ -221,11 +221,11 @@ def bootstrap_estimate(
     ``note`` says which it is.
     """
     estimate, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
-    found = Inference(estimate, n, f"{name}, BCa bootstrap, {resamples} resamples")
+    inference = Inference(estimate, n, f"{name}, BCa bootstrap, {resamples} resamples")
     if min(n) < FEWEST:
-        return replace(found, note=f"no interval: a sample has fewer than {FEWEST} values")
+        return replace(inference, note=f"no interval: a sample has fewer than {FEWEST} values")
     if not any(map(varies, samples)):
-        return replace(found, low=estimate, high=estimate, note=NO_SPREAD)
+        return replace(inference, low=estimate, high=estimate, note=NO_SPREAD)
     large = max(n) > LARGE
     resamples = min(resamples, RESAMPLES_OF_LARGE) if large else resamples
     with warnings.catch_warnings():
@@ -244,11 +244,11 @@ def bootstrap_estimate(
         )
     low, high = map(float, result.confidence_interval)
     if math.isfinite(low) and math.isfinite(high) and not large:
-        return replace(found, low=low, high=high, seed=seed)
+        return replace(inference, low=low, high=high, seed=seed)
     low, high = map(float, np.quantile(result.bootstrap_distribution, TAILS))
     method = f"{name}, percentile bootstrap, {resamples} resamples"
     note = "" if large else "BCa is not defined for this sample"
-    return replace(found, method=method, low=low, high=high, seed=seed, note=note)
+    return replace(inference, method=method, low=low, high=high, seed=seed, note=note)
 
 
 def student(value: float, error: float, freedom: float, p: float = math.nan) -> Interval:
@@ -273,5 +273,5 @@ def standard_deviation(values: Array) -> float:
 @cache
 def wilson(count: int, total: int) -> Interval:
     """``count`` of ``total`` runs as a share, with Wilson's interval (1927)."""
-    found = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
-    return Interval(count / total, float(found.low), float(found.high))
+    ends = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
+    return Interval(count / total, float(ends.low), float(ends.high))

@@ -65,18 +65,18 @@ def bootstrap_test(
     """
     samples = samples_of(first, second)
     estimate = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
-    found = Inference(
+    inference = Inference(
         estimate,
         tuple(map(len, samples)),
         f"{TAILS[alternative]} {'two' if len(samples) > 1 else 'one'}-sample bootstrap test "
         f"of the mean, studentised, {resamples} resamples",
     )
-    if min(found.n) < 2:
-        return replace(found, note="no test: a sample has fewer than 2 values")
+    if min(inference.n) < 2:
+        return replace(inference, note="no test: a sample has fewer than 2 values")
     shifted = list(map(centred, samples))
     size = max(np.abs(values).max() for values in shifted)
     if not size:
-        return replace(found, note="no test: no spread to resample")
+        return replace(inference, note="no test: no spread to resample")
     observed = estimate / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
     rng = np.random.default_rng(seed)
     sums, variances = np.zeros(resamples), np.zeros(resamples)
@@ -96,7 +96,7 @@ def bootstrap_test(
         null, observed = np.abs(null), abs(observed)
     extreme = null <= observed if alternative == "less" else null >= observed
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
-    return replace(found, p=float(1 + extreme.sum()) / (1 + resamples), seed=seed)
+    return replace(inference, p=float(1 + extreme.sum()) / (1 + resamples), seed=seed)
 
 
 def sign_flip_test(differences: ArrayLike, alternative: Alternative = "two-sided") -> Inference:
@@ -108,14 +108,14 @@ def sign_flip_test(differences: ArrayLike, alternative: Alternative = "two-sided
     """
     values = sample(differences)
     exact = 2 ** len(values) <= RESAMPLES
-    found = Inference(
+    inference = Inference(
         float(values.mean()),
         (len(values),),
         f"{TAILS[alternative]} sign-flip test of paired differences, "
         + ("exact" if exact else f"{RESAMPLES} resamples"),
     )
     if len(values) < 2:
-        return replace(found, note="no test: fewer than 2 pairs")
+        return replace(inference, note="no test: fewer than 2 pairs")
     result = stats.permutation_test(
         (values,),
         np.mean,
@@ -126,7 +126,7 @@ def sign_flip_test(differences: ArrayLike, alternative: Alternative = "two-sided
         batch=max(1, min(1_000, AT_ONCE // len(values))),
         rng=np.random.default_rng(SEED),
     )
-    return replace(found, p=float(result.pvalue), seed=None if exact else SEED)
+    return replace(inference, p=float(result.pvalue), seed=None if exact else SEED)
 
 
 def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:
@@ -155,13 +155,13 @@ def independence_test(
     if min(n, m) < 1:
         raise ValueError("a row has no counts")
     apart = float(np.abs(rows[0] / n - rows[1] / m).sum() / 2)
-    found = Inference(apart, (n, m), "Fisher's exact test")
+    inference = Inference(apart, (n, m), "Fisher's exact test")
     pairs = zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True)
     *columns, (last, of_first) = sorted(pairs)
     if math.prod(count + 1 for count, _ in columns) > MOST_TABLES:
         method = stats.MonteCarloMethod(rng=np.random.default_rng(seed))
         p = float(stats.fisher_exact(rows, method=method).pvalue)
-        return replace(found, method=f"{found.method}, Monte Carlo", p=p, seed=seed)
+        return replace(inference, method=f"{inference.method}, Monte Carlo", p=p, seed=seed)
     # Ways to choose the first row's runs, by how many it has of the columns so far.
     ways, seen = {0: [1]}, math.comb(last, of_first)
     for count, in_first in columns:
@@ -177,7 +177,7 @@ def independence_test(
         for product in products
         if product * math.comb(last, n - used) <= seen
     )
-    return replace(found, p=extreme / math.comb(n + m, n))
+    return replace(inference, p=extreme / math.comb(n + m, n))
 
 
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:

@@ -58,7 +58,7 @@ def task_mean(values: Mapping[str, ArrayLike]) -> Inference:
 
 def value(runs: Runs) -> float:
     """Of an instance: the mean over runs, or the difference of two."""
-    return float(runs[0].mean()) - math.fsum(float(own.mean()) for own in runs[1:])
+    return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
 def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
@@ -72,22 +72,26 @@ def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
-    values = {family: np.array(list(map(value, own))) for family, own in scores.items()}
-    estimate = float(np.mean([own.mean() for own in values.values()]))
+    values = {family: np.array(list(map(value, instances))) for family, instances in scores.items()}
+    estimate = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
     name = f"mean over instances, families alike; hierarchical bootstrap, {RESAMPLES} resamples"
     if min(n) < FEWEST:
         note = f"no interval: a family has fewer than {FEWEST} instances"
         return Inference(estimate, n, name, note=note)
     deviations = np.zeros(RESAMPLES)
-    for place, (family, own) in enumerate(scores.items()):
+    for place, (family, instances) in enumerate(scores.items()):
         rng = np.random.default_rng([seed, place])
-        deviations += resampled_deviations(own, values[family], rng)
+        deviations += resampled_deviations(instances, values[family], rng)
     if np.abs(deviations).max() <= NEGLIGIBLE * abs(estimate):
         return Inference(estimate, n, name, estimate, estimate, note=NO_SPREAD)
     low, high = estimate + np.quantile(deviations / len(values), TAILS)
-    least = np.mean([min(-greatest_value(runs, -1) for runs in own) for own in scores.values()])
-    most = np.mean([max(greatest_value(runs, 1) for runs in own) for own in scores.values()])
+    least = np.mean(
+        [min(-greatest_value(runs, -1) for runs in instances) for instances in scores.values()]
+    )
+    most = np.mean(
+        [max(greatest_value(runs, 1) for runs in instances) for instances in scores.values()]
+    )
     ends = max(float(low), float(least)), min(float(high), float(most))
     return Inference(estimate, n, name, *ends, seed=seed)
 
@@ -95,7 +99,7 @@ def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
 def greatest_value(runs: Runs, sign: int) -> float:
     """Greatest value that an instance's runs can make, or (``sign`` -1) that less it can."""
     signs = (sign, -sign)
-    return math.fsum(float((s * own).max()) for s, own in zip(signs, runs, strict=False))
+    return math.fsum(float((s * of_runs).max()) for s, of_runs in zip(signs, runs, strict=False))
 
 
 def resampled_deviations(
