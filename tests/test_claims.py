@@ -10,14 +10,14 @@ import pytest
 from scipy import stats
 
 from coartic import corrective_trial, load_task, trajectory
-from coartic.analysis.claims import general, judge
-from coartic.analysis.claims.data import FREE, MissingError
+from coartic.analysis.claims import judge, single
+from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.ensemble import held_by
-from coartic.analysis.claims.general import shortest_reach
 from coartic.analysis.claims.judge import by_tests, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
+from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
-from coartic.analysis.signatures.subtasks import isolated_reach, served
+from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
@@ -47,7 +47,7 @@ def planted(holds, *p, ids=("r",), against=None, **more):
         contrary = None if against is None else tuple(map(test, against))
         return Finding(holds, "planted", tuple(map(test, p)), contrary)
 
-    claim = Claim(id="planted", section="s", statement="It is so.", judge="x.y", place="p",
+    claim = Claim(id="planted", section="s", statement="It is so.", rule="planted", place="p",
                   quote="q", **more)  # fmt: skip
     return claim, decide
 
@@ -56,9 +56,9 @@ def judge_planted(monkeypatch, *pairs):
     """Planted claims judged together."""
     claims = []
     for number, (claim, decide) in enumerate(pairs):
-        named = claim.model_copy(update={"id": f"planted-{number}"})
-        monkeypatch.setattr(judge, "JUDGES", {**judge.JUDGES, named.id: decide})
-        claims.append(named)
+        rule = f"planted-{number}"
+        monkeypatch.setitem(judge.RULES, rule, decide)
+        claims.append(claim.model_copy(update={"id": rule, "rule": rule}))
     return judge.judge(nothing(), claims)
 
 
@@ -98,8 +98,8 @@ def test_verdicts(claim, verdict, monkeypatch):
 def test_most_admissible_goals_decide(monkeypatch):
     """A claim on reconstructed goals that most of them refute is not supported."""
     claim, decide = planted(True, 0.001, fitted=True)
+    monkeypatch.setitem(judge.RULES, "planted", decide)
     for name, verdict in (("ec4-mixed", "not supported"), ("arm-coarticulation", "supported")):
-        monkeypatch.setitem(judge.JUDGES, name, decide)
         (entry,) = judge.judge(nothing(), [claim.model_copy(update={"id": name})])
         assert entry.verdict == verdict
 
@@ -306,7 +306,7 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
         ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(10)), "not supported"),
         ("rlrr-better", learner(T2, "EC3", BETTER + WORSE, MIXED, -357), "supported"),
         ("rlrr-better", learner(T2, "EC3", WORSE + BETTER, MIXED, -357), "not supported"),
-        ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "undecided"),  # a tie
+        ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "not supported"),  # a tie
         ("ec3-departs", learner(T2, "EC3", BETTER, "RLLR", -357), "supported"),
         ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3), "supported"),
         ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3, "RRLR"), "not supported"),
@@ -409,7 +409,7 @@ def test_corrections_early_and_late():
             assert judged.verdict == verdict
         # Of 999.9 trials with four goals; first and last tenth.
         early = np.mean([row["early_corrections"] for row in rows[-5:]]) / 3999.6
-        assert f"two-armed-2 EC4 {early:.1%}" in judged.evidence
+        assert f"two-armed-2, EC4: {early:.3f} [" in judged.evidence
 
 
 def ensured(failed=0):
@@ -436,7 +436,7 @@ def test_the_shortest_reach():
     task = load_task("ascending")
     alone = corrective_trial(task, "RRR").configurations
     found = [
-        shortest_reach(task, q, "right", goal, alone[goal - 1], seed=0)
+        shortest_reach(task, q, "right", goal, alone[goal - 1])
         for goal, q in ((1, task.q0), (2, alone[0]))
     ]
     assert found[0] == pytest.approx(1.4)
@@ -458,7 +458,7 @@ def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
 
     The sum over its subtasks would hide that.
     """
-    monkeypatch.setattr(general, "STARTS", 2)
+    monkeypatch.setattr(single, "STARTS", 2)
     claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
     shipped = planted_study(seven([9, 10, 11]))
     assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2
@@ -555,7 +555,7 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
     study = with_paths(planted_study(rows), paths)
     judged = verdict_of("resembles-squared-changes", study)
     assert judged.verdict == verdict
-    assert judged.evidence.count(f"learned solutions {share:.2f} [") == 2
+    assert judged.evidence.count(f"{1 - share:.3f} [".replace("-", "−")) == 2
 
 
 @pytest.mark.parametrize(
@@ -603,23 +603,13 @@ def test_the_other_arm_gets_ready(part, verdict):
     study = with_paths(planted_study(rows), paths)
     judged = verdict_of("other-arm-coarticulation", study)
     assert judged.verdict == verdict, judged.evidence
-    left_at_goal_2 = [
-        task.robot.forward_kinematics(corrective_trial(task, hands).configurations[1], "left")
-        for hands in ("LRLR", "RRRR")
-    ]
-    here, initially = np.linalg.norm(left_at_goal_2 - np.array(task.goals[2]), axis=1)
-    nearer = f"{1 - here / initially:.2f} at goal 2"
-    assert nearer in judged.evidence.split("under EC3")[-1]
-
-
-PLAN = "trajectory-optimisation/path-length"
 
 
 def timed(task, first, others):
     """A run whose first movement takes ``first`` ticks more than initially, the next so many."""
     ticks = corrective_trial(load_task(task), "RRR").ticks_by_goal()
     ticks = [ticks[0] + first, ticks[1] + others, ticks[2]]
-    return SimpleNamespace(execution=SimpleNamespace(ticks_by_goal=lambda: ticks, ticks=sum(ticks)))
+    return SimpleNamespace(execution=SimpleNamespace(hands="RRR", ticks_by_goal=lambda: ticks))
 
 
 @pytest.mark.parametrize(
@@ -642,8 +632,6 @@ def test_the_first_movement_is_sacrificed(first, others, verdict):
         runs += runs[:2]
     judged = verdict_of("first-movement-sacrificed", with_paths(planted_study(rows), paths))
     assert judged.verdict == verdict, judged.evidence
-    both = sum(first + k > 1 and first + k + others < 0 for k in (*SPREAD, *SPREAD[:2]))
-    assert judged.evidence.count(f"both in {both} of 8 runs") == 2
 
 
 def test_little_dependence_on_context():
@@ -717,7 +705,7 @@ def test_the_register_on_runs(study):
     for name in ("first-movement-sacrificed", "ec3-beats-exhaustive"):
         assert entries[name].verdict != "not supported"
     sacrificed = entries["first-movement-sacrificed"]
-    assert "(initially 141)" in sacrificed.finding.evidence
+    assert "ascending, corrective process: 0.0" in sacrificed.finding.evidence
     assert "one goal" not in sacrificed.finding.evidence  # not in this folder
     assert len(sacrificed.run_ids) == 9
     assert set(sacrificed.run_ids) <= set(study.runs.run_id)
@@ -757,19 +745,6 @@ def test_independent_claims_rest_on_printed_tasks(study):
     assert seen > 20
 
 
-def test_a_place_can_be_found_by_a_few_words():
-    for claim in CLAIMS.values():
-        assert claim.place
-        assert 0 < len(claim.quote.split()) <= 12
-        assert "Methods" not in claim.place  # the paper's heading is Method
-
-
-def test_the_register_is_the_same_every_time(study):
-    first, second = judge.judged(study), judge.judged(replace(study))
-    for name in ("verdict", "finding", "run_ids"):
-        assert [repr(getattr(e, name)) for e in first] == [repr(getattr(e, name)) for e in second]
-
-
 @pytest.mark.parametrize(
     ("free", "verdict"),
     [
@@ -780,8 +755,13 @@ def test_the_register_is_the_same_every_time(study):
 )
 def test_the_rail_makes_the_sequence(free, verdict):
     rows = [*learner(T1, "EC3", MIDDLE * 3), *learner(T1, "EC2", LOW, "RRRR")]
-    rows += [*learner(FREE, "EC3", MIDDLE * 3, free), *learner(FREE, "EC2", LOW, "RRRR")]
-    free_base = load_task(T1).model_copy(update={"name": FREE, "locked_base": ()})
+    rows += [
+        *learner("two-armed-1.free-base", "EC3", MIDDLE * 3, free),
+        *learner("two-armed-1.free-base", "EC2", LOW, "RRRR"),
+    ]
+    free_base = load_task(T1).model_copy(
+        update={"name": "two-armed-1.free-base", "locked_base": ()}
+    )
     judged = verdict_of("rail", planted_study(rows, tasks=[free_base]))
     assert judged.verdict == verdict, judged.evidence
 
@@ -860,6 +840,7 @@ def test_every_sentence_is_accounted_for():
 def test_margins_have_a_reason():
     assert all(each["reason"] for each in HISTORY.values())
     assert MARGINS["few"] == 1 - MARGINS["most"]
+    assert MARGINS["ticks"] == ROUNDING
     for claim in CLAIMS.values():
         assert "{" not in judge.test_in_words(claim)
 

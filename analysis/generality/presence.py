@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from coartic import Trajectory
 from coartic.analysis.generality.sample import Sample, sample
 from coartic.analysis.methods import CONDITIONS, TWO_ARMED
-from coartic.analysis.signatures.other_arm import preshaping
-from coartic.analysis.signatures.subtasks import isolated_agreement, served
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics import spread
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study, cached
-from coartic.analysis.trajectories import Trajectories, best_sequences
+from coartic.analysis.trajectories import best_sequences
 from coartic.robot import Array
 
-SIGNS = {
-    "hand": "share of the goals that others follow which are hit with a hand that is not the "
-    "quicker one for them alone",
-    "arm": "ticks by which learned postures leave the next goal nearer, mean over goals",
-    "other arm": "share of its way to its next goal that the waiting arm's hand makes while it "
-    "waits, mean over goals",
-    "first": "ticks by which the first movement is longer than the corrective process's with the "
-    "same hands",
-    "whole": "ticks by which the whole is shorter than it",
-}
-"""What is measured of every run, by name."""
+THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
+"""From where on a sign of :data:`~coartic.analysis.signatures.signs.SIGNS` is there: a tenth of the
+goals, or of the way; more than a tick, which rounding can make."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +29,7 @@ class Signs:
     """Of the runs of a learner on an instance."""
 
     values: dict[str, Array]
-    """By the names of :data:`SIGNS`, of the runs (n,) that have a value; without none of it."""
+    """By the names of :data:`THERE`, of the runs (n,) that have a value; without none of it."""
     hands: tuple[str, ...]
     """Sequence of each run."""
     initial: str
@@ -59,35 +49,10 @@ def signs(study: Study) -> dict[tuple[str, str], Signs]:
                 runs = study.trajectories(name, label)
                 best = best_sequences(study.sequences, name)
                 initial = str(cell.good.initial_hands.iloc[0])
-                found[name, label] = Signs(
-                    _values(runs), tuple(runs.sequences), initial, tuple(best)
-                )
+                measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
+                values = {sign: each for sign, each in measured.items() if len(each)}
+                found[name, label] = Signs(values, tuple(runs.sequences), initial, tuple(best))
     return found
-
-
-def _values(cell: Trajectories) -> dict[str, Array]:
-    # Runs often end in the same solution, but not to the last bit: each is measured.
-    own = [_of_run(cell, run) for run in cell.runs]
-    change = cell.against_same_hands
-    values = {name: np.array([v for v in column if not math.isnan(v)]) for name, column in zip(
-        ("hand", "arm", "other arm"), zip(*own, strict=True), strict=True)}  # fmt: skip
-    values |= {"first": change[:, 0].astype(float), "whole": -change.sum(axis=1).astype(float)}
-    return {name: column for name, column in values.items() if len(column)}
-
-
-def _of_run(cell: Trajectories, run: Trajectory) -> tuple[float, float, float]:
-    """Hand, arm and other arm of :data:`SIGNS`; NaN for what the run does not have."""
-    two = len(cell.task.hands) > 1
-    quicker = isolated_agreement(run)[:-1]
-    hand = 1.0 - sum(quicker) / len(quicker) if two and quicker else math.nan
-    gains = served(run)[:, 1]
-    arm = float(gains.mean()) if np.isfinite(gains).all() else math.nan
-    waiting = math.nan
-    if two and cell.initial is not None:
-        nearer = preshaping(run, cell.initial)
-        known = nearer[~np.isnan(nearer)]
-        waiting = float(known.mean()) if len(known) else math.nan
-    return hand, arm, waiting
 
 
 class Presence(NamedTuple):
@@ -102,16 +67,11 @@ class Presence(NamedTuple):
     """Instances whose mean is beyond :data:`THERE`."""
 
 
-THERE = {"hand": 0.1, "arm": 1.0, "other arm": 0.1, "first": 1.0, "whole": 1.0}
-"""From where on a signature is there: a tenth of the goals, or of the way; more than a tick, which
-rounding can make."""
-
-
 def presence(sample: Sample) -> list[Presence]:
     """Every signature by condition and family, and over all families."""
     rows, found = [], signs(sample.study)
     for label in CONDITIONS:
-        for sign in SIGNS:
+        for sign in THERE:
             scores = {}
             for family, names in sample.families.items():
                 own = [
