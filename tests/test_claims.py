@@ -205,113 +205,58 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
 @pytest.mark.parametrize(
     ("claim", "rows", "verdict"),
     [
+        # Means, against a number.
         ("ec3-beats-exhaustive", learner(T1, "EC3", MIDDLE), "supported"),
         ("ec3-beats-exhaustive", learner(T1, "EC3", LOW), "not supported"),
         ("ec3-beats-exhaustive", learner(T1, "EC3", [-533, -600, -470]), "undecided"),
-        ("ec3-alternates", learner(T1, "EC3", MIDDLE * 3), "supported"),
-        ("ec3-alternates", learner(T1, "EC3", MIDDLE * 3, "RRLR"), "not supported"),
-        ("ec3-alternates", learner(T1, "EC3", MIDDLE[:4]), "undecided"),
-        # More than three quarters of all: 19 of 20 has p = 0.024, 18 of 20 has 0.09.
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR, initial=-500), "not supported"),
+        # Against other runs, all of several comparisons, runs with certain hands.
+        ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH), "supported"),
+        ("ec4-beats-ec3", learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE), "not supported"),
+        ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", MIDDLE[::-1]),
+         "undecided"),
+        ("proficiency-rises", learner(T1, "EC2", LOW) + learner(T1, "EC3", MIDDLE)
+         + learner(T1, "EC4", HIGH) + second(WORSE, BETTER), "supported"),
+        ("proficiency-rises", learner(T1, "EC2", HIGH) + learner(T1, "EC3", MIDDLE)
+         + learner(T1, "EC4", HIGH) + second(WORSE, BETTER), "not supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "undecided"),
+        # Better than all runs of EC2 together, but not than those with RRLR.
+        ("ec3-better-than-ec2", learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE),
+         "not supported"),
+        # More than three quarters: 19 of 20 has p = 0.024, 18 has 0.09; fewer: 11 has 0.041.
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(19)), "supported"),
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(18)), "undecided"),
-        ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(15)), "undecided"),
-        # Fewer than that: 11 of 20 has p = 0.041, 12 of 20 has 0.10.
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(12)), "undecided"),
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(11)), "not supported"),
-        (
-            "ec4-beats-ec3",
-            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH),
-            "supported",
-        ),
-        (
-            "ec4-beats-ec3",
-            learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE),
-            "not supported",
-        ),
-        (
-            "ec4-beats-ec3",
-            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", MIDDLE[::-1]),
-            "undecided",
-        ),
-        (
-            "proficiency-rises",
-            learner(T1, "EC2", LOW) + learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH)
-            + second(WORSE, BETTER),
-            "supported",
-        ),
-        (
-            "proficiency-rises",
-            learner(T1, "EC2", HIGH) + learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH)
-            + second(WORSE, BETTER),
-            "not supported",
-        ),
-        (
-            "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + learner(T2, "EC3", WORSE, ["RRRR"] * 7 + ["RLRR"], -357),
-            "supported",
-        ),
-        (  # no run of task 2 leaves the initial hands
-            "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + learner(T2, "EC3", WORSE, "RRRR", -357),
-            "undecided",
-        ),
-        (
-            "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + learner(T2, "EC3", WORSE * 4, "RRRR", -357),
-            "not supported",
-        ),
-        (
-            "sequences-change",
-            learner(T1, "EC2", LOW * 4, "RRRR") + learner(T1, "EC3", MIDDLE * 4, "RRRR")
-            + learner(T2, "EC3", BETTER, "RLRR", -357),
-            "not supported",
-        ),
-        ("ec2-sequences", learner(T1, "EC2", LOW * 3, "RRRR"), "not supported"),
-        ("ec2-sequences", learner(T1, "EC2", LOW, ["RRLR"] * 4 + ["RRRR"] * 4), "undecided"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE * 3, "RRLR"), "not supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE, "RRLR"), "undecided"),
+        # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, "RRRR", -357), "not supported"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR", "RRRR"] * 4, -357),
-         "undecided"),
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR", "RRRR"] * 20, -357),
          "supported"),
-        # A tenth: too few, but not told from 9 of 20 where there are so few runs.
         ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR"] + ["RRRR"] * 7, -357),
          "undecided"),
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36, -357),
          "not supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", LOW + MIDDLE, RRLR), "not supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "undecided"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR, initial=-500), "not supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE * 3, "RRLR"), "not supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE, "RRLR"), "undecided"),
-        (
-            "ec3-better-than-ec2",
-            learner(T1, "EC2", MIDDLE + LOW, RRLR) + learner(T1, "EC3", HIGH), "supported",
-        ),
-        (  # not what the paper compares: nothing learned RRLR
-            "ec3-better-than-ec2",
-            learner(T1, "EC2", LOW, "LLLR") + learner(T1, "EC3", HIGH), "undecided",
-        ),
-        (  # better than all runs of EC2 together, but not than those with RRLR
-            "ec3-better-than-ec2",
-            learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE), "not supported",
-        ),
-        ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3), "supported"),
-        ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3, "RRLR"), "not supported"),
+        # Exact: a majority, one run.
+        ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(11)), "supported"),
         ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(10)), "not supported"),
-        ("rlrr-better", learner(T2, "EC3", BETTER + WORSE, MIXED, -357), "supported"),
-        ("rlrr-better", learner(T2, "EC3", WORSE + BETTER, MIXED, -357), "not supported"),
         ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "not supported"),  # a tie
-        ("ec3-departs", learner(T2, "EC3", BETTER, "RLLR", -357), "supported"),
-        ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3), "supported"),
-        ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3, "RRLR"), "not supported"),
+        ("ec3-departs", learner(T2, "EC3", BETTER, ["RLLR"] + ["RRRR"] * 7, -357), "supported"),
         ("ec4-mixed", learner(T2, "EC4", WORSE + BETTER, MIXED, -357), "supported"),
         ("ec4-mixed", learner(T2, "EC4", WORSE, "RLRR", -357), "not supported"),
+        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+         + learner(T2, "EC3", WORSE, ["RRRR"] * 7 + ["RLRR"], -357), "supported"),
+        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+         + learner(T2, "EC3", WORSE, "RRRR", -357), "undecided"),
+        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+         + learner(T2, "EC3", WORSE * 4, "RRRR", -357), "not supported"),
+        ("sequences-change", learner(T1, "EC2", LOW * 4, "RRRR")
+         + learner(T1, "EC3", MIDDLE * 4, "RRRR") + learner(T2, "EC3", BETTER, "RLRR", -357),
+         "not supported"),
     ],
 )  # fmt: skip
 def test_judges_on_planted_runs(claim, rows, verdict):
@@ -477,53 +422,38 @@ BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
 PLANS = ("path-length", "squared-changes", "acceleration", "jerk")
 
 
-MORE = "goals, forward kinematics, Jacobian"
 SPREAD = (-1, 0, 1, 0, -1, 1)
 
 
-def beside_plans(reward, plan, spent=1_000_000, *, spread=SPREAD, **more):
+def beside_plans(reward, plan, *, spread=SPREAD):
     """The learner near ``reward`` and plans at ``plan`` (one for all or by cost), everywhere."""
     rows = []
     for task, condition in BEST:
-        rewards = [reward + k for k in spread]
-        rows += learner(task, condition, rewards, forward_kinematics=spent, jacobians=0)
-        rows += [
-            row(
-                f"trajectory-optimisation/{cost}",
-                plan.get(cost, reward) if isinstance(plan, dict) else plan,
-                task=task,
-                **{
-                    "trials": 0, "told": MORE, "forward_kinematics": 50_000, "jacobians": 50_000,
-                    **more,
-                },
-            )
-            for cost in PLANS
-        ]  # fmt: skip
+        rows += learner(task, condition, [reward + k for k in spread])
+        for cost in PLANS:
+            planned = plan.get(cost, reward) if isinstance(plan, dict) else plan
+            rows.append(row(f"trajectory-optimisation/{cost}", planned, task=task, trials=0))
     return rows
 
 
-JUST = {"squared-changes": -302, "acceleration": -300, "jerk": -300}
+JUST = {"squared-changes": -302}
 """One plan a little worse than the learner: p of its test is 0.049, too much times six."""
 
 
 @pytest.mark.parametrize(
-    ("claim", "rows", "verdict"),
+    ("rows", "verdict"),
     [
-        ("beats-inaccurate", beside_plans(-300, -310), "supported"),
-        ("beats-inaccurate", beside_plans(-310, -300), "not supported"),
-        ("beats-inaccurate", beside_plans(-300, -300), "undecided"),
-        ("beats-inaccurate", beside_plans(-300, {**JUST, "squared-changes": -310}), "supported"),
-        (
-            "beats-inaccurate",
-            beside_plans(-300, JUST, spread=(-3, -2, 3, 2, -1, 2)),
-            "undecided",
-        ),
+        (beside_plans(-300, -310), "supported"),
+        (beside_plans(-310, -300), "not supported"),
+        (beside_plans(-300, -300), "undecided"),
+        (beside_plans(-300, {"squared-changes": -310}), "supported"),
+        (beside_plans(-300, JUST, spread=(-3, -2, 3, 2, -1, 2)), "undecided"),
     ],
 )
-def test_judges_beside_planted_plans(claim, rows, verdict):
+def test_judges_beside_planted_plans(rows, verdict):
     study = planted_study(rows)
     for which in ("one", "two"):
-        judged = verdict_of(f"{claim}-{which}-armed", study)
+        judged = verdict_of(f"beats-inaccurate-{which}-armed", study)
         assert judged.verdict == verdict, judged.evidence
 
 
@@ -563,8 +493,6 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
     [
         (load_task(T1), "left", "RRLR", "supported"),
         (load_task(T1), "left", "LRLR", "not supported"),
-        (as_released(T1), "right", "LRLR", "supported"),
-        (as_released(T1), "right", "RRLR", "not supported"),
     ],
 )
 def test_hands_that_serve_other_goals(task, quicker, hands, verdict):
@@ -764,16 +692,6 @@ def test_the_rail_makes_the_sequence(free, verdict):
     )
     judged = verdict_of("rail", planted_study(rows, tasks=[free_base]))
     assert judged.verdict == verdict, judged.evidence
-
-
-@pytest.mark.parametrize(
-    ("one", "verdict"),
-    [(LOW, "supported"), (HIGH, "not supported"), (MIDDLE, "undecided")],
-)
-def test_search_on_two_levels(one, verdict):
-    rows = [*learner(T1, "EC3", MIDDLE), *learner(T1, "EC1", one)]
-    rows += [*learner(T2, "EC3", BETTER, initial=-357), *learner(T2, "EC1", WORSE, initial=-357)]
-    assert verdict_of("multilevel-search", planted_study(rows)).verdict == verdict
 
 
 def test_the_papers_own_p_values():

@@ -33,7 +33,6 @@ from coartic.analysis.signatures.rows import (
 from coartic.analysis.signatures.subtasks import (
     excess,
     isolated_agreement,
-    sacrifice_p,
     sacrifices,
 )
 from coartic.analysis.statistics import intervals
@@ -54,13 +53,10 @@ def against_same_hands(cell: Trajectories, first: Signature, total: Signature) -
 def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that sacrifice the first subtask, against their own hands."""
     changes = cell.against_same_hands
-    if not len(changes):
+    if len(changes):
+        yield share_at(signature, {}, [*map(sacrifices, changes)])
+    else:
         yield from without((signature,), NO_INITIAL if cell.runs else NO_RUN)
-        return
-    share = share_at(signature, {}, [*map(sacrifices, changes)])
-    p = sacrifice_p(changes)
-    untested = "no test: the first subtask or the whole takes the same ticks in every run"
-    yield {**share, "p": p, "why_not": share["why_not"] or untested * math.isnan(p)}
 
 
 def against_isolated_reach(cell: Trajectories, signature: Signature) -> Rows:
