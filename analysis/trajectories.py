@@ -125,8 +125,8 @@ def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
 
     ``sequences`` is a results folder's table of that name. Empty where none has a reward.
     """
-    own = sequences[(sequences.task == task) & sequences.reward.notna()]
-    return [str(hands) for hands in own.hands[own.reward == own.reward.max()]]
+    solved = sequences[(sequences.task == task) & sequences.reward.notna()]
+    return [str(hands) for hands in solved.hands[solved.reward == solved.reward.max()]]
 
 
 def trajectories_of(

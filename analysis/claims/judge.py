@@ -92,8 +92,8 @@ def test_in_words(claim: Claim) -> str:
 
 def p_of(claim: Claim, finding: Finding) -> float:
     """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
-    known = [test.p for test in finding.tests if not math.isnan(test.p)]
-    return max(known) if known and claim.group else math.nan
+    values = [test.p for test in finding.tests if not math.isnan(test.p)]
+    return max(values) if values and claim.group else math.nan
 
 
 def opposite_p(claim: Claim, finding: Finding) -> float:
@@ -102,8 +102,8 @@ def opposite_p(claim: Claim, finding: Finding) -> float:
         p = [test.p for test in finding.against]
     else:
         p = [min(1.0, 1 - test.p + 1 / (RESAMPLES + 1)) for test in finding.tests]
-    known = [value for value in p if not math.isnan(value)]
-    return min(1.0, min(known) * len(known)) if known and claim.group else math.nan
+    values = [value for value in p if not math.isnan(value)]
+    return min(1.0, min(values) * len(values)) if values and claim.group else math.nan
 
 
 @cached
@@ -142,12 +142,12 @@ def see(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
 
 def counts(entries: Iterable[Judged]) -> Mapping[Verdict, int]:
     """How many claims have each verdict; 0 for those that none has."""
-    found: dict[Verdict, int] = {
+    number_of: dict[Verdict, int] = {
         "supported": 0, "used to choose the goals": 0, "not supported": 0, "undecided": 0
     }  # fmt: skip
     for entry in entries:
-        found[entry.verdict] += 1
-    return found
+        number_of[entry.verdict] += 1
+    return number_of
 
 
 @cached

@@ -115,10 +115,10 @@ def judged_instances(data: Data, family: str) -> dict[str, ReferenceReward]:
     """Instances of a family but for those of development, on which methods were tuned."""
     instances = sample(data.study)
     names = instances.families.get(family, ()) if instances else ()
-    kept = [name for name in names if data.task(name).split != "development"]
-    if instances is None or not kept:
+    reported = [name for name in names if data.task(name).split != "development"]
+    if instances is None or not reported:
         raise MissingError(f"this folder has no instances of {family} that can be judged")
-    return {name: instances.references[name] for name in kept}
+    return {name: instances.references[name] for name in reported}
 
 
 def counted(data: Data, claim: Claim) -> Finding:
@@ -130,10 +130,10 @@ def counted(data: Data, claim: Claim) -> Finding:
             condition, what = f"EC{rest}".split(" ", 1)
             findings.append(count_runs(data, task, how, condition, what))
     return Finding(
-        all(found.holds for found in findings),
-        "; ".join(found.evidence for found in findings),
-        tuple(test for found in findings for test in found.tests),
-        tuple(test for found in findings for test in found.against or ()),
+        all(each.holds for each in findings),
+        "; ".join(each.evidence for each in findings),
+        tuple(test for each in findings for test in each.tests),
+        tuple(test for each in findings for test in each.against or ()),
     )
 
 
@@ -274,7 +274,7 @@ def evidence(parts: Parts) -> str:
     for what, part in parts:
         words = QUANTITIES[what] if what not in REWARDS else ""
         by_what.setdefault(f"{words[:1].upper()}{words[1:]}: " if words else "", []).append(part)
-    return " ".join(f"{words}{'; '.join(own)}." for words, own in by_what.items())
+    return " ".join(f"{words}{'; '.join(of_quantity)}." for words, of_quantity in by_what.items())
 
 
 def all_hold(tests: list[Inference], parts: Parts) -> Finding:

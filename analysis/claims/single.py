@@ -177,7 +177,7 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) ->
     rng = np.random.default_rng(SEED)
     best = math.inf
     for start in (first, *(first + rng.normal(0, SPREAD, (STARTS, len(joints))))):
-        found = optimize.minimize(
+        reach = optimize.minimize(
             lambda change: (change @ change, 2 * change),
             start,
             jac=True,
@@ -185,8 +185,8 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) ->
             constraints=[{"type": "ineq", "fun": inside, "jac": inside_gradient}],
             options={"ftol": 1e-12, "maxiter": 300},
         )
-        if inside(found.x) >= -1e-8:
-            best = min(best, float(np.linalg.norm(found.x)))
+        if inside(reach.x) >= -1e-8:
+            best = min(best, float(np.linalg.norm(reach.x)))
     return best
 
 

@@ -158,8 +158,15 @@ def _judged(
 
 def _of_task(claim: Claim, task: str) -> Claim:
     """A claim of comparisons on one task alone; other claims as they are."""
-    pairs = {name: pairs for name, pairs in claim.pairs.items() if name == task}
-    return claim.model_copy(update={"pairs": pairs}) if pairs else claim
+    if task not in claim.pairs:
+        return claim
+    fields = {"pairs": claim.pairs, "shown": claim.shown}
+    return claim.model_copy(
+        update={
+            name: {at: texts for at, texts in by_task.items() if at == task}
+            for name, by_task in fields.items()
+        }
+    )
 
 
 def _row(spec: Assumptions, judged: Judged) -> Iterator[tuple[str, Any]]:

@@ -157,10 +157,10 @@ def lead(contexts: TwoContexts, signature: Signature) -> Rows:
         yield signature.row(place, n=n, why_not="a run hits it at the start")
         return
     first, second = (last_ticks(group, contexts.goal, count) for group in contexts.runs)
-    found = lead_time(first, second, rng_of(signature.name, place))
+    ticks = lead_time(first, second, rng_of(signature.name, place))
     place["longest"] = count - 1
-    why = "not distinguishable at the hit" if found is None else ""
-    yield signature.row(place, value=math.nan if found is None else float(found), n=n, why_not=why)
+    why = "not distinguishable at the hit" if ticks is None else ""
+    yield signature.row(place, value=math.nan if ticks is None else float(ticks), n=n, why_not=why)
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
     beside = {family.moving - 1, family.moving + 1} & set(range(1, len(task.goals) + 1))
     for goal, hand in product(sorted(beside), HANDS):
         runs = {name: cell.with_hand(hand, goal) for name, cell in members.of_task.items()}
-        places = [position[name] for name, own in runs.items() for _ in own]
+        places = [position[name] for name, of_task in runs.items() for _ in of_task]
         n, place = len(places), {"goal": goal, "hand": hand, "moving": family.moving}
         if not n:
             continue
@@ -188,9 +188,9 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
             yield from without((slope, norm), why, place, n)
             continue
         q = postures(tuple(chain.from_iterable(runs.values())), goal)
-        for joint, found in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
+        for joint, fitted in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
             unit = "1" if joint.startswith("base") else slope.unit
-            yield slope.estimated({**place, "joint": joint}, found, n, unit=unit)
+            yield slope.estimated({**place, "joint": joint}, fitted, n, unit=unit)
         yield norm.estimated(place, slope_norm(q, places, rng_of(norm.name, place)), n)
 
 

@@ -83,11 +83,11 @@ def rows_of_cells(study: Study) -> Rows:
 def of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
     """Of every shared goal with every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
-        every = [TwoContexts(first, second, goal, hand) for hand in HANDS]
-        found = [contexts for contexts in every if all(contexts.runs)]
-        for contexts in found:
+        by_hand = [TwoContexts(first, second, goal, hand) for hand in HANDS]
+        in_both = [contexts for contexts in by_hand if all(contexts.runs)]
+        for contexts in in_both:
             yield from measured(CONTEXTS, contexts)
-        if not found:
+        if not in_both:
             place = {"goal": goal, "against": second.task.name}
             yield from without(CONTEXTS, "no hand hit the goal in both contexts", place)
 

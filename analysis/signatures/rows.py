@@ -84,13 +84,13 @@ class Signature(BaseModel):
     def row(self, place: Row | None = None, **values: Any) -> Row:
         """A value of it with its unit, at a place; ``values`` by :data:`COLUMNS`."""
         place = {**PLACE, **(place or {})}
-        own = {"signature": self.name, "where": where(place), "unit": self.unit}
-        return {**COLUMNS, **own, **values, **place}
+        names = {"signature": self.name, "where": where(place), "unit": self.unit}
+        return {**COLUMNS, **names, **values, **place}
 
-    def estimated(self, place: Row, found: Interval, n: int, **values: Any) -> Row:
+    def estimated(self, place: Row, interval: Interval, n: int, **values: Any) -> Row:
         """The same of a value with its interval or test, over so many runs."""
         why = ONE_RUN if n == 1 else ""
-        return self.row(place, **{"why_not": why, "n": n, **found._asdict(), **values})
+        return self.row(place, **{"why_not": why, "n": n, **interval._asdict(), **values})
 
 
 def without(of: Iterable[Signature], why: str, place: Row | None = None, n: int = 0) -> Rows:

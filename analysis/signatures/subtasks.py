@@ -52,7 +52,7 @@ def served(path: Trajectory) -> Array:
     """
     task, execution = path.task, path.execution
     befores, ticks = postures_before(execution, task), execution.ticks_by_goal()
-    found = np.full((len(task.goals) - 1, 2), np.nan)
+    cost_and_gain = np.full((len(task.goals) - 1, 2), np.nan)
     for k, (now, after) in enumerate(itertools.pairwise(path.hands)):
         alone = isolated_reach(task, befores[k], k + 1, now)
         if alone is None:
@@ -62,8 +62,8 @@ def served(path: Trajectory) -> Array:
         hit[waiting] = alone[1][waiting]
         nexts = [isolated_reach(task, q, k + 2, after) for q in (alone[1], hit)]
         if nexts[0] is not None and nexts[1] is not None:
-            found[k] = ticks[k] - alone[0], nexts[0][0] - nexts[1][0]
-    return found
+            cost_and_gain[k] = ticks[k] - alone[0], nexts[0][0] - nexts[1][0]
+    return cost_and_gain
 
 
 def postures_before(execution: Execution, task: Task) -> list[Array]:

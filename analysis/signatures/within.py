@@ -151,10 +151,10 @@ def turning(cell: Trajectories, signature: Signature) -> Rows:
 
 def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Rows:
     """Smoothness of the chosen hand's path."""
-    found = [smoothness(run) for run in cell.runs]
+    values = [smoothness(run) for run in cell.runs]
     short = "every subtask is too short, or its path is without jerk"
     for k, signature in enumerate((sparc, jerk)):
-        yield mean_at(signature, {"hand": "chosen"}, [run[k] for run in found], short)
+        yield mean_at(signature, {"hand": "chosen"}, [run[k] for run in values], short)
 
 
 def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
@@ -172,23 +172,23 @@ def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
         hand = runs[0].hands[number - 1]
         q = postures(runs, number)
         joints, jacobian = jacobian_of(cell.task, hand, q)
-        found = synergy(q[:, joints], jacobian)
+        variance = synergy(q[:, joints], jacobian)
         place: Row = {"goal": number, "hand": hand, "hands": runs[0].execution.hands}
-        why = "runs do not differ" if math.isnan(found.z.value) else ""
-        for signature, value in zip(parts, found[:3], strict=True):
+        why = "runs do not differ" if math.isnan(variance.z.value) else ""
+        for signature, value in zip(parts, variance[:3], strict=True):
             yield signature.row(place, value=value, n=n, why_not=why)
         if not why:
-            place["neutral"] = found.neutral
-            if math.isnan(found.z.p):
+            place["neutral"] = variance.neutral
+            if math.isnan(variance.z.p):
                 why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield z.estimated(place, found.z, n, why_not=why)
+        yield z.estimated(place, variance.z, n, why_not=why)
 
 
 def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: str = "") -> Rows:
     """Means at the first ``goals`` goals of ``values``, a row of them a run."""
     for number in range(1, goals + 1):
-        own = [run[number - 1] for run in values]
-        yield mean_at(signature, {"goal": number}, own, missing)
+        at_goal = [run[number - 1] for run in values]
+        yield mean_at(signature, {"goal": number}, at_goal, missing)
 
 
 def mean_at(signature: Signature, place: Row, values: ArrayLike, missing: str = "") -> Row:
@@ -196,11 +196,11 @@ def mean_at(signature: Signature, place: Row, values: ArrayLike, missing: str = 
 
     ``missing`` says why a run may have none.
     """
-    given = np.asarray(values, dtype=np.float64)
-    known = given[np.isfinite(given)]
-    if not len(known):
-        return signature.row(place, why_not=missing if len(given) else NO_RUN)
-    return signature.estimated(place, intervals.mean(known), len(known))
+    of_runs = np.asarray(values, dtype=np.float64)
+    finite = of_runs[np.isfinite(of_runs)]
+    if not len(finite):
+        return signature.row(place, why_not=missing if len(of_runs) else NO_RUN)
+    return signature.estimated(place, intervals.mean(finite), len(finite))
 
 
 def share_at(signature: Signature, place: Row, agrees: Sequence[bool]) -> Row:
