@@ -66,21 +66,14 @@ class Trajectories:
         return tuple(run for run in self.runs if run.hands[goal - 1] == hand)
 
     @cached_property
-    def against_initial(self) -> NDArray[np.int64]:
-        """Ticks of subtasks less the initial solution's, ``(runs, G)``; no row without one."""
-        return self._changes(dict.fromkeys(self.sequences, self.initial))
-
-    @cached_property
     def against_same_hands(self) -> NDArray[np.int64]:
         """Ticks of subtasks less the corrective process's with each run's own hands.
 
         Shape ``(n, G)``: runs whose hands it completes the task with.
         """
-        hands = set(self.sequences)
-        return self._changes({own: corrective(self.task, own, self.model) for own in hands})
-
-    def _changes(self, references: Mapping[str, Execution | None]) -> NDArray[np.int64]:
-        """From the solution that each hand sequence is compared with."""
+        references = {
+            hands: corrective(self.task, hands, self.model) for hands in set(self.sequences)
+        }
         rows = [
             change_from(run.execution, reference)
             for run in self.runs
@@ -132,8 +125,8 @@ def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
 
     ``sequences`` is a results folder's table of that name. Empty where none has a reward.
     """
-    own = sequences[(sequences.task == task) & sequences.reward.notna()]
-    return [str(hands) for hands in own.hands[own.reward == own.reward.max()]]
+    solved = sequences[(sequences.task == task) & sequences.reward.notna()]
+    return [str(hands) for hands in solved.hands[solved.reward == solved.reward.max()]]
 
 
 def trajectories_of(

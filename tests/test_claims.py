@@ -10,14 +10,14 @@ import pytest
 from scipy import stats
 
 from coartic import corrective_trial, load_task, trajectory
-from coartic.analysis.claims import general, judge
-from coartic.analysis.claims.data import FREE, MissingError
+from coartic.analysis.claims import judge, single
+from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.ensemble import held_by
-from coartic.analysis.claims.general import shortest_reach
 from coartic.analysis.claims.judge import by_tests, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
+from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
-from coartic.analysis.signatures.subtasks import isolated_reach, served
+from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
@@ -47,7 +47,7 @@ def planted(holds, *p, ids=("r",), against=None, **more):
         contrary = None if against is None else tuple(map(test, against))
         return Finding(holds, "planted", tuple(map(test, p)), contrary)
 
-    claim = Claim(id="planted", section="s", statement="It is so.", judge="x.y", place="p",
+    claim = Claim(id="planted", section="s", statement="It is so.", rule="planted", place="p",
                   quote="q", **more)  # fmt: skip
     return claim, decide
 
@@ -56,9 +56,9 @@ def judge_planted(monkeypatch, *pairs):
     """Planted claims judged together."""
     claims = []
     for number, (claim, decide) in enumerate(pairs):
-        named = claim.model_copy(update={"id": f"planted-{number}"})
-        monkeypatch.setattr(judge, "JUDGES", {**judge.JUDGES, named.id: decide})
-        claims.append(named)
+        rule = f"planted-{number}"
+        monkeypatch.setitem(judge.RULES, rule, decide)
+        claims.append(claim.model_copy(update={"id": rule, "rule": rule}))
     return judge.judge(nothing(), claims)
 
 
@@ -98,8 +98,8 @@ def test_verdicts(claim, verdict, monkeypatch):
 def test_most_admissible_goals_decide(monkeypatch):
     """A claim on reconstructed goals that most of them refute is not supported."""
     claim, decide = planted(True, 0.001, fitted=True)
+    monkeypatch.setitem(judge.RULES, "planted", decide)
     for name, verdict in (("ec4-mixed", "not supported"), ("arm-coarticulation", "supported")):
-        monkeypatch.setitem(judge.JUDGES, name, decide)
         (entry,) = judge.judge(nothing(), [claim.model_copy(update={"id": name})])
         assert entry.verdict == verdict
 
@@ -205,113 +205,58 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
 @pytest.mark.parametrize(
     ("claim", "rows", "verdict"),
     [
+        # Means, against a number.
         ("ec3-beats-exhaustive", learner(T1, "EC3", MIDDLE), "supported"),
         ("ec3-beats-exhaustive", learner(T1, "EC3", LOW), "not supported"),
         ("ec3-beats-exhaustive", learner(T1, "EC3", [-533, -600, -470]), "undecided"),
-        ("ec3-alternates", learner(T1, "EC3", MIDDLE * 3), "supported"),
-        ("ec3-alternates", learner(T1, "EC3", MIDDLE * 3, "RRLR"), "not supported"),
-        ("ec3-alternates", learner(T1, "EC3", MIDDLE[:4]), "undecided"),
-        # More than three quarters of all: 19 of 20 has p = 0.024, 18 of 20 has 0.09.
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR, initial=-500), "not supported"),
+        # Against other runs, all of several comparisons, runs with certain hands.
+        ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH), "supported"),
+        ("ec4-beats-ec3", learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE), "not supported"),
+        ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", MIDDLE[::-1]),
+         "undecided"),
+        ("proficiency-rises", learner(T1, "EC2", LOW) + learner(T1, "EC3", MIDDLE)
+         + learner(T1, "EC4", HIGH) + second(WORSE, BETTER), "supported"),
+        ("proficiency-rises", learner(T1, "EC2", HIGH) + learner(T1, "EC3", MIDDLE)
+         + learner(T1, "EC4", HIGH) + second(WORSE, BETTER), "not supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "undecided"),
+        # Better than all runs of EC2 together, but not than those with RRLR.
+        ("ec3-better-than-ec2", learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE),
+         "not supported"),
+        # More than three quarters: 19 of 20 has p = 0.024, 18 has 0.09; fewer: 11 has 0.041.
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(19)), "supported"),
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(18)), "undecided"),
-        ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(15)), "undecided"),
-        # Fewer than that: 11 of 20 has p = 0.041, 12 of 20 has 0.10.
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(12)), "undecided"),
         ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(11)), "not supported"),
-        (
-            "ec4-beats-ec3",
-            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH),
-            "supported",
-        ),
-        (
-            "ec4-beats-ec3",
-            learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE),
-            "not supported",
-        ),
-        (
-            "ec4-beats-ec3",
-            learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", MIDDLE[::-1]),
-            "undecided",
-        ),
-        (
-            "proficiency-rises",
-            learner(T1, "EC2", LOW) + learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH)
-            + second(WORSE, BETTER),
-            "supported",
-        ),
-        (
-            "proficiency-rises",
-            learner(T1, "EC2", HIGH) + learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH)
-            + second(WORSE, BETTER),
-            "not supported",
-        ),
-        (
-            "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + learner(T2, "EC3", WORSE, ["RRRR"] * 7 + ["RLRR"], -357),
-            "supported",
-        ),
-        (  # no run of task 2 leaves the initial hands
-            "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + learner(T2, "EC3", WORSE, "RRRR", -357),
-            "undecided",
-        ),
-        (
-            "sequences-change",
-            learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-            + learner(T2, "EC3", WORSE * 4, "RRRR", -357),
-            "not supported",
-        ),
-        (
-            "sequences-change",
-            learner(T1, "EC2", LOW * 4, "RRRR") + learner(T1, "EC3", MIDDLE * 4, "RRRR")
-            + learner(T2, "EC3", BETTER, "RLRR", -357),
-            "not supported",
-        ),
-        ("ec2-sequences", learner(T1, "EC2", LOW * 3, "RRRR"), "not supported"),
-        ("ec2-sequences", learner(T1, "EC2", LOW, ["RRLR"] * 4 + ["RRRR"] * 4), "undecided"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE * 3, "RRLR"), "not supported"),
+        ("ec2-unreliable", learner(T1, "EC2", MIDDLE, "RRLR"), "undecided"),
+        # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, "RRRR", -357), "not supported"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR", "RRRR"] * 4, -357),
-         "undecided"),
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR", "RRRR"] * 20, -357),
          "supported"),
-        # A tenth: too few, but not told from 9 of 20 where there are so few runs.
         ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR"] + ["RRRR"] * 7, -357),
          "undecided"),
         ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36, -357),
          "not supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", LOW + MIDDLE, RRLR), "not supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "undecided"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR, initial=-500), "not supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE * 3, "RRLR"), "not supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE, "RRLR"), "undecided"),
-        (
-            "ec3-better-than-ec2",
-            learner(T1, "EC2", MIDDLE + LOW, RRLR) + learner(T1, "EC3", HIGH), "supported",
-        ),
-        (  # not what the paper compares: nothing learned RRLR
-            "ec3-better-than-ec2",
-            learner(T1, "EC2", LOW, "LLLR") + learner(T1, "EC3", HIGH), "undecided",
-        ),
-        (  # better than all runs of EC2 together, but not than those with RRLR
-            "ec3-better-than-ec2",
-            learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE), "not supported",
-        ),
-        ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3), "supported"),
-        ("ec3-as-exhaustive", learner(T1, "EC3", MIDDLE * 3, "RRLR"), "not supported"),
+        # Exact: a majority, one run.
+        ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(11)), "supported"),
         ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(10)), "not supported"),
-        ("rlrr-better", learner(T2, "EC3", BETTER + WORSE, MIXED, -357), "supported"),
-        ("rlrr-better", learner(T2, "EC3", WORSE + BETTER, MIXED, -357), "not supported"),
-        ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "undecided"),  # a tie
-        ("ec3-departs", learner(T2, "EC3", BETTER, "RLLR", -357), "supported"),
-        ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3), "supported"),
-        ("ec4-keeps-lrlr", learner(T1, "EC4", HIGH * 3, "RRLR"), "not supported"),
+        ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "not supported"),  # a tie
+        ("ec3-departs", learner(T2, "EC3", BETTER, ["RLLR"] + ["RRRR"] * 7, -357), "supported"),
         ("ec4-mixed", learner(T2, "EC4", WORSE + BETTER, MIXED, -357), "supported"),
         ("ec4-mixed", learner(T2, "EC4", WORSE, "RLRR", -357), "not supported"),
+        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+         + learner(T2, "EC3", WORSE, ["RRRR"] * 7 + ["RLRR"], -357), "supported"),
+        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+         + learner(T2, "EC3", WORSE, "RRRR", -357), "undecided"),
+        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
+         + learner(T2, "EC3", WORSE * 4, "RRRR", -357), "not supported"),
+        ("sequences-change", learner(T1, "EC2", LOW * 4, "RRRR")
+         + learner(T1, "EC3", MIDDLE * 4, "RRRR") + learner(T2, "EC3", BETTER, "RLRR", -357),
+         "not supported"),
     ],
 )  # fmt: skip
 def test_judges_on_planted_runs(claim, rows, verdict):
@@ -409,7 +354,7 @@ def test_corrections_early_and_late():
             assert judged.verdict == verdict
         # Of 999.9 trials with four goals; first and last tenth.
         early = np.mean([row["early_corrections"] for row in rows[-5:]]) / 3999.6
-        assert f"two-armed-2 EC4 {early:.1%}" in judged.evidence
+        assert f"two-armed-2, EC4: {early:.3f} [" in judged.evidence
 
 
 def ensured(failed=0):
@@ -436,7 +381,7 @@ def test_the_shortest_reach():
     task = load_task("ascending")
     alone = corrective_trial(task, "RRR").configurations
     found = [
-        shortest_reach(task, q, "right", goal, alone[goal - 1], seed=0)
+        shortest_reach(task, q, "right", goal, alone[goal - 1])
         for goal, q in ((1, task.q0), (2, alone[0]))
     ]
     assert found[0] == pytest.approx(1.4)
@@ -458,7 +403,7 @@ def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
 
     The sum over its subtasks would hide that.
     """
-    monkeypatch.setattr(general, "STARTS", 2)
+    monkeypatch.setattr(single, "STARTS", 2)
     claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
     shipped = planted_study(seven([9, 10, 11]))
     assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2
@@ -477,53 +422,38 @@ BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
 PLANS = ("path-length", "squared-changes", "acceleration", "jerk")
 
 
-MORE = "goals, forward kinematics, Jacobian"
 SPREAD = (-1, 0, 1, 0, -1, 1)
 
 
-def beside_plans(reward, plan, spent=1_000_000, *, spread=SPREAD, **more):
+def beside_plans(reward, plan, *, spread=SPREAD):
     """The learner near ``reward`` and plans at ``plan`` (one for all or by cost), everywhere."""
     rows = []
     for task, condition in BEST:
-        rewards = [reward + k for k in spread]
-        rows += learner(task, condition, rewards, forward_kinematics=spent, jacobians=0)
-        rows += [
-            row(
-                f"trajectory-optimisation/{cost}",
-                plan.get(cost, reward) if isinstance(plan, dict) else plan,
-                task=task,
-                **{
-                    "trials": 0, "told": MORE, "forward_kinematics": 50_000, "jacobians": 50_000,
-                    **more,
-                },
-            )
-            for cost in PLANS
-        ]  # fmt: skip
+        rows += learner(task, condition, [reward + k for k in spread])
+        for cost in PLANS:
+            planned = plan.get(cost, reward) if isinstance(plan, dict) else plan
+            rows.append(row(f"trajectory-optimisation/{cost}", planned, task=task, trials=0))
     return rows
 
 
-JUST = {"squared-changes": -302, "acceleration": -300, "jerk": -300}
+JUST = {"squared-changes": -302}
 """One plan a little worse than the learner: p of its test is 0.049, too much times six."""
 
 
 @pytest.mark.parametrize(
-    ("claim", "rows", "verdict"),
+    ("rows", "verdict"),
     [
-        ("beats-inaccurate", beside_plans(-300, -310), "supported"),
-        ("beats-inaccurate", beside_plans(-310, -300), "not supported"),
-        ("beats-inaccurate", beside_plans(-300, -300), "undecided"),
-        ("beats-inaccurate", beside_plans(-300, {**JUST, "squared-changes": -310}), "supported"),
-        (
-            "beats-inaccurate",
-            beside_plans(-300, JUST, spread=(-3, -2, 3, 2, -1, 2)),
-            "undecided",
-        ),
+        (beside_plans(-300, -310), "supported"),
+        (beside_plans(-310, -300), "not supported"),
+        (beside_plans(-300, -300), "undecided"),
+        (beside_plans(-300, {"squared-changes": -310}), "supported"),
+        (beside_plans(-300, JUST, spread=(-3, -2, 3, 2, -1, 2)), "undecided"),
     ],
 )
-def test_judges_beside_planted_plans(claim, rows, verdict):
+def test_judges_beside_planted_plans(rows, verdict):
     study = planted_study(rows)
     for which in ("one", "two"):
-        judged = verdict_of(f"{claim}-{which}-armed", study)
+        judged = verdict_of(f"beats-inaccurate-{which}-armed", study)
         assert judged.verdict == verdict, judged.evidence
 
 
@@ -555,7 +485,7 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
     study = with_paths(planted_study(rows), paths)
     judged = verdict_of("resembles-squared-changes", study)
     assert judged.verdict == verdict
-    assert judged.evidence.count(f"learned solutions {share:.2f} [") == 2
+    assert judged.evidence.count(f"{1 - share:.3f} [".replace("-", "−")) == 2
 
 
 @pytest.mark.parametrize(
@@ -563,8 +493,6 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
     [
         (load_task(T1), "left", "RRLR", "supported"),
         (load_task(T1), "left", "LRLR", "not supported"),
-        (as_released(T1), "right", "LRLR", "supported"),
-        (as_released(T1), "right", "RRLR", "not supported"),
     ],
 )
 def test_hands_that_serve_other_goals(task, quicker, hands, verdict):
@@ -603,23 +531,13 @@ def test_the_other_arm_gets_ready(part, verdict):
     study = with_paths(planted_study(rows), paths)
     judged = verdict_of("other-arm-coarticulation", study)
     assert judged.verdict == verdict, judged.evidence
-    left_at_goal_2 = [
-        task.robot.forward_kinematics(corrective_trial(task, hands).configurations[1], "left")
-        for hands in ("LRLR", "RRRR")
-    ]
-    here, initially = np.linalg.norm(left_at_goal_2 - np.array(task.goals[2]), axis=1)
-    nearer = f"{1 - here / initially:.2f} at goal 2"
-    assert nearer in judged.evidence.split("under EC3")[-1]
-
-
-PLAN = "trajectory-optimisation/path-length"
 
 
 def timed(task, first, others):
     """A run whose first movement takes ``first`` ticks more than initially, the next so many."""
     ticks = corrective_trial(load_task(task), "RRR").ticks_by_goal()
     ticks = [ticks[0] + first, ticks[1] + others, ticks[2]]
-    return SimpleNamespace(execution=SimpleNamespace(ticks_by_goal=lambda: ticks, ticks=sum(ticks)))
+    return SimpleNamespace(execution=SimpleNamespace(hands="RRR", ticks_by_goal=lambda: ticks))
 
 
 @pytest.mark.parametrize(
@@ -642,8 +560,6 @@ def test_the_first_movement_is_sacrificed(first, others, verdict):
         runs += runs[:2]
     judged = verdict_of("first-movement-sacrificed", with_paths(planted_study(rows), paths))
     assert judged.verdict == verdict, judged.evidence
-    both = sum(first + k > 1 and first + k + others < 0 for k in (*SPREAD, *SPREAD[:2]))
-    assert judged.evidence.count(f"both in {both} of 8 runs") == 2
 
 
 def test_little_dependence_on_context():
@@ -717,7 +633,7 @@ def test_the_register_on_runs(study):
     for name in ("first-movement-sacrificed", "ec3-beats-exhaustive"):
         assert entries[name].verdict != "not supported"
     sacrificed = entries["first-movement-sacrificed"]
-    assert "(initially 141)" in sacrificed.finding.evidence
+    assert "ascending, corrective process: 0.0" in sacrificed.finding.evidence
     assert "one goal" not in sacrificed.finding.evidence  # not in this folder
     assert len(sacrificed.run_ids) == 9
     assert set(sacrificed.run_ids) <= set(study.runs.run_id)
@@ -757,19 +673,6 @@ def test_independent_claims_rest_on_printed_tasks(study):
     assert seen > 20
 
 
-def test_a_place_can_be_found_by_a_few_words():
-    for claim in CLAIMS.values():
-        assert claim.place
-        assert 0 < len(claim.quote.split()) <= 12
-        assert "Methods" not in claim.place  # the paper's heading is Method
-
-
-def test_the_register_is_the_same_every_time(study):
-    first, second = judge.judged(study), judge.judged(replace(study))
-    for name in ("verdict", "finding", "run_ids"):
-        assert [repr(getattr(e, name)) for e in first] == [repr(getattr(e, name)) for e in second]
-
-
 @pytest.mark.parametrize(
     ("free", "verdict"),
     [
@@ -780,20 +683,15 @@ def test_the_register_is_the_same_every_time(study):
 )
 def test_the_rail_makes_the_sequence(free, verdict):
     rows = [*learner(T1, "EC3", MIDDLE * 3), *learner(T1, "EC2", LOW, "RRRR")]
-    rows += [*learner(FREE, "EC3", MIDDLE * 3, free), *learner(FREE, "EC2", LOW, "RRRR")]
-    free_base = load_task(T1).model_copy(update={"name": FREE, "locked_base": ()})
+    rows += [
+        *learner("two-armed-1.free-base", "EC3", MIDDLE * 3, free),
+        *learner("two-armed-1.free-base", "EC2", LOW, "RRRR"),
+    ]
+    free_base = load_task(T1).model_copy(
+        update={"name": "two-armed-1.free-base", "locked_base": ()}
+    )
     judged = verdict_of("rail", planted_study(rows, tasks=[free_base]))
     assert judged.verdict == verdict, judged.evidence
-
-
-@pytest.mark.parametrize(
-    ("one", "verdict"),
-    [(LOW, "supported"), (HIGH, "not supported"), (MIDDLE, "undecided")],
-)
-def test_search_on_two_levels(one, verdict):
-    rows = [*learner(T1, "EC3", MIDDLE), *learner(T1, "EC1", one)]
-    rows += [*learner(T2, "EC3", BETTER, initial=-357), *learner(T2, "EC1", WORSE, initial=-357)]
-    assert verdict_of("multilevel-search", planted_study(rows)).verdict == verdict
 
 
 def test_the_papers_own_p_values():
@@ -860,6 +758,7 @@ def test_every_sentence_is_accounted_for():
 def test_margins_have_a_reason():
     assert all(each["reason"] for each in HISTORY.values())
     assert MARGINS["few"] == 1 - MARGINS["most"]
+    assert MARGINS["ticks"] == ROUNDING
     for claim in CLAIMS.values():
         assert "{" not in judge.test_in_words(claim)
 

@@ -1,4 +1,4 @@
-"""What judges read of a results folder, with a record of what each has read."""
+"""What rules read of a results folder, with a record of the runs that each claim has read."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.claims.register import Side
+from coartic.analysis.generality.presence import signs
+from coartic.analysis.methods import LEARNER, most_exploring
 from coartic.analysis.published import TRIALS
+from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories, best_sequences, initial_solution
+from coartic.learner.kernel import PARTS
 from coartic.robot import Array
 
-ASCENDING, DESCENDING = "ascending", "descending"
-ONE, TWO = "two-armed-1", "two-armed-2"
-FREE = f"{ONE}.free-base"
-"""Two-armed task 1 with a base that moves in both directions (suite ``ablations``)."""
-
-SMOOTH = ("squared-changes", "acceleration", "jerk")
-"""Smoothness costs of trajectory optimisation; the first is Jordan's, the last Flash & Hogan's."""
+PLAN = "trajectory-optimisation/squared-changes"
+"""Jordan's smoothness cost."""
 
 
 class MissingError(Exception):
@@ -37,11 +36,18 @@ class Data:
     run_ids: list[str] = field(default_factory=list)
     """Runs read so far, some of them more than once."""
 
-    def runs(self, task: str, method: str, hands: str | None = None) -> pd.DataFrame:
+    def label(self, task: str, who: str) -> str:
+        """Label of a method: ``EC4`` is the learner's, ``EC`` its that explores most on a task."""
+        if who == "EC":
+            return most_exploring(self.task(task))
+        return who if "/" in who else LEARNER + who
+
+    def runs(self, task: str, who: str, hands: str = "") -> pd.DataFrame:
         """Solved runs of a method, of ``hands`` only those that learned that sequence.
 
         Raises MissingError where they cannot be judged.
         """
+        method = self.label(task, who)
         cell = self.study.cells.get((task, method))
         if cell is None or not len(cell.runs):
             raise MissingError(f"this folder has no runs of {method} on {task}")
@@ -51,6 +57,7 @@ class Data:
                 f"{failed} of {len(cell.runs)} runs of {method} on {task} failed, so "
                 "the mean of the others would mislead"
             )
+        runs = cell.good[cell.good.hands == hands] if hands else cell.good
         if method.startswith(LEARNER):
             trials = sorted(set(cell.runs.trials))
             if trials != [TRIALS]:
@@ -58,52 +65,75 @@ class Data:
                     f"the paper's runs have {TRIALS} trials; those of {method} on {task} have "
                     f"{', '.join(map(str, trials))}"
                 )
-            if len(cell.runs) < FEWEST:
-                raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}")
-        found = cell.good if hands is None else cell.good[cell.good.hands == hands]
-        self.run_ids.extend(found.run_id)
-        return found
+            if len(runs) < FEWEST:
+                learned = f" learned {hands}" if hands else ""
+                raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}{learned}")
+        self.run_ids.extend(runs.run_id)
+        return runs
 
-    def learned(self, task: str, condition: str, hands: str | None = None) -> pd.DataFrame:
-        """:meth:`runs` of the paper's learner."""
-        return self.runs(task, LEARNER + condition, hands)
+    def values(self, task: str, side: Side) -> Array:
+        """One side of a comparison: a value of each run, or one number, shape ``()``.
 
-    def rewards(self, task: str, condition: str, hands: str | None = None) -> Array:
-        """Learned rewards of runs (that learned ``hands``), shape ``(runs,)``."""
-        found = self.learned(task, condition, hands).reward.to_numpy(dtype=np.float64)
-        return self._enough(found, task, condition, hands)
-
-    @staticmethod
-    def _enough(found: Array, task: str, condition: str, hands: str | None) -> Array:
-        if len(found) < FEWEST:
-            raise MissingError(
-                f"{len(found)} runs of {condition} on {task} learned {hands}, fewer than {FEWEST}"
-            )
-        return found
-
-    def replays(self, task: str, condition: str, hands: str | None = None) -> Array:
-        """Rewards of noiseless replays of runs (that learned ``hands``), shape ``(runs,)``.
-
-        Not the learned reward, which as the best of all trials is never below trial 0's.
+        Raises MissingError where it cannot be judged.
         """
-        runs = self.learned(task, condition, hands)
-        replays = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
-        if not np.isfinite(replays).all():
-            raise MissingError(f"a run of {condition} on {task} has no replay")
-        return self._enough(replays, task, condition, hands)
+        what, who, hands = side
+        if what == "number":
+            return np.array(0.0)
+        if who == "best":
+            return np.array(self.best_sequences(task)[1])
+        if who == "initial":
+            return np.array(self.initial_reward(task))
+        runs = self.runs(task, who, hands)
+        if what == "reward":
+            rewards = runs.reward.to_numpy(dtype=np.float64)
+            # Planners have one run, or runs that are all the same.
+            return (
+                rewards if self.label(task, who).startswith(LEARNER) else np.array(rewards.mean())
+            )
+        if what == "replay":
+            # Not the learned reward, which as the best of all trials is never below trial 0's.
+            values = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        elif what in ("early", "late"):
+            # Trial 0 has no other movements by construction.
+            movements = (runs.trials - 1) * len(self.task(task).goals) / PARTS
+            values = (runs[f"{what}_corrections"] / movements).to_numpy(dtype=np.float64)
+        elif what == "last":
+            values = (runs.solution_corrections / len(self.task(task).goals)).to_numpy(np.float64)
+        elif what == "resemblance":
+            values = self.resemblance(task, who)
+        else:
+            values = self.sign(task, self.label(task, who), what.replace("-", " "))
+        if not len(values) or not np.isfinite(values).all():
+            raise MissingError(f"{who} on {task} has no {what}")
+        return values
+
+    def sign(self, task: str, label: str, name: str) -> Array:
+        """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
+        if self.task(task).family is not None:
+            measured = signs(self.study)[task, label]
+            return measured.values.get(name, np.empty(0))  # noqa: PD011
+        return SIGNS[name].of(self.study.trajectories(task, label))
+
+    def resemblance(self, task: str, who: str) -> Array:
+        """Share of the initial solution's distance to the plan that each run has covered."""
+        (plan,) = self.cell(task, PLAN).runs
+        planned = plan.execution.configurations
+
+        def apart(execution: Execution) -> float:
+            """Mean distance of postures at the goals, length unit and rad mixed."""
+            return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
+
+        before = apart(self.initial(task))
+        return np.array([1 - apart(run.execution) / before for run in self.cell(task, who).runs])
 
     def hands(self, task: str, condition: str) -> Counter[str]:
         """Runs of the paper's learner by learned hand sequence."""
-        return Counter(map(str, self.learned(task, condition).hands))
+        return Counter(map(str, self.runs(task, condition).hands))
 
-    def initial_reward(self, task: str, condition: str, hands: str | None = None) -> float:
-        """Of trial 0: the corrective process alone."""
-        return float(self.learned(task, condition, hands).initial_reward.iloc[0])
-
-    def cell(self, task: str, method: str) -> Trajectories:
+    def cell(self, task: str, who: str) -> Trajectories:
         """Executed solutions; raises MissingError where there are none."""
-        self.runs(task, method)
-        return self.study.trajectories(task, method)
+        self.runs(task, who)
+        return self.study.trajectories(task, self.label(task, who))
 
     def task(self, name: str) -> Task:
         """A task of the folder."""
@@ -118,23 +148,31 @@ class Data:
             raise MissingError(f"the corrective process alone does not complete {name}")
         return execution
 
+    def initial_reward(self, task: str) -> float:
+        """Reward of the learner's trial 0: the corrective process alone."""
+        runs = self.study.runs
+        of_task = runs[runs.task.eq(task) & runs.initial_reward.notna()]
+        if not len(of_task):
+            raise MissingError(f"no run on {task} has an initial reward")
+        return float(of_task.initial_reward.iloc[0])
+
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""
         table = self.study.sequences
-        own = table[table.task == task]
-        if not len(own):
+        of_task = table[table.task == task]
+        if not len(of_task):
             raise MissingError(
                 f"this folder has no rewards of the corrective process alone on {task}"
             )
-        rewards = own.reward.to_numpy(dtype=np.float64, na_value=np.nan)
-        return dict(zip(map(str, own.hands), rewards.tolist(), strict=True))
+        rewards = of_task.reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        return dict(zip(map(str, of_task.hands), rewards.tolist(), strict=True))
 
     def best_sequences(self, task: str) -> tuple[list[str], float]:
         """Hand sequences that are best by the corrective process alone, and their reward."""
-        known = self.sequences(task)
+        rewards = self.sequences(task)
         best = best_sequences(self.study.sequences, task)
         if not best:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"
             )
-        return best, known[best[0]]
+        return best, rewards[best[0]]

@@ -38,12 +38,16 @@ def held_by(claim: str) -> tuple[Held, ...]:
 
 
 def held_in_words(claim: str) -> str:
-    """``231 of 242 (two-armed-1, refuted in 3)``; empty where there is none."""
+    """``231 of 242 (two-armed-1, refuted in 3)``, or that there is no count.
+
+    There is none where all members were admitted by the claim, and where it takes other runs than
+    the paper's conditions.
+    """
     parts = []
     for held in held_by(claim):
         refuted = f", refuted in {held.refuted}" if held.refuted else ""
         parts.append(f"{held.supported} of {held.members} ({held.task}{refuted})")
-    return "; ".join(parts)
+    return "; ".join(parts) or "not counted"
 
 
 def mostly_refuted(claim: str) -> bool:

@@ -19,29 +19,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import get_args
 
 import pandas as pd
 
-from coartic.analysis.claims import families, general, one_armed, rules, two_armed
+from coartic.analysis.claims import rules, single
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.ensemble import held_in_words, mostly_refuted
-from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Correction, Finding, Verdict
+from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached
 
-_CORRECTIONS: tuple[Correction, ...] = ("paper", "beside", "families")
-_MODULES = {
-    module.__name__.rpartition(".")[2]: module
-    for module in (rules, one_armed, two_armed, general, families)
+RULES: dict[str, Callable[[Data, Claim], Finding]] = {
+    rule.__name__: rule
+    for rule in (
+        *(rules.higher, rules.some_higher, rules.in_every_family, rules.counted, rules.ordered),
+        *(single.context, single.sequences_change, single.initial_base_reverses),
+        *(single.corrective_ensures, single.corrective_near_shortest, single.printed_p_values),
+    )
 }
-JUDGES: Mapping[str, Callable[[Data, Claim], Finding]] = {
-    name: getattr(_MODULES[module], function)
-    for name, claim in CLAIMS.items()
-    for module, _, function in [claim.judge.partition(".")]
-}
-"""Who judges each claim, by its id."""
+"""The rules by their names in ``claims.toml``."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +85,15 @@ def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
 
 def test_in_words(claim: Claim) -> str:
     """How a claim is judged, with its margins; a rule's own words are its docstring."""
-    return " ".join((claim.test or str(JUDGES[claim.id].__doc__)).split()).format(**MARGINS)
+    counts = [rules.COUNTS[how.partition(" EC")[0]] for each in claim.runs.values() for how in each]
+    words = claim.test or "; ".join(dict.fromkeys(counts)) or str(RULES[claim.rule].__doc__)
+    return " ".join(words.split()).format(**MARGINS)
 
 
 def p_of(claim: Claim, finding: Finding) -> float:
     """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
-    known = [test.p for test in finding.tests if not math.isnan(test.p)]
-    return max(known) if known and claim.correction else math.nan
+    values = [test.p for test in finding.tests if not math.isnan(test.p)]
+    return max(values) if values and claim.group else math.nan
 
 
 def opposite_p(claim: Claim, finding: Finding) -> float:
@@ -101,8 +102,8 @@ def opposite_p(claim: Claim, finding: Finding) -> float:
         p = [test.p for test in finding.against]
     else:
         p = [min(1.0, 1 - test.p + 1 / (RESAMPLES + 1)) for test in finding.tests]
-    known = [value for value in p if not math.isnan(value)]
-    return min(1.0, min(known) * len(known)) if known and claim.correction else math.nan
+    values = [value for value in p if not math.isnan(value)]
+    return min(1.0, min(values) * len(values)) if values and claim.group else math.nan
 
 
 @cached
@@ -114,34 +115,39 @@ def judged(study: Study) -> list[Judged]:
 
 def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     """The claims judged; those with a test are corrected over their groups among ``claims``."""
-    seen = [_seen(claim, Data(study)) for claim in claims]
+    seen = [(claim, *see(claim, Data(study))) for claim in claims]
     adjusted: dict[str, tuple[float, float]] = {}
-    for correction in _CORRECTIONS:
-        group = [(claim, finding) for claim, finding, _ in seen if claim.correction == correction]
-        both = [holm([of(*own) for own in group], len(group)) for of in (p_of, opposite_p)]
-        adjusted |= {own[0].id: p for own, p in zip(group, zip(*both, strict=True), strict=True)}
+    for group in get_args(Group):
+        members = [(claim, finding) for claim, finding, _ in seen if claim.group == group]
+        both = [holm([of(*each) for each in members], len(members)) for of in (p_of, opposite_p)]
+        adjusted |= {
+            each[0].id: p for each, p in zip(members, zip(*both, strict=True), strict=True)
+        }
     return [
         Judged(claim, finding, runs, *adjusted.get(claim.id, (math.nan, math.nan)))
         for claim, finding, runs in seen
     ]
 
 
-def _seen(claim: Claim, data: Data) -> tuple[Claim, Finding, tuple[str, ...]]:
+def see(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
+    """What a claim's rule finds, and the ids of the runs that it read."""
     try:
-        finding = JUDGES[claim.id](data, claim)
+        finding = RULES[claim.rule](data, claim)
     except MissingError as missing:
-        return claim, Finding(None, f"Not judged: {missing}."), ()
-    return claim, finding, tuple(dict.fromkeys(data.run_ids))
+        return Finding(None, f"Not judged: {missing}."), ()
+    if claim.exact:
+        finding = replace(finding, tests=(), against=None)
+    return finding, tuple(dict.fromkeys(data.run_ids))
 
 
 def counts(entries: Iterable[Judged]) -> Mapping[Verdict, int]:
     """How many claims have each verdict; 0 for those that none has."""
-    found: dict[Verdict, int] = {
+    number_of: dict[Verdict, int] = {
         "supported": 0, "used to choose the goals": 0, "not supported": 0, "undecided": 0
     }  # fmt: skip
     for entry in entries:
-        found[entry.verdict] += 1
-    return found
+        number_of[entry.verdict] += 1
+    return number_of
 
 
 @cached

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from coartic.analysis.methods import name_of
+from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.words import read_beside
-from coartic.robot import Array
 
 _FILE = read_beside(__file__, "claims")
 HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
@@ -18,16 +20,69 @@ HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
 Verdict = Literal["supported", "not supported", "undecided", "used to choose the goals"]
-Correction = Literal["paper", "beside", "families"]
+Group = Literal["paper", "beside", "families"]
 """Which claims are corrected together: on the paper's cells, with runs beside them, on families of
 random tasks."""
 
 _HANDS = "[LR]+"
-_RUNS = rf"(replay )?(EC[1-4]?|EC[1-4]-[a-z]+)( {_HANDS})?"
-Pair = Annotated[str, Field(pattern=rf"^{_RUNS} > ({_RUNS}|initial|best|jerk)$")]
-"""Two things that are compared, the first of which is said to be higher."""
-Counted = Annotated[str, Field(pattern=rf"^EC[1-4] (not )?{_HANDS}$")]
-"""Runs that are counted by their hands."""
+QUANTITIES = {
+    "replay": "reward of a replay without noise after learning",
+    "early": "share of movements that are corrected, in the first tenth of the trials",
+    "late": "share of movements that are corrected, in the last tenth of the trials",
+    "last": "share of movements that are corrected, in the learned solution",
+    "resemblance": "share of the distance of the initial solution to the plan for least squared "
+    "changes that learning has covered (postures at the goals)",
+} | {name.replace(" ", "-"): sign.words for name, sign in SIGNS.items()}
+"""What is measured of runs beside their reward, by its name in comparisons."""
+_WHAT = "|".join(QUANTITIES)
+_SIDE = rf"(?:(?P<what>{_WHAT}) )?(?P<who>EC\S*|initial|best|\S+/.+?)(?: (?P<hands>{_HANDS}))?"
+_SHOWN = re.sub(r"\?P<\w+>", "?:", _SIDE)
+Shown = Annotated[str, Field(pattern=rf"^{_SHOWN}$")]
+"""What is measured of whom: ``EC2 RRLR``, ``replay EC1``, ``initial``, ``arm posture-based/x``."""
+_MARGIN = "|".join(MARGINS)
+_PAIR = rf"{_SHOWN} > ({_SHOWN}|0)( by ({_MARGIN}))?"
+Pair = Annotated[str, Field(pattern=rf"^({_PAIR}|{_HANDS} > ({_HANDS}|others))$")]
+"""Two things that are compared, the first of which is said to be higher, by more than a margin if
+there is one. Or hand sequences of the corrective process alone."""
+Counted = Annotated[
+    str,
+    Field(
+        pattern=r"^(most|not most|half|majority|some) EC[1-4] (not )?"
+        rf"({_HANDS}( rightward)?|commonest|best|initial|slower-hand)$"
+    ),
+]
+"""How many runs do something."""
+
+
+class Side(NamedTuple):
+    """One side of a comparison."""
+
+    what: str
+    """A name of :data:`QUANTITIES`, or ``reward``; ``number`` for 0."""
+    who: str
+    """Condition, ``initial`` solution, ``best`` hand sequence of the corrective process alone, or
+    label of a method."""
+    hands: str = ""
+    """Only the runs that learned this sequence, where it is named."""
+
+    def __str__(self) -> str:
+        who = name_of(self.who) if "/" in self.who else self.who
+        return " ".join(filter(None, ("replay of" * (self.what == "replay"), who, self.hands)))
+
+
+def side(text: str) -> Side:
+    """A side as it is written, such as ``replay EC2 RRRR``."""
+    match = re.fullmatch(_SIDE, text)
+    if match is None:
+        return Side("number", text)
+    return Side(match["what"] or "reward", match["who"], match["hands"] or "")
+
+
+def sides(pair: str) -> tuple[Side, Side, float]:
+    """Both sides of a comparison such as ``arm EC4 > 0 by ticks``, and its margin."""
+    first, second = pair.split(" > ")
+    second, _, margin = second.partition(" by ")
+    return side(first), side(second), MARGINS.get(margin, 0.0)
 
 
 @dataclass(frozen=True)
@@ -41,8 +96,6 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Inference, ...] | None = None
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
-    samples: tuple[Array, ...] = ()
-    """What the tests are of, where they are of instances: their values (n,) less their bound."""
 
 
 class Claim(BaseModel):
@@ -53,24 +106,24 @@ class Claim(BaseModel):
     id: str
     section: str
     statement: str
-    judge: Annotated[str, Field(pattern=r"^[a-z_]+\.[a-z_0-9]+$")]
+    rule: str
     test: str = ""
     exact: bool = False
     fitted: bool = False
     chosen: bool = False
     beside: bool = False
     pairs: Mapping[str, Sequence[Pair]] = {}
-    runs: Mapping[str, Counted] = {}
+    shown: Mapping[str, Sequence[Shown]] = {}
+    runs: Mapping[str, Sequence[Counted]] = {}
     cells: Mapping[str, Sequence[str]] = {}
     families: Sequence[str] = ()
     compared: Sequence[Pair] = ()
-    unit: str = ""
     place: str
     quote: str
     figure: str = ""
 
     @property
-    def correction(self) -> Correction | None:
+    def group(self) -> Group | None:
         """Which claims it is corrected with; None for what is counted exactly."""
         if self.exact:
             return None
@@ -85,13 +138,9 @@ class Claim(BaseModel):
         return self
 
 
-def _read() -> dict[str, Claim]:
-    return {
-        name: Claim(id=name, section=section, **row)
-        for section, rows in _FILE.items()
-        for name, row in rows.items()
-    }
-
-
-CLAIMS: Mapping[str, Claim] = _read()
+CLAIMS: Mapping[str, Claim] = {
+    name: Claim(id=name, section=section, **row)
+    for section, rows in _FILE.items()
+    for name, row in rows.items()
+}
 """Every claim by its id, in the order of the register."""

@@ -1,18 +1,22 @@
-"""Judges of claims that name what they compare or count."""
+"""Rules that many claims share: each takes a folder and a claim, whose fields say what it is about.
+
+:func:`higher` compares means over runs, :func:`in_every_family` means over random tasks,
+:func:`counted` counts runs, and :func:`ordered` compares rewards of the corrective process alone.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+import math
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 from scipy import stats
 
-from coartic.analysis.claims.data import Data
-from coartic.analysis.claims.register import MARGINS, Claim, Finding
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.register import MARGINS, QUANTITIES, Claim, Finding, Side, side, sides
+from coartic.analysis.generality.sample import ReferenceReward, sample
 from coartic.analysis.published import (
     ENTRIES,
     Number,
@@ -21,6 +25,7 @@ from coartic.analysis.published import (
     published_initial,
 )
 from coartic.analysis.statistics.estimates import (
+    FEWEST,
     Inference,
     difference_of_means,
     mean,
@@ -32,199 +37,293 @@ from coartic.analysis.statistics.hypotheses import (
     share_test,
 )
 from coartic.analysis.words import estimate, number, tally
+from coartic.robot import Array
 
-FEW, MOST = MARGINS["few"], MARGINS["most"]
-
-
-@dataclass(frozen=True)
-class Side:
-    """One side of a comparison: runs of a condition, or the corrective process alone."""
-
-    name: str
-    """Condition; ``initial`` solution, or ``best`` of all hand sequences."""
-    hands: str = ""
-    """Only the runs that learned this sequence, where it is named."""
-    replay: bool = False
-    """Noiseless replays: the learned reward, the best of all trials, is never below trial 0's."""
-
-    @property
-    def known(self) -> bool:
-        """Whether its reward is one number."""
-        return self.name in ("initial", "best")
-
-    def __str__(self) -> str:
-        return f"{'replay of ' * self.replay}{self.name} {self.hands}".strip()
-
-
-def sides(pair: str) -> tuple[Side, Side]:
-    """Both sides of a comparison such as ``replay EC2 RRRR > initial``."""
-    first, second = (_side(text.split()) for text in pair.split(" > "))
-    return first, second
-
-
-def _side(words: list[str]) -> Side:
-    replay = words[0] == "replay"
-    name, *hands = words[replay:]
-    return Side(name, "".join(hands), replay)
-
-
-def counted_hands(text: str) -> tuple[str, str, bool]:
-    """Condition, hand sequence, and whether it is runs without it that count."""
-    condition, *inverse, hands = text.split()
-    return condition, hands, inverse == ["not"]
+RESAMPLES_OF_FAMILIES = 99_999
+"""More than elsewhere: some verdicts on families are close, and samples are small."""
+REWARDS = ("reward", "replay")
+Parts = list[tuple[str, str]]
+"""Parts of the evidence, each with what is measured."""
+COUNTS = {
+    "most": "exact binomial test that more than {most:.0%} of the runs do",
+    "not most": "exact binomial test that fewer than {most:.0%} of the runs do",
+    "majority": "exact binomial test that more than {majority:.0%} of the runs do",
+    "half": "exact binomial tests that more than {few:.0%} and fewer than {most:.0%} of all runs "
+    "do; for the opposite: the share lies outside, and Fisher's exact test tells the counts from "
+    "the printed ones. 20 runs are too few to pass it after Holm's correction",
+    "some": "exact: one run is enough",
+}
+"""How many runs have to do something, and how that is tested."""
 
 
 def higher(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap test of the mean reward for each comparison"""
     tests, parts = [], []
     for task, pairs in claim.pairs.items():
-        for first, second in map(sides, pairs):
-            a, b = _rewards(data, task, first, second), _rewards(data, task, second, first)
-            tests.append(exceeds(a, b))
-            if second.known:
-                seen = f"{shown(a)} against {number(float(np.asarray(b)))} ({second})"
-            else:
-                seen = (
-                    f"{shown(a)} against {shown(b)} ({second}), a difference of "
-                    f"{estimate(difference_of_means(a, b), 1)} ticks; the first is better with "
-                    f"probability {estimate(probability_of_improvement(a, b), 2)}"
-                )
-            printed = [_as_printed(task, side) for side in (first, second)]
-            if None not in printed:
-                seen += f"; published {printed[0]} and {printed[1]}"
-            parts.append(f"{task}, {first}: {seen}")
+        for first, second, margin in map(sides, pairs):
+            a, b = data.values(task, first), data.values(task, second)
+            same_runs = b.ndim and (first.who, first.hands) == (second.who, second.hands)
+            tests.append(bootstrap_test(a - b, 0.0) if same_runs else bootstrap_test(a - margin, b))
+            parts.append((first.what, f"{task}, {first}: {compared(task, first, second, a, b)}"))
+    return all_hold(tests, [*parts, *shown_beside(data, claim)])
+
+
+def some_higher(data: Data, claim: Claim) -> Finding:
+    """one-tailed bootstrap test of the mean reward for each comparison; at least one of them \
+holds, the smallest p times their number (Bonferroni)"""
+    every = higher(data, claim)
+    best = min(every.tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
+    holds = any(test.estimate > 0 for test in every.tests)
+    if holds:
+        best = replace(best, p=min(1.0, best.p * len(every.tests)))
+    return Finding(holds, every.evidence, (best,))
+
+
+def in_every_family(data: Data, claim: Claim) -> Finding:
+    """one-tailed bootstrap tests over instances of the mean difference, as a share of the best \
+known reward, in each family"""
+    tests, parts = [], []
+    for pair in claim.compared:
+        first, second, margin = sides(pair)
+        for family in claim.families:
+            values = over_instances(data, family, first, second)
+            tests.append(bootstrap_test(values, margin, resamples=RESAMPLES_OF_FAMILIES))
+            seen = f"{family}: {estimate(mean(values), 2)}"
+            if first.what in REWARDS:
+                seen = f"{family} {pair}: {estimate(mean(values), 1)} %"
+            parts.append((first.what, f"{seen} on {len(values)} instances"))
     return all_hold(tests, parts)
 
 
-def most(data: Data, claim: Claim) -> Finding:
-    """exact binomial test that more than {most:.0%} of all runs do"""
-    return _share(data, claim, "most")
+def over_instances(data: Data, family: str, first: Side, second: Side) -> Array:
+    """Mean difference on each instance of a family that can be judged, shape ``(n,)``.
+
+    Of rewards in per cent of the best known one.
+    """
+    differences = []
+    for name, reference in judged_instances(data, family).items():
+        with suppress(MissingError):
+            a = data.values(name, first).mean()
+            b = data.values(name, second).mean()
+            scale = 1.0
+            if first.what in REWARDS:
+                scale = 100 / abs(reference.best)
+            differences.append(scale * float(a - b))
+    if len(differences) < FEWEST:
+        raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
+    return np.array(differences)
 
 
-def few(data: Data, claim: Claim) -> Finding:
-    """exact binomial test that fewer than {most:.0%} of all runs do"""
-    return _share(data, claim, "few")
+def judged_instances(data: Data, family: str) -> dict[str, ReferenceReward]:
+    """Instances of a family but for those of development, on which methods were tuned."""
+    instances = sample(data.study)
+    names = instances.families.get(family, ()) if instances else ()
+    reported = [name for name in names if data.task(name).split != "development"]
+    if instances is None or not reported:
+        raise MissingError(f"this folder has no instances of {family} that can be judged")
+    return {name: instances.references[name] for name in reported}
 
 
-def about(data: Data, claim: Claim) -> Finding:
-    """exact binomial tests that more than {few:.0%} and fewer than {most:.0%} of all runs do; \
-for the opposite: the share lies outside, and Fisher's exact test tells the counts from the \
-printed ones"""
-    ((task, text),) = claim.runs.items()
-    condition, hands, _ = counted_hands(text)
-    words, count, found = _count(data, task, text)
-    total, printed = found.total(), printed_count(task, condition, hands)
+def counted(data: Data, claim: Claim) -> Finding:
+    """exact counts of runs"""
+    findings = []
+    for task, texts in claim.runs.items():
+        for text in texts:
+            how, _, rest = text.partition(" EC")
+            condition, what = f"EC{rest}".split(" ", 1)
+            findings.append(count_runs(data, task, how, condition, what))
+    return Finding(
+        all(each.holds for each in findings),
+        "; ".join(each.evidence for each in findings),
+        tuple(test for each in findings for test in each.tests),
+        tuple(test for each in findings for test in each.against or ()),
+    )
+
+
+def count_runs(data: Data, task: str, how: str, condition: str, what: str) -> Finding:
+    """Whether so many runs do something; ``how`` is a name of :data:`COUNTS`."""
+    does = runs_that(data, task, condition, what)
+    count, total = int(does.sum()), len(does)
+    share = count / total
+    words = (
+        f"{task} {condition} {what}: {count} of {total} runs ({tally(data.hands(task, condition))})"
+    )
+    if how == "some":
+        return Finding(count > 0, words)
+    if how == "half":
+        return about_half(task, condition, what, words, count, total)
+    bound = MARGINS["majority" if how == "majority" else "most"]
+    sides_of_test: tuple[Alternative, Alternative] = ("greater", "less")
+    if how == "not most":
+        sides_of_test = ("less", "greater")
+    limits = stats.binomtest(count, total, alternative=sides_of_test[0]).proportion_ci()
+    limit = f"at least {limits.low:.0%}" if how != "not most" else f"at most {limits.high:.0%}"
+    test, against = (share_test(count, total, bound, tail) for tail in sides_of_test)
+    holds = share < bound if how == "not most" else share > bound
+    return Finding(holds, f"{words}, {limit} of all (95 %)", (test,), (against,))
+
+
+def runs_that(data: Data, task: str, condition: str, what: str) -> NDArray[np.bool_]:
+    """Which runs do something, shape ``(runs,)``: ``LRLR``, ``not best``, ``RRLR rightward``.
+
+    ``commonest``: have the commonest hand sequence; ``best``, ``initial``: one that is best by the
+    corrective process alone, or the initial one; ``slower-hand``: hit some goal with a hand that is
+    slower for it alone; ``rightward``: of the runs with these hands, the base only moves right.
+    """
+    inverse, what = what.startswith("not "), what.removeprefix("not ")
+    learned = data.runs(task, condition).hands.astype(str).to_numpy()
+    if what == "slower-hand":
+        does = data.values(task, Side("hand", condition)) > 0
+    elif what.endswith(" rightward"):
+        q0, hands = data.task(task).q0, what.partition(" ")[0]
+        runs = [r.execution for r in data.cell(task, condition).runs if r.execution.hands == hands]
+        if not runs:
+            raise MissingError(f"no run of {condition} on {task} learned {hands}")
+        does = np.array([bool((base_steps(q0, run.configurations) > 0).all()) for run in runs])
+    else:
+        wanted = [what]
+        if what == "commonest":
+            wanted = [data.hands(task, condition).most_common(1)[0][0]]
+        elif what == "best":
+            wanted = data.best_sequences(task)[0]
+        elif what == "initial":
+            wanted = [data.task(task).initial_hands]
+        does = np.isin(learned, wanted)
+    return ~does if inverse else does
+
+
+def base_steps(start: Array, configurations: Array) -> Array:
+    """How far the base moves along x from goal to goal, length unit, shape ``(G,)``."""
+    return np.diff(np.append(start[0], configurations[:, 0]))
+
+
+def about_half(
+    task: str, condition: str, hands: str, words: str, count: int, total: int
+) -> Finding:
+    """Whether a share lies between few and most; against it also speaks the printed count."""
+    few, most = MARGINS["few"], MARGINS["most"]
+    low, high = stats.binomtest(count, total).proportion_ci()
+    cell = published_cell(task, condition)
+    assert cell is not None
+    printed = cell.sequences[hands].runs
+    printed_total = sum(summary.runs for summary in cell.sequences.values())
     derived = any(
         (entry.kind, entry.task, entry.condition, entry.hands) == ("count", task, condition, hands)
         for entry in ENTRIES.values()
         if isinstance(entry, Number) and entry.difference_of
     )
-    low, high = stats.binomtest(count, total).proportion_ci()
     share = count / total
-    within = f"two one-tailed exact binomial tests, {FEW:.0%} and {MOST:.0%}"
-    room, p = min(share - FEW, MOST - share), half_p(count, total)
-    unlike = "Fisher's exact test, two-tailed, against the printed counts"
-    apart, contrary_p = share - printed[0] / printed[1], unlike_p((count, total), printed)
+    within = Inference(
+        min(share - few, most - share),
+        (total,),
+        f"two one-tailed exact binomial tests, {few:.0%} and {most:.0%}",
+        p=max(
+            share_test(count, total, few, "greater").p,
+            share_test(count, total, most, "less").p,
+        ),
+    )
+    table = [[count, total - count], [printed, printed_total - printed]]
+    unlike = Inference(
+        share - printed / printed_total,
+        (total, printed_total),
+        "Fisher's exact test, two-tailed, against the printed counts",
+        p=float(stats.fisher_exact(table).pvalue),
+    )
     return Finding(
-        FEW < share < MOST,
-        f"{words} in {count} of {total} runs ({tally(found)}), {low:.0%} to {high:.0%} of all "
-        f"(95 %); published {printed[0]} of {printed[1]}{' (derived)' * derived}",
-        (Inference(room, (total,), within, p=p),),
-        (Inference(apart, (total, printed[1]), unlike, p=contrary_p),),
+        few < share < most,
+        f"{words}, {low:.0%} to {high:.0%} of all (95 %); published {printed} of {printed_total}"
+        + " (derived)" * derived,
+        (within,),
+        (unlike,),
     )
 
 
-def exceeds(values: ArrayLike, bound: ArrayLike | float) -> Inference:
-    """One-tailed bootstrap test that the mean is above a number, or above another sample's."""
-    return bootstrap_test(values, bound)
-
-
-def shown(values: ArrayLike, digits: int = 1) -> str:
-    """The mean with its BCa interval."""
-    return estimate(mean(values), digits)
-
-
-def all_hold(tests: Sequence[Inference], parts: Sequence[str], before: str = "") -> Finding:
-    """What is seen where every test points as claimed; ``parts`` of a sentence say so."""
-    seen = all(test.estimate > 0 for test in tests)
-    return Finding(seen, f"{before}{'; '.join(parts)}.", tuple(tests))
-
-
-def nearly_all(
-    words: str, count: int, total: int, rule: Literal["most", "few"] = "most"
-) -> Finding:
-    """Whether most runs do something; ``few``: whether it is not most of them."""
-    greater = rule == "most"
-    alternative: Literal["greater", "less"] = "greater" if greater else "less"
-    found = stats.binomtest(count, total, alternative=alternative).proportion_ci()
-    bound = f"at least {found.low:.0%}" if greater else f"at most {found.high:.0%}"
+def ordered(data: Data, claim: Claim) -> Finding:
+    """exact: rewards of the corrective process alone; a tie leaves it undecided"""
+    ((task, pairs),) = claim.pairs.items()
+    ((first, second),) = (pair.split(" > ") for pair in pairs)
+    solved = {name: r for name, r in data.sequences(task).items() if not math.isnan(r)}
+    others = set(solved) - {first} if second == "others" else {second} & set(solved)
+    rivals = [solved[name] for name in others]
+    if first not in solved or not rivals:
+        raise MissingError(f"the corrective process alone has no reward with {first} or {second}")
     return Finding(
-        count > MOST * total if greater else count < MOST * total,
-        f"{words} in {count} of {total} runs, {bound} of all (95 %)",
-        (share_test(count, total, MOST, alternative),),
-        (share_test(count, total, MOST, "less" if greater else "greater"),),
+        None if solved[first] == max(rivals) else solved[first] > max(rivals),
+        f"{task}: {first} {number(solved[first])} (published {number(printed_corrective(task))}), "
+        f"{second} {number(max(rivals))}.",
     )
 
 
-def half_p(count: int, total: int) -> float:
-    """p that a share lies between few and most: the larger of two exact tests."""
-    bounds: tuple[tuple[float, Alternative], ...] = (FEW, "greater"), (MOST, "less")
-    return max(share_test(count, total, bound, side).p for bound, side in bounds)
+def printed_corrective(task: str) -> float:
+    """Printed reward of the corrective process alone, with the initial hands or the best."""
+    initial, exhaustive = published_initial(task), published_exhaustive(task)
+    return initial.reward if initial else exhaustive[1] if exhaustive else math.nan
 
 
-def unlike_p(ours: tuple[int, int], printed: tuple[int, int]) -> float:
-    """Fisher's exact p of two counts, each out of so many runs."""
-    return float(stats.fisher_exact([[k, n - k] for k, n in (ours, printed)]).pvalue)
+def shown_beside(data: Data, claim: Claim) -> Parts:
+    """What the claim shows beside its comparisons, as far as the folder has it."""
+    parts = []
+    for task, texts in claim.shown.items():
+        for beside in map(side, texts):
+            with suppress(MissingError):
+                values = np.atleast_1d(data.values(task, beside))
+                parts.append((beside.what, f"{task}, {beside}: {in_words(beside.what, values)}"))
+    return parts
 
 
-def printed_count(task: str, condition: str, hands: str) -> tuple[int, int]:
-    """Runs that the paper prints for a hand sequence, and out of how many."""
-    cell = published_cell(task, condition)
-    assert cell is not None
-    known = {name: summary.runs for name, summary in cell.sequences.items()}
-    return known[hands], sum(known.values())
+def evidence(parts: Parts) -> str:
+    """Parts by what is measured: ``Ticks by which ...: a; b. Share of ...: c.``"""
+    by_what: dict[str, list[str]] = {}
+    for what, part in parts:
+        words = QUANTITIES[what] if what not in REWARDS else ""
+        by_what.setdefault(f"{words[:1].upper()}{words[1:]}: " if words else "", []).append(part)
+    return " ".join(f"{words}{'; '.join(of_quantity)}." for words, of_quantity in by_what.items())
 
 
-def printed_known(task: str, side: Side) -> float | None:
-    """Printed reward of the corrective process alone."""
-    printed = published_initial(task) if side.name == "initial" else published_exhaustive(task)
-    return None if printed is None else printed[1]
+def all_hold(tests: list[Inference], parts: Parts) -> Finding:
+    """What is seen where every test points as claimed."""
+    return Finding(all(test.estimate > 0 for test in tests), evidence(parts), tuple(tests))
 
 
-def _as_printed(task: str, side: Side) -> str | None:
-    """Mean reward of one side as the paper has it, in words."""
-    if side.known:
-        initial = published_initial(task)
-        derived = side.name == "initial" and initial is not None and initial.derived
-        value = printed_known(task, side)
+def in_words(what: str, values: Array) -> str:
+    """The mean with its BCa interval; ticks and rewards with one decimal."""
+    ticks = what in REWARDS or QUANTITIES[what].startswith("ticks")
+    return estimate(mean(values), 1 if ticks else 3)
+
+
+def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
+    """Both sides of a comparison with their difference, and what the paper prints of them."""
+    seen = in_words(first.what, a)
+    if second.what == "number":
+        return seen
+    if not b.ndim:
+        seen += f" against {number(float(b))} ({second})"
+    elif first.what != second.what:
+        return f"{seen}, {second.what} {in_words(second.what, b)}"
     else:
-        cell = published_cell(task, side.name)
-        of_hands = cell.sequences if cell else {}
-        summary = of_hands.get(side.hands) if side.hands else cell and cell.summary
-        value, derived = (summary.mean, summary.derived) if summary else (None, False)
+        difference = estimate(difference_of_means(a, b), 1)
+        seen += (
+            f" against {in_words(second.what, b)} ({second}), a difference of {difference} ticks"
+        )
+        if first.what in REWARDS:
+            better = estimate(probability_of_improvement(a, b), 2)
+            seen += f"; the first is better with probability {better}"
+    printed = [as_printed(task, each) for each in (first, second)]
+    return f"{seen}; published {printed[0]} and {printed[1]}" if None not in printed else seen
+
+
+def as_printed(task: str, of: Side) -> str | None:
+    """Mean reward of one side as the paper has it, in words; None where it does not print it."""
+    value, derived = None, False
+    if of.who == "initial":
+        initial = published_initial(task)
+        if initial is not None:
+            value, derived = initial.reward, initial.derived
+    elif of.who == "best":
+        exhaustive = published_exhaustive(task)
+        value = exhaustive[1] if exhaustive else None
+    elif of.what in REWARDS and (cell := published_cell(task, of.who)):
+        summary = cell.sequences.get(of.hands) if of.hands else cell.summary
+        if summary is not None:
+            value, derived = summary.mean, summary.derived
     return None if value is None else f"{number(value)}{' (derived)' * derived}"
-
-
-def _rewards(data: Data, task: str, side: Side, other: Side) -> ArrayLike:
-    hands = side.hands or None
-    if side.name == "initial":
-        return data.initial_reward(task, other.name, other.hands or None)
-    if side.name == "best":
-        return data.best_sequences(task)[1]
-    return (data.replays if side.replay else data.rewards)(task, side.name, hands)
-
-
-def _count(data: Data, task: str, text: str) -> tuple[str, int, Counter[str]]:
-    """What is counted in words, how often, and all hand sequences."""
-    condition, hands, inverse = counted_hands(text)
-    found = data.hands(task, condition)
-    count, words = found[hands], f"{condition} {hands}"
-    if inverse:
-        count, words = found.total() - count, f"{condition} other hands than {hands}"
-    return words, count, found
-
-
-def _share(data: Data, claim: Claim, rule: Literal["most", "few"]) -> Finding:
-    ((task, text),) = claim.runs.items()
-    words, count, found = _count(data, task, text)
-    return nearly_all(f"{words} ({tally(found)})", count, found.total(), rule)

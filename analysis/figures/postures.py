@@ -16,7 +16,8 @@ from coartic.analysis.figures.choice import NO_CONTEXTS, missing
 from coartic.analysis.figures.plot import Plot, worded
 from coartic.analysis.figures.robot import MARKERS, box
 from coartic.analysis.methods import name_of
-from coartic.analysis.signatures.shared_goal import SharedGoal, shared_goal
+from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.shared_goal import shared_goal
 from coartic.analysis.study import Study
 from coartic.robot import Array
 
@@ -40,7 +41,7 @@ def postures(study: Study) -> Plot:
     return worded("postures", figure, _data(found), found.tasks, found=found, method=method)
 
 
-def _draw(axes: Axes, found: SharedGoal) -> None:
+def _draw(axes: Axes, found: TwoContexts) -> None:
     axes.set_axis_off()
     axes.set_aspect("equal")
     shown = np.concatenate([q.mean(axis=0)[None] for q in found.postures])
@@ -94,7 +95,7 @@ def _base(axes: Axes, task: Task, q: Array, *, above: bool) -> None:
     )  # fmt: skip
 
 
-def _data(found: SharedGoal) -> pd.DataFrame:
+def _data(found: TwoContexts) -> pd.DataFrame:
     """One row a run: task and posture at the shared goal."""
     parts = []
     for task, runs in zip(found.tasks, found.postures, strict=True):

@@ -2,74 +2,53 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
-from coartic import Trajectory
 from coartic.analysis.generality.sample import Sample, sample
 from coartic.analysis.methods import CONDITIONS
-from coartic.analysis.signatures.other_arm import preshaping
-from coartic.analysis.signatures.subtasks import isolated_agreement, served
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study, cached
-from coartic.analysis.trajectories import Trajectories
+from coartic.analysis.trajectories import best_sequences
 from coartic.robot import Array
 
-SIGNS = {
-    "hand": "share of the goals that others follow which are hit with a hand that is not the "
-    "quicker one for them alone",
-    "arm": "ticks by which learned postures leave the next goal nearer, mean over goals",
-    "other arm": "share of its way to its next goal that the waiting arm's hand makes while it "
-    "waits, mean over goals",
-    "first": "ticks by which the first movement is longer than the corrective process's with the "
-    "same hands",
-    "whole": "ticks by which the whole is shorter than it",
-}
-"""What is measured of every run, by name."""
+THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
+"""From where on a sign of :data:`~coartic.analysis.signatures.signs.SIGNS` is there: a tenth of the
+goals, or of the way; more than a tick, which rounding can make."""
+
+
+@dataclass(frozen=True)
+class Signs:
+    """Of the runs of a learner on an instance."""
+
+    values: dict[str, Array]
+    """By the names of :data:`THERE`, of the runs (n,) that have a value; without none of it."""
+    hands: tuple[str, ...]
+    """Sequence of each run."""
+    initial: str
+    best: tuple[str, ...]
+    """Sequences that are best by the corrective process alone."""
 
 
 @cached
-def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Of every instance and condition of the learner, by name and label.
-
-    Signs by the names of :data:`SIGNS`, of the runs (n,) that have a value; without none of it.
-    """
-    by_cell = {}
+def signs(study: Study) -> dict[tuple[str, str], Signs]:
+    """Of every instance and condition of the learner, by name and label."""
+    by_cell: dict[tuple[str, str], Signs] = {}
     instances = sample(study)
     for name in instances.references if instances else ():
         for label in CONDITIONS:
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
-                by_cell[name, label] = _values(study.trajectories(name, label))
+                runs = study.trajectories(name, label)
+                best = best_sequences(study.sequences, name)
+                initial = str(cell.good.initial_hands.iloc[0])
+                measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
+                values = {sign: each for sign, each in measured.items() if len(each)}
+                by_cell[name, label] = Signs(values, tuple(runs.sequences), initial, tuple(best))
     return by_cell
-
-
-def _values(cell: Trajectories) -> dict[str, Array]:
-    # Runs often end in the same solution, but not to the last bit: each is measured.
-    of_runs = np.array([_of_run(cell, run) for run in cell.runs])
-    change = cell.against_same_hands.astype(np.float64)
-    values = dict(zip(("hand", "arm", "other arm"), of_runs.T, strict=True))
-    values |= {"first": change[:, 0], "whole": -change.sum(axis=1)}
-    present = {name: column[~np.isnan(column)] for name, column in values.items()}
-    return {name: column for name, column in present.items() if len(column)}
-
-
-def _of_run(cell: Trajectories, run: Trajectory) -> tuple[float, float, float]:
-    """Hand, arm and other arm of :data:`SIGNS`; NaN for what the run does not have."""
-    two = len(cell.task.hands) > 1
-    quicker = isolated_agreement(run)[:-1]
-    hand = 1.0 - sum(quicker) / len(quicker) if two and quicker else math.nan
-    gains = served(run)[:, 1]
-    arm = float(gains.mean()) if np.isfinite(gains).all() else math.nan
-    waiting = math.nan
-    if two and cell.initial is not None:
-        nearer = preshaping(run, cell.initial)
-        of_goals = nearer[~np.isnan(nearer)]
-        waiting = float(of_goals.mean()) if len(of_goals) else math.nan
-    return hand, arm, waiting
 
 
 class Presence(NamedTuple):
@@ -84,20 +63,18 @@ class Presence(NamedTuple):
     """Instances whose mean is beyond :data:`THERE`."""
 
 
-THERE = {"hand": 0.1, "arm": 1.0, "other arm": 0.1, "first": 1.0, "whole": 1.0}
-"""From where on a signature is there: a tenth of the goals, or of the way; more than a tick, which
-rounding can make."""
-
-
 def presence(sample: Sample) -> list[Presence]:
     """Every signature by condition and family, and over all families."""
     rows, by_cell = [], signs(sample.study)
     for label in CONDITIONS:
-        for sign in SIGNS:
+        for sign in THERE:
             scores = {}
             for family, names in sample.families.items():
-                values = [by_cell.get((name, label), {}).get(sign) for name in names]
-                instances = [(of_runs,) for of_runs in values if of_runs is not None]
+                instances = [
+                    (by_cell[name, label].values[sign],)
+                    for name in names
+                    if (name, label) in by_cell and sign in by_cell[name, label].values
+                ]
                 if instances:
                     scores[family] = instances
             parts = [{family: instances} for family, instances in scores.items()]

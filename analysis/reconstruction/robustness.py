@@ -138,11 +138,14 @@ def judge_view(
     task, rows, own = specification.task, [], []
     wanted = [CLAIMS[name] for name in names]
     if task:  # what the default goals of the other task do is no matter of a member's
-        alone = [{t: pairs for t, pairs in claim.pairs.items() if t == task} for claim in wanted]
-        wanted = [
-            claim.model_copy(update={"pairs": pairs}) if pairs else claim
-            for claim, pairs in zip(wanted, alone, strict=True)
-        ]
+        for number, claim in enumerate(wanted):
+            if task in claim.pairs:
+                fields = {"pairs": claim.pairs, "shown": claim.shown}
+                alone = {
+                    name: {of: texts for of, texts in by_task.items() if of == task}
+                    for name, by_task in fields.items()
+                }
+                wanted[number] = claim.model_copy(update=alone)
     its_runs = set(view.runs.run_id[view.runs.task == task] if task else view.runs.run_id)
     for judged in judge(view, wanted):
         claim, finding = judged.claim, judged.finding

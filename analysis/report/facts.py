@@ -33,8 +33,9 @@ from coartic.analysis.methods import (
     name_of,
 )
 from coartic.analysis.published import RUNS, TRIALS
+from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.register import signatures
-from coartic.analysis.signatures.shared_goal import SharedGoal, shared_goal
+from coartic.analysis.signatures.shared_goal import shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import listed
@@ -47,7 +48,7 @@ Rows = list[dict[str, Any]]
 class Coarticulation:
     """How the posture at one goal depends on the next."""
 
-    goal: SharedGoal
+    goal: TwoContexts
     method: str
     runs: int
     tested: bool

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, product
 
 import numpy as np
 
-from coartic import Hand, Trajectory
+from coartic import Hand, Task, Trajectory
 from coartic.analysis.signatures.context import (
     context_dependence,
     distance,
@@ -20,12 +20,15 @@ from coartic.analysis.signatures.context import (
 )
 from coartic.analysis.signatures.locus import LEAST, ContextFamily, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
+from coartic.analysis.signatures.rows import Row, Rows, Signature, where, without
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.trajectories import Trajectories, last_ticks, postures
 from coartic.robot import HANDS, Array
+from coartic.runs.plan import label_of
 
 Runs = tuple[Trajectory, ...]
+DEPENDENCE = "context dependence"
+"""Name of the signature whose test is the claim's."""
 NO_SPREAD = "one run a context: no spread within contexts, no test"
 
 
@@ -36,12 +39,23 @@ class TwoContexts:
     first: Trajectories
     second: Trajectories
     goal: int
+    """Number of the goal, from 1."""
     hand: Hand
 
     @property
-    def place(self) -> Place:
+    def tasks(self) -> tuple[Task, Task]:
+        """Of either context."""
+        return self.first.task, self.second.task
+
+    @property
+    def method(self) -> str:
+        """Label of the method."""
+        return label_of(self.first.method, self.first.variant)
+
+    @property
+    def place(self) -> Row:
         """Of every value."""
-        return Place(goal=self.goal, hand=self.hand, against=self.second.task.name)
+        return {"goal": self.goal, "hand": self.hand, "against": self.second.task.name}
 
     @cached_property
     def runs(self) -> tuple[Runs, Runs]:
@@ -65,56 +79,87 @@ class TwoContexts:
         """Whether a context has one run only, and so no spread."""
         return min(map(len, self.runs)) < 2
 
-    def row(
-        self, signature: Signature, value: float, why_not: str, basis: Array | None = None
-    ) -> SignatureRow:
-        """A value and its test (within a subspace); without one for a single run."""
-        p = permutation_p(*self.postures, rng_of(signature, self.place), basis=basis)
-        return signature.at(self.place, value=value, p=float(p), n=self.n, why_not=why_not)
+    @property
+    def apart(self) -> float:
+        """Distance of the mean postures, length unit and rad."""
+        return distance(*self.postures)
+
+    @property
+    def spreads(self) -> float:
+        """That distance in pooled SDs of the runs; NaN where there is none."""
+        return context_dependence(*self.postures)
+
+    @property
+    def hands_apart(self) -> float:
+        """Distance of the hand in the mean postures, length unit."""
+        robot = self.first.task.robot
+        ends = [robot.forward_kinematics(q.mean(axis=0), self.hand) for q in self.postures]
+        return float(np.linalg.norm(ends[0] - ends[1]))
+
+    @cached_property
+    def jacobian(self) -> tuple[Array, Array]:
+        """Joints that can move the hand, and its Jacobian in these, at the mean posture."""
+        return jacobian_of(self.first.task, self.hand, np.concatenate(self.postures))
+
+    @property
+    def parts(self) -> tuple[float, float]:
+        """Of the difference of mean postures, what leaves the hand in place and what moves it."""
+        joints, jacobian = self.jacobian
+        first, second = (configurations.mean(axis=0) for configurations in self.postures)
+        return motor_equivalence((first - second)[joints], jacobian)
+
+    @cached_property
+    def p(self) -> float:
+        """Of the permutation test over runs; NaN where a context has one run."""
+        return self.p_within(DEPENDENCE)
+
+    def p_within(self, name: str, basis: Array | None = None) -> float:
+        """The same within the span of an orthonormal ``basis`` (dof, d), with draws of its own."""
+        return float(permutation_p(*self.postures, rng_of(name, self.place), basis=basis))
 
 
 def context_distance(contexts: TwoContexts, signature: Signature) -> Rows:
     """Distance of mean postures."""
-    yield signature.at(contexts.place, value=distance(*contexts.postures), n=contexts.n)
+    yield signature.row(contexts.place, value=contexts.apart, n=contexts.n)
 
 
 def dependence(contexts: TwoContexts, signature: Signature) -> Rows:
     """The distance in pooled standard deviations, with its test."""
-    value = context_dependence(*contexts.postures)
+    value = contexts.spreads
     why = "runs do not differ within contexts" if math.isnan(value) else ""
-    yield contexts.row(signature, value, NO_SPREAD if contexts.single else why)
+    why = NO_SPREAD if contexts.single else why
+    yield signature.row(contexts.place, value=value, p=contexts.p, n=contexts.n, why_not=why)
 
 
 def parts(contexts: TwoContexts, equivalent: Signature, other: Signature) -> Rows:
     """The difference that leaves the hand in place, and the one that moves it."""
-    first, second = contexts.postures
-    task = contexts.first.task
-    joints, jacobian = jacobian_of(task, contexts.hand, np.concatenate([first, second]))
-    difference = first.mean(axis=0) - second.mean(axis=0)
-    found = motor_equivalence(difference[joints], jacobian)
+    joints, jacobian = contexts.jacobian
     why = "one run a context: no test" if contexts.single else ""
     signatures = equivalent, other
-    for signature, value, basis in zip(signatures, found, subspaces(jacobian), strict=True):
-        wide = np.zeros((task.robot.dof, basis.shape[1]))
-        wide[joints] = basis
-        yield contexts.row(signature, value, why, wide)
+    for signature, value, basis in zip(
+        signatures, contexts.parts, subspaces(jacobian), strict=True
+    ):
+        of_all_joints = np.zeros((contexts.first.task.robot.dof, basis.shape[1]))
+        of_all_joints[joints] = basis
+        p = contexts.p_within(signature.name, of_all_joints)
+        yield signature.row(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
 
 
 def lead(contexts: TwoContexts, signature: Signature) -> Rows:
     """How long before the hit contexts differ."""
     place, n = contexts.place, contexts.n
     if contexts.single:
-        yield signature.at(place, n=n, why_not=NO_SPREAD)
+        yield signature.row(place, n=n, why_not=NO_SPREAD)
         return
     count = min(int(run.hits[contexts.goal - 1]) for group in contexts.runs for run in group) + 1
     if count == 1:
-        yield signature.at(place, n=n, why_not="a run hits it at the start")
+        yield signature.row(place, n=n, why_not="a run hits it at the start")
         return
     first, second = (last_ticks(group, contexts.goal, count) for group in contexts.runs)
-    found = lead_time(first, second, rng_of(signature, place))
-    place = replace(place, longest=count - 1)
-    why = "not distinguishable at the hit" if found is None else ""
-    yield signature.at(place, value=math.nan if found is None else float(found), n=n, why_not=why)
+    ticks = lead_time(first, second, rng_of(signature.name, place))
+    place["longest"] = count - 1
+    why = "not distinguishable at the hit" if ticks is None else ""
+    yield signature.row(place, value=math.nan if ticks is None else float(ticks), n=n, why_not=why)
 
 
 @dataclass(frozen=True)
@@ -133,8 +178,8 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
     beside = {family.moving - 1, family.moving + 1} & set(range(1, len(task.goals) + 1))
     for goal, hand in product(sorted(beside), HANDS):
         runs = {name: cell.with_hand(hand, goal) for name, cell in members.of_task.items()}
-        places = [position[name] for name, own in runs.items() for _ in own]
-        n, place = len(places), Place(goal=goal, moving=family.moving, hand=hand)
+        places = [position[name] for name, of_task in runs.items() for _ in of_task]
+        n, place = len(places), {"goal": goal, "hand": hand, "moving": family.moving}
         if not n:
             continue
         if len(set(places)) < LEAST:
@@ -142,12 +187,12 @@ def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
             yield from without((slope, norm), why, place, n)
             continue
         q = postures(tuple(chain.from_iterable(runs.values())), goal)
-        for joint, found in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
+        for joint, fitted in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
             unit = "1" if joint.startswith("base") else slope.unit
-            yield slope.estimated(replace(place, joint=joint), found, n, unit=unit)
-        yield norm.estimated(place, slope_norm(q, places, rng_of(norm, place)), n)
+            yield slope.estimated({**place, "joint": joint}, fitted, n, unit=unit)
+        yield norm.estimated(place, slope_norm(q, places, rng_of(norm.name, place)), n)
 
 
-def rng_of(signature: Signature, place: Place) -> np.random.Generator:
-    """A generator of its own for each row, the same in every folder."""
-    return np.random.default_rng([SEED, zlib.crc32(f"{signature.name} {place}".encode())])
+def rng_of(name: str, place: Row) -> np.random.Generator:
+    """A generator for each row of a signature, the same in every folder."""
+    return np.random.default_rng([SEED, zlib.crc32(f"{name} {where(place)}".encode())])

@@ -119,7 +119,7 @@ def permutation_p(
     if basis is not None:
         pool = pool @ basis
     weights, exact = divisions(len(first), len(second), rng, resamples)
-    own = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
+    observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
     flat = pool.reshape(len(pool), -1)
 
     def distances(rows: Array) -> Array:
@@ -128,7 +128,7 @@ def permutation_p(
         return lengths
 
     null = np.concatenate([distances(block) for block in weights])
-    return p_values(null, distances(own), exact=exact)
+    return p_values(null, distances(observed), exact=exact)
 
 
 def lead_time(

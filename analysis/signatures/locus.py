@@ -44,18 +44,18 @@ class ContextFamily:
 
 def families(tasks: Mapping[str, Task]) -> list[ContextFamily]:
     """The largest sets of at least three tasks that are the same but for one goal."""
-    found = []
+    moving = []
     groups: dict[tuple[int, str], list[str]] = {}
     for name, task in tasks.items():
-        kept = task.model_dump_json(include={*KEPT})
+        shared = task.model_dump_json(include={*KEPT})
         for index in range(len(task.goals)):
             others = task.goals[:index] + task.goals[index + 1 :]
-            groups.setdefault((index, f"{kept}{others}"), []).append(name)
+            groups.setdefault((index, f"{shared}{others}"), []).append(name)
     for (index, _), names in groups.items():
         goals = np.array([tasks[name].goals[index] for name in names])
         if len(np.unique(goals, axis=0)) >= LEAST:
-            found.append(ContextFamily(index + 1, tuple(names), _along(goals)))
-    return found
+            moving.append(ContextFamily(index + 1, tuple(names), _along(goals)))
+    return moving
 
 
 def variants(groups: Sequence[ContextFamily]) -> list[set[str]]:
@@ -64,8 +64,8 @@ def variants(groups: Sequence[ContextFamily]) -> list[set[str]]:
     for family in groups:
         for name in family.tasks:
             joined.merge(family.tasks[0], name)
-    found: list[set[str]] = joined.subsets()
-    return found
+    sets: list[set[str]] = joined.subsets()
+    return sets
 
 
 def _along(points: Array) -> Array:

@@ -122,6 +122,6 @@ def synergy(configurations: Array, jacobian: Array) -> Synergy:
 def _leave_one_out(part: Array, total: float) -> Array:
     """Sum of squares about the mean without each of the runs in turn; 0 for its rounding."""
     n = len(part)
-    own = ((part - part.mean(axis=0)) ** 2).sum(axis=1)
-    rest: Array = total - own * n / (n - 1)
+    squares = ((part - part.mean(axis=0)) ** 2).sum(axis=1)
+    rest: Array = total - squares * n / (n - 1)
     return np.where(rest > n * np.finfo(np.float64).eps * total, rest, 0.0)

@@ -84,4 +84,6 @@ def travel(path: Trajectory) -> Array:
     """
     moved = path.execution.configurations - postures_before(path.execution, path.task)
     waiting = [path.task.robot.joints(other(hand)) for hand in path.hands]
-    return np.array([np.linalg.norm(row[own]) for row, own in zip(moved, waiting, strict=True)])
+    return np.array(
+        [np.linalg.norm(row[joints]) for row, joints in zip(moved, waiting, strict=True)]
+    )

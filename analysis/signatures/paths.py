@@ -119,13 +119,13 @@ def smoothness(path: Trajectory) -> tuple[float, float]:
     -∞ to ∞, -5.3 for a minimum-jerk reach; ∞ where there is no jerk at all. Subtasks of fewer
     than six rows and those without motion of the hand are left out.
     """
-    found = []
+    of_subtasks = []
     for number, hand in enumerate(path.hands, 1):
-        own = path.task.robot.forward_kinematics(path.subtask(number), hand)
-        values = spectral_arc_length(own), dimensionless_jerk(own)
+        hand_path = path.task.robot.forward_kinematics(path.subtask(number), hand)
+        values = spectral_arc_length(hand_path), dimensionless_jerk(hand_path)
         if not np.isnan(values).any():
-            found.append(values)
-    if not found:
+            of_subtasks.append(values)
+    if not of_subtasks:
         return math.nan, math.nan
-    sparc, jerk = np.array(found).mean(axis=0).tolist()
+    sparc, jerk = np.array(of_subtasks).mean(axis=0).tolist()
     return sparc, -math.log(jerk) if jerk else math.inf

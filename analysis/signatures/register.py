@@ -8,9 +8,7 @@ To add one: a function that computes it, in the file of its concept, a measure o
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields, replace
-from functools import partial
-from itertools import groupby
+from itertools import chain, groupby
 from operator import attrgetter
 
 import pandas as pd
@@ -18,9 +16,9 @@ from pydantic import BaseModel, ConfigDict
 
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.signatures.between import Members, TwoContexts
-from coartic.analysis.signatures.context import context_pairs
-from coartic.analysis.signatures.locus import LEAST, families, variants
-from coartic.analysis.signatures.rows import Place, Rows, Signature, SignatureRow, without
+from coartic.analysis.signatures.locus import LEAST, families
+from coartic.analysis.signatures.rows import COLUMNS, PLACE, Rows, Signature, without
+from coartic.analysis.signatures.shared_goal import pairs_of_contexts
 from coartic.analysis.study import Study, cached
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
@@ -53,8 +51,7 @@ for _signature in (*WITHIN, *CONTEXTS, *FAMILIES):
         raise ValueError(f"register.toml has two signatures {_signature.name!r}")
 
 
-@cached
-def signature_rows(study: Study) -> list[SignatureRow]:
+def rows_of_cells(study: Study) -> Rows:
     """Every signature of every method and task of a study.
 
     Differences between contexts stand with the first task of the pair and name the other; tasks
@@ -62,63 +59,54 @@ def signature_rows(study: Study) -> list[SignatureRow]:
     """
     alone = one_by_one(study)
     trajectories = {key: study.trajectories(*key) for key in study.cells if key[0] in alone}
-    groups = families(study.tasks)
-    joined = variants(groups)
-    pairs = context_pairs(study.tasks)
-    pairs = [pair for pair in pairs if not any({*pair[:2]} <= names for names in joined)]
-    rows: list[SignatureRow] = []
+    groups, pairs = families(study.tasks), pairs_of_contexts(study)
     for (task, label), cell in trajectories.items():
-        done = {name: its for (name, whose), its in trajectories.items() if whose == label}
-        own = [group for group in groups if task in group.tasks]
-        values = list(_measured(WITHIN, cell))
-        partners = [pair for pair in pairs if task in pair[:2] and {*pair[:2]} <= done.keys()]
-        for _, second, shared in (pair for pair in partners if pair[0] == task):
-            values += _of_pair(cell, done[second], shared)
+        of_method = {name: its for (name, whose), its in trajectories.items() if whose == label}
+        moving = [group for group in groups if task in group.tasks]
+        rows = [measured(WITHIN, cell)]
+        partners = [p for p in pairs if task in p[:2] and {*p[:2]} <= of_method.keys()]
+        for first, second, shared in partners:
+            if first == task:
+                rows.append(of_pair(cell, of_method[second], shared))
         if not partners:
-            values += without(CONTEXTS, IN_FAMILY if own else NO_CONTEXT)
-        for group in own:
-            cells = {name: done[name] for name in group.tasks if name in done}
+            rows.append(without(CONTEXTS, IN_FAMILY if moving else NO_CONTEXT))
+        for group in moving:
+            cells = {name: of_method[name] for name in group.tasks if name in of_method}
             if task == next(iter(cells)):
-                values += _measured(FAMILIES, Members(group, cells))
-        if not own:
-            values += without(FAMILIES, NO_FAMILY)
-        of_cell = partial(replace, task=task, method=cell.method, variant=cell.variant)
-        rows += map(of_cell, values)
-    return rows
+                rows.append(measured(FAMILIES, Members(group, cells)))
+        if not moving:
+            rows.append(without(FAMILIES, NO_FAMILY))
+        identity = {"task": task, "method": cell.method, "variant": cell.variant, "label": label}
+        yield from ({**row, **identity} for row in chain(*rows))
 
 
-def _of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
+def of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
     """Of every shared goal with every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
-        every = [TwoContexts(first, second, goal, hand) for hand in HANDS]
-        found = [contexts for contexts in every if all(contexts.runs)]
-        for contexts in found:
-            yield from _measured(CONTEXTS, contexts)
-        if not found:
-            place = Place(goal=goal, against=second.task.name)
+        by_hand = [TwoContexts(first, second, goal, hand) for hand in HANDS]
+        in_both = [contexts for contexts in by_hand if all(contexts.runs)]
+        for contexts in in_both:
+            yield from measured(CONTEXTS, contexts)
+        if not in_both:
+            place = {"goal": goal, "against": second.task.name}
             yield from without(CONTEXTS, "no hand hit the goal in both contexts", place)
 
 
-def _measured(signatures: Iterable[Signature], what: Trajectories | TwoContexts | Members) -> Rows:
+def measured(signatures: Iterable[Signature], what: Trajectories | TwoContexts | Members) -> Rows:
     """Values of all signatures, those with the same measure together."""
-    for measure, measured in groupby(signatures, attrgetter("measure")):
-        yield from measure(what, *measured)
+    for measure, alike in groupby(signatures, attrgetter("measure")):
+        yield from measure(what, *alike)
 
 
 @cached
 def signatures(study: Study) -> pd.DataFrame:
-    """The rows of :func:`signature_rows` as a table, with ``label``.
+    """Every signature of every method and task of a study, a value a row.
 
-    Columns are the fields of :class:`~.rows.SignatureRow`, with the place in words (``where``),
-    then those of its :class:`~.rows.Place`. Signatures over runs are means with Student's
-    interval, shares of runs have Wilson's.
+    Columns ``task``, ``method``, ``variant``, those of :data:`~.rows.COLUMNS` (``where``: the place
+    in words) and of :data:`~.rows.PLACE`, and ``label``. Signatures over runs are means with
+    Student's interval, shares of runs have Wilson's.
     """
-    own = [field.name for part in (SignatureRow, Place) for field in fields(part)]
     frame = pd.DataFrame(
-        [
-            {**vars(row), "place": str(row.place), **vars(row.place), "label": row.label}
-            for row in signature_rows(study)
-        ],
-        columns=[*own, "label"],
-    ).rename(columns={"place": "where"})
+        rows_of_cells(study), columns=["task", "method", "variant", *COLUMNS, *PLACE, "label"]
+    )
     return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))

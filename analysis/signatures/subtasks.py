@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coartic import Execution, Hand, Task, Trajectory, correct, move
-from coartic.analysis.statistics.estimates import RESAMPLES, SEED
-from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.robot import Array
 
 ROUNDING = 1
@@ -54,7 +52,7 @@ def served(path: Trajectory) -> Array:
     """
     task, execution = path.task, path.execution
     befores, ticks = postures_before(execution, task), execution.ticks_by_goal()
-    found = np.full((len(task.goals) - 1, 2), np.nan)
+    cost_and_gain = np.full((len(task.goals) - 1, 2), np.nan)
     for k, (now, after) in enumerate(itertools.pairwise(path.hands)):
         alone = isolated_reach(task, befores[k], k + 1, now)
         if alone is None:
@@ -64,8 +62,8 @@ def served(path: Trajectory) -> Array:
         hit[waiting] = alone[1][waiting]
         nexts = [isolated_reach(task, q, k + 2, after) for q in (alone[1], hit)]
         if nexts[0] is not None and nexts[1] is not None:
-            found[k] = ticks[k] - alone[0], nexts[0][0] - nexts[1][0]
-    return found
+            cost_and_gain[k] = ticks[k] - alone[0], nexts[0][0] - nexts[1][0]
+    return cost_and_gain
 
 
 def postures_before(execution: Execution, task: Task) -> list[Array]:
@@ -82,22 +80,6 @@ def sacrifices(change: ArrayLike) -> bool:
     """
     ticks = np.asarray(change)
     return bool(ticks[0] > ROUNDING and ticks.sum() < 0)
-
-
-def sacrifice_p(changes: ArrayLike, *, seed: int = SEED, resamples: int = RESAMPLES) -> float:
-    """Probability of such changes, shape ``(runs, G)``, if there were no sacrifice in the mean.
-
-    No sacrifice: the mean first subtask takes longer by no more than :data:`ROUNDING`, or the
-    mean whole takes no less. The larger p of two one-tailed tests
-    (:func:`~coartic.analysis.statistics.hypotheses.bootstrap_test`), as both have to reject
-    (intersection-union test, Berger 1982). NaN below two runs, and where either does not
-    differ between runs.
-    """
-    ticks = np.asarray(changes, dtype=np.float64)
-    first, total = ticks[:, 0], ticks.sum(axis=1)
-    longer = bootstrap_test(first, ROUNDING, seed=seed, resamples=resamples)
-    less = bootstrap_test(total, 0.0, "less", seed=seed, resamples=resamples)
-    return float(np.maximum(longer.p, less.p))
 
 
 def excess(path: Trajectory) -> Array:

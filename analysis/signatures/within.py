@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from coartic.analysis.signatures.manifold import jacobian_of, synergy
 from coartic.analysis.signatures.other_arm import (
@@ -26,16 +25,14 @@ from coartic.analysis.signatures.rows import (
     NO_RUN,
     ONE_HAND,
     Measure,
-    Place,
+    Row,
     Rows,
     Signature,
-    SignatureRow,
     without,
 )
 from coartic.analysis.signatures.subtasks import (
     excess,
     isolated_agreement,
-    sacrifice_p,
     sacrifices,
 )
 from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
@@ -43,36 +40,23 @@ from coartic.analysis.trajectories import Trajectories, entropy, postures
 from coartic.robot import Array
 
 
-def against_initial(cell: Trajectories, first: Signature, total: Signature) -> Rows:
-    """Mean change of the first subtask and of the whole, from the initial solution."""
-    yield from _changes(cell, cell.against_initial, first, total)
-
-
 def against_same_hands(cell: Trajectories, first: Signature, total: Signature) -> Rows:
-    """The same, from the corrective process with each run's own hands."""
-    yield from _changes(cell, cell.against_same_hands, first, total)
-
-
-def _changes(
-    cell: Trajectories, changes: NDArray[np.int64], first: Signature, total: Signature
-) -> Rows:
-    if len(changes):
-        yield mean_at(first, Place(goal=1), changes[:, 0])
-        yield mean_at(total, Place(), changes.sum(axis=1))
-    else:
+    """Mean change of the first subtask and of the whole, from the corrective process's."""
+    changes = cell.against_same_hands
+    if not len(changes):
         yield from without((first, total), NO_INITIAL if cell.runs else NO_RUN)
+        return
+    yield mean_at(first, {"goal": 1}, changes[:, 0])
+    yield mean_at(total, {}, changes.sum(axis=1))
 
 
 def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that sacrifice the first subtask, against their own hands."""
     changes = cell.against_same_hands
-    if not len(changes):
+    if len(changes):
+        yield share_at(signature, {}, [*map(sacrifices, changes)])
+    else:
         yield from without((signature,), NO_INITIAL if cell.runs else NO_RUN)
-        return
-    shown = share_at(signature, Place(), [*map(sacrifices, changes)])
-    p = sacrifice_p(changes)
-    untested = "no test: the first subtask or the whole takes the same ticks in every run"
-    yield replace(shown, p=p, why_not=shown.why_not or (untested if math.isnan(p) else ""))
 
 
 def against_isolated_reach(cell: Trajectories, signature: Signature) -> Rows:
@@ -97,8 +81,8 @@ def of_two_hands(measure: Measure) -> Measure:
 def hand_entropy(cell: Trajectories, signature: Signature) -> Rows:
     """Entropy of the hand sequences."""
     counts = pd.Series(cell.sequences).value_counts()
-    yield signature.at(
-        Place(hands=", ".join(f"{hands} {count}" for hands, count in counts.items())),
+    yield signature.row(
+        {"hands": ", ".join(f"{hands} {count}" for hands, count in counts.items())},
         value=entropy(cell.sequences),
         n=len(cell.runs),
         why_not="" if len(cell.runs) > 1 else "one run: no distribution",
@@ -110,7 +94,7 @@ def as_in_isolation(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs that hit each goal with the hand that is quickest for it by itself."""
     by_run = map(isolated_agreement, cell.runs)
     for number, agrees in enumerate(zip(*by_run, strict=True), 1):
-        yield share_at(signature, Place(goal=number), agrees)
+        yield share_at(signature, {"goal": number}, agrees)
 
 
 @of_two_hands
@@ -119,7 +103,7 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
     best = cell.best_hands
     if best:
         agrees = [hands in best for hands in cell.sequences]
-        yield share_at(signature, Place(hands=", ".join(best)), agrees)
+        yield share_at(signature, {"hands": ", ".join(best)}, agrees)
     else:
         yield from without((signature,), "the folder's table of sequences has no reward")
 
@@ -147,7 +131,7 @@ def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
     """Mean number of reversals of each base coordinate."""
     reversals = [reversals_of(run) for run in cell.runs]
     for k, name in enumerate("xy"):
-        place = Place(joint=f"base_{name}")
+        place = {"joint": f"base_{name}"}
         if name in cell.task.locked_base:
             yield from without((signature,), "the coordinate is locked", place)
         else:
@@ -167,10 +151,10 @@ def turning(cell: Trajectories, signature: Signature) -> Rows:
 
 def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Rows:
     """Smoothness of the chosen hand's path."""
-    found = [smoothness(run) for run in cell.runs]
+    values = [smoothness(run) for run in cell.runs]
     short = "every subtask is too short, or its path is without jerk"
     for k, signature in enumerate((sparc, jerk)):
-        yield mean_at(signature, Place(hand="chosen"), [run[k] for run in found], short)
+        yield mean_at(signature, {"hand": "chosen"}, [run[k] for run in values], short)
 
 
 def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
@@ -188,41 +172,39 @@ def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
         hand = runs[0].hands[number - 1]
         q = postures(runs, number)
         joints, jacobian = jacobian_of(cell.task, hand, q)
-        found = synergy(q[:, joints], jacobian)
-        place = Place(goal=number, hand=hand, hands=runs[0].execution.hands)
-        why = "runs do not differ" if math.isnan(found.z.value) else ""
-        for signature, value in zip(parts, found[:3], strict=True):
-            yield signature.at(place, value=value, n=n, why_not=why)
+        variance = synergy(q[:, joints], jacobian)
+        place: Row = {"goal": number, "hand": hand, "hands": runs[0].execution.hands}
+        why = "runs do not differ" if math.isnan(variance.z.value) else ""
+        for signature, value in zip(parts, variance[:3], strict=True):
+            yield signature.row(place, value=value, n=n, why_not=why)
         if not why:
-            place = replace(place, neutral=found.neutral)
-            if math.isnan(found.z.p):
+            place["neutral"] = variance.neutral
+            if math.isnan(variance.z.p):
                 why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield z.estimated(place, found.z, n, why_not=why)
+        yield z.estimated(place, variance.z, n, why_not=why)
 
 
 def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: str = "") -> Rows:
     """Means at the first ``goals`` goals of ``values``, a row of them a run."""
     for number in range(1, goals + 1):
-        own = [run[number - 1] for run in values]
-        yield mean_at(signature, Place(goal=number), own, missing)
+        at_goal = [run[number - 1] for run in values]
+        yield mean_at(signature, {"goal": number}, at_goal, missing)
 
 
-def mean_at(
-    signature: Signature, place: Place, values: ArrayLike, missing: str = ""
-) -> SignatureRow:
+def mean_at(signature: Signature, place: Row, values: ArrayLike, missing: str = "") -> Row:
     """Mean over the runs that have a value, with Student's interval.
 
     ``missing`` says why a run may have none.
     """
-    given = np.asarray(values, dtype=np.float64)
-    known = given[np.isfinite(given)]
-    if not len(known):
-        return signature.at(place, why_not=missing if len(given) else NO_RUN)
-    return signature.estimated(place, student_mean(known), len(known))
+    of_runs = np.asarray(values, dtype=np.float64)
+    finite = of_runs[np.isfinite(of_runs)]
+    if not len(finite):
+        return signature.row(place, why_not=missing if len(of_runs) else NO_RUN)
+    return signature.estimated(place, student_mean(finite), len(finite))
 
 
-def share_at(signature: Signature, place: Place, agrees: Sequence[bool]) -> SignatureRow:
-    """Share of runs, with Wilson's interval; without one for a single run."""
+def share_at(signature: Signature, place: Row, agrees: Sequence[bool]) -> Row:
+    """Share of runs, with Wilson's interval."""
     count, total = sum(agrees), len(agrees)
-    found = wilson(count, total) if total > 1 else Interval(count / total)
-    return signature.estimated(place, found, total)
+    share = wilson(count, total) if total > 1 else Interval(count / total)
+    return signature.estimated(place, share, total)
