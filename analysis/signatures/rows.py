@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
 from coartic.analysis.references import Key
 from coartic.analysis.statistics.intervals import Interval
+from coartic.robot import Array
 
 NO_RUN = "no run has a solution"
 ONE_HAND = "the task has one hand"
@@ -62,7 +63,11 @@ class Signature(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    measure: ImportString[Measure]
+    measure: ImportString[Measure] | None = None
+    of_runs: ImportString[Callable[..., Array]] | None = None
+    two_hands: bool = False
+    place: Row = {}
+    missing: str = ""
     unit: str
     range: str = "share of runs"
     by_goal: bool = False
