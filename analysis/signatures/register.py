@@ -19,6 +19,7 @@ from coartic.analysis.signatures.between import Members, TwoContexts
 from coartic.analysis.signatures.locus import LEAST, families
 from coartic.analysis.signatures.rows import COLUMNS, PLACE, Rows, Signature, without
 from coartic.analysis.signatures.shared_goal import pairs_of_contexts
+from coartic.analysis.signatures.within import measured_within
 from coartic.analysis.study import Study, cached
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
@@ -63,7 +64,7 @@ def rows_of_cells(study: Study) -> Rows:
     for (task, label), cell in trajectories.items():
         of_method = {name: its for (name, whose), its in trajectories.items() if whose == label}
         moving = [group for group in groups if task in group.tasks]
-        rows = [measured(WITHIN, cell)]
+        rows = [measured_within(cell, WITHIN)]
         partners = [p for p in pairs if task in p[:2] and {*p[:2]} <= of_method.keys()]
         for first, second, shared in partners:
             if first == task:
@@ -92,7 +93,7 @@ def of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
             yield from without(CONTEXTS, "no hand hit the goal in both contexts", place)
 
 
-def measured(signatures: Iterable[Signature], what: Trajectories | TwoContexts | Members) -> Rows:
+def measured(signatures: Iterable[Signature], what: TwoContexts | Members) -> Rows:
     """Values of all signatures, those with the same measure together."""
     for measure, alike in groupby(signatures, attrgetter("measure")):
         yield from measure(what, *alike)

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Self
 
-from coartic.analysis.references import Key
 from pydantic import BaseModel, ConfigDict, ImportString, model_validator
 
 from coartic.analysis.statistics.estimates import Interval
+from coartic.robot import Array
 
 NO_RUN = "no run has a solution"
 ONE_HAND = "the task has one hand"
@@ -62,13 +62,17 @@ class Signature(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    measure: ImportString[Measure]
+    measure: ImportString[Measure] | None = None
+    of_runs: ImportString[Callable[..., Array]] | None = None
+    two_hands: bool = False
+    place: Row = {}
+    missing: str = ""
     unit: str
     range: str = "share of runs"
     by_goal: bool = False
     share: bool = False
     meaning: str
-    sources: tuple[Key, ...] = ()
+    sources: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _says_its_range(self) -> Self:

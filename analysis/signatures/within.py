@@ -1,83 +1,117 @@
-"""Measures of one method on one task: its runs' values as means, shares and synergies.
+"""Signatures of one method on one task: means, shares and synergies over its runs.
 
-A measure takes :class:`~.trajectories.Trajectories`, then the signatures that it measures.
+Most are functions of :class:`~.trajectories.Trajectories` that return a value for each run, shape
+``(runs,)``, or for each run and goal, shape ``(runs, goals)``; :func:`over_runs` makes them rows.
+Other measures yield rows themselves.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import chain, groupby
+from operator import attrgetter
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from coartic import Execution, Trajectory
 from coartic.analysis.signatures.manifold import jacobian_of, synergy
-from coartic.analysis.signatures.other_arm import (
-    preshaping,
-    readiness,
-    readiness_from_base,
-    travel,
-)
+from coartic.analysis.signatures.other_arm import preshaping, readiness, readiness_from_base, travel
 from coartic.analysis.signatures.paths import reversals_of, smoothness, turning_angles
 from coartic.analysis.signatures.rows import (
     NO_INITIAL,
     NO_RUN,
     ONE_HAND,
-    Measure,
     Row,
     Rows,
     Signature,
     without,
 )
-from coartic.analysis.signatures.subtasks import (
-    excess,
-    isolated_agreement,
-    sacrifices,
-)
+from coartic.analysis.signatures.subtasks import excess, isolated_agreement, sacrifices
 from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
 from coartic.analysis.trajectories import Trajectories, entropy, postures
 from coartic.robot import Array
 
 
-def against_same_hands(cell: Trajectories, first: Signature, total: Signature) -> Rows:
-    """Mean change of the first subtask and of the whole, from the corrective process's."""
-    changes = cell.against_same_hands
-    if not len(changes):
-        yield from without((first, total), NO_INITIAL if cell.runs else NO_RUN)
+def measured_within(cell: Trajectories, signatures: Sequence[Signature]) -> Rows:
+    """Rows of all signatures of a cell; those with the same measure are measured together."""
+    for (measure, two_hands), group in groupby(signatures, attrgetter("measure", "two_hands")):
+        alike = list(group)
+        if not cell.runs:
+            yield from without(alike, NO_RUN)
+        elif two_hands and len(cell.task.hands) < 2:
+            yield from without(alike, ONE_HAND)
+        elif measure is not None:
+            yield from measure(cell, *alike)
+        else:
+            yield from chain.from_iterable(over_runs(cell, signature) for signature in alike)
+
+
+def over_runs(cell: Trajectories, signature: Signature) -> Rows:
+    """The mean over runs of a signature's values, or their share, by goal if it has goals."""
+    assert signature.of_runs is not None
+    values = signature.of_runs(cell)
+    if not len(values):
+        yield from without((signature,), NO_INITIAL)
         return
-    yield mean_at(first, {"goal": 1}, changes[:, 0])
-    yield mean_at(total, {}, changes.sum(axis=1))
+    columns = values.T if signature.by_goal else values[None]
+    for number, column in enumerate(columns, 1):
+        place = {"goal": number} if signature.by_goal else signature.place
+        if signature.share:
+            yield share_at(signature, place, column)
+        else:
+            yield mean_at(signature, place, column)
 
 
-def sacrificed(cell: Trajectories, signature: Signature) -> Rows:
-    """Share of runs that sacrifice the first subtask, against their own hands."""
-    changes = cell.against_same_hands
-    if len(changes):
-        yield share_at(signature, {}, [*map(sacrifices, changes)])
-    else:
-        yield from without((signature,), NO_INITIAL if cell.runs else NO_RUN)
+def first_change(cell: Trajectories) -> Array:
+    """Ticks of the first subtask less the corrective process's with the same hands."""
+    return np.asarray(cell.against_same_hands[:, 0])
 
 
-def against_isolated_reach(cell: Trajectories, signature: Signature) -> Rows:
-    """Mean excess of each subtask over an isolated reach."""
-    missing = "the corrective process reaches the goal from the posture before with no hand"
-    values = [excess(run) for run in cell.runs]
-    yield from by_goal(signature, len(cell.task.goals), values, missing)
+def total_change(cell: Trajectories) -> Array:
+    """Ticks of the whole less the corrective process's with the same hands."""
+    return np.asarray(cell.against_same_hands.sum(axis=1))
 
 
-def of_two_hands(measure: Measure) -> Measure:
-    """Restrict a measure to solved tasks with two hands."""
-
-    def restricted(cell: Trajectories, *signatures: Signature) -> Rows:
-        if len(cell.task.hands) < 2 or not cell.runs:
-            return without(signatures, ONE_HAND if cell.runs else NO_RUN)
-        return measure(cell, *signatures)
-
-    return restricted
+def sacrificed(cell: Trajectories) -> Array:
+    """Whether each run sacrifices the first subtask, against its own hands."""
+    return np.array([sacrifices(change) for change in cell.against_same_hands])
 
 
-@of_two_hands
+def of_each_run(measure: Callable[[Trajectory], ArrayLike]) -> Callable[[Trajectories], Array]:
+    """The same for all runs of a cell."""
+    return lambda cell: np.array([measure(run) for run in cell.runs])
+
+
+def before_the_last_goal(
+    nearer: Callable[[Trajectory, Execution], Array],
+) -> Callable[[Trajectories], Array]:
+    """A measure against the initial solution at every goal but the last; no row without that."""
+
+    def values(cell: Trajectories) -> Array:
+        initial = cell.initial
+        if initial is None:
+            return np.empty((0, len(cell.task.goals) - 1))
+        return np.array([nearer(run, initial)[:-1] for run in cell.runs])
+
+    return values
+
+
+against_isolated_reach = of_each_run(excess)
+as_in_isolation = of_each_run(isolated_agreement)
+readiness_of_the_other_hand = before_the_last_goal(readiness)
+readiness_seen_from_the_base = before_the_last_goal(readiness_from_base)
+preshaping_of_the_other_arm = before_the_last_goal(preshaping)
+travel_of_the_other_arm = of_each_run(travel)
+turning = of_each_run(
+    lambda run: turning_angles(np.vstack([run.task.q0, run.execution.configurations]))
+)
+spectral_arc_lengths = of_each_run(lambda run: smoothness(run)[0])
+log_jerks = of_each_run(lambda run: smoothness(run)[1])
+
+
 def hand_entropy(cell: Trajectories, signature: Signature) -> Rows:
     """Entropy of the hand sequences."""
     counts = pd.Series(cell.sequences).value_counts()
@@ -89,15 +123,6 @@ def hand_entropy(cell: Trajectories, signature: Signature) -> Rows:
     )
 
 
-@of_two_hands
-def as_in_isolation(cell: Trajectories, signature: Signature) -> Rows:
-    """Share of runs that hit each goal with the hand that is quickest for it by itself."""
-    by_run = map(isolated_agreement, cell.runs)
-    for number, agrees in enumerate(zip(*by_run, strict=True), 1):
-        yield share_at(signature, {"goal": number}, agrees)
-
-
-@of_two_hands
 def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
     """Share of runs with a hand sequence that is best by the corrective process alone."""
     best = cell.best_hands
@@ -106,25 +131,6 @@ def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
         yield share_at(signature, {"hands": ", ".join(best)}, agrees)
     else:
         yield from without((signature,), "the folder's table of sequences has no reward")
-
-
-@of_two_hands
-def readiness_of_the_other_hand(cell: Trajectories, *signatures: Signature) -> Rows:
-    """Readiness, that seen from the base, and preshaping; but at the last goal."""
-    measures = (readiness, readiness_from_base, preshaping)
-    if (initial := cell.initial) is None:
-        yield from without(signatures, NO_INITIAL)
-        return
-    missing = "the other hand hits no later goal"
-    for signature, nearer in zip(signatures, measures, strict=True):
-        values = [nearer(run, initial) for run in cell.runs]
-        yield from by_goal(signature, len(cell.task.goals) - 1, values, missing)
-
-
-@of_two_hands
-def travel_of_the_other_arm(cell: Trajectories, signature: Signature) -> Rows:
-    """Mean travel of the arm that is not chosen, by subtask."""
-    yield from by_goal(signature, len(cell.task.goals), [travel(run) for run in cell.runs])
 
 
 def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
@@ -136,25 +142,6 @@ def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
             yield from without((signature,), "the coordinate is locked", place)
         else:
             yield mean_at(signature, place, [run[k] for run in reversals])
-
-
-def turning(cell: Trajectories, signature: Signature) -> Rows:
-    """Mean turning angle at every goal but the last."""
-    goals = len(cell.task.goals)
-    if goals < 2:
-        yield from without((signature,), "the task has one goal")
-        return
-    start = cell.task.q0
-    turns = [turning_angles(np.vstack([start, run.execution.configurations])) for run in cell.runs]
-    yield from by_goal(signature, goals - 1, turns, "a subtask without displacement")
-
-
-def smooth(cell: Trajectories, sparc: Signature, jerk: Signature) -> Rows:
-    """Smoothness of the chosen hand's path."""
-    values = [smoothness(run) for run in cell.runs]
-    short = "every subtask is too short, or its path is without jerk"
-    for k, signature in enumerate((sparc, jerk)):
-        yield mean_at(signature, {"hand": "chosen"}, [run[k] for run in values], short)
 
 
 def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
@@ -184,22 +171,15 @@ def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
         yield z.estimated(place, variance.z, n, why_not=why)
 
 
-def by_goal(signature: Signature, goals: int, values: Sequence[Array], missing: str = "") -> Rows:
-    """Means at the first ``goals`` goals of ``values``, a row of them a run."""
-    for number in range(1, goals + 1):
-        at_goal = [run[number - 1] for run in values]
-        yield mean_at(signature, {"goal": number}, at_goal, missing)
-
-
-def mean_at(signature: Signature, place: Row, values: ArrayLike, missing: str = "") -> Row:
+def mean_at(signature: Signature, place: Row, values: ArrayLike) -> Row:
     """Mean over the runs that have a value, with Student's interval.
 
-    ``missing`` says why a run may have none.
+    The signature's ``missing`` says why a run may have none.
     """
     of_runs = np.asarray(values, dtype=np.float64)
     finite = of_runs[np.isfinite(of_runs)]
     if not len(finite):
-        return signature.row(place, why_not=missing if len(of_runs) else NO_RUN)
+        return signature.row(place, why_not=signature.missing)
     return signature.estimated(place, student_mean(finite), len(finite))
 
 
