@@ -110,8 +110,7 @@ class Data:
     def sign(self, task: str, label: str, name: str) -> Array:
         """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
         if self.task(task).family is not None:
-            measured = signs(self.study)[task, label]
-            return measured.values.get(name, np.empty(0))  # noqa: PD011
+            return signs(self.study)[task, label].get(name, np.empty(0))
         return SIGNS[name].of(self.study.trajectories(task, label))
 
     def resemblance(self, task: str, who: str) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from coartic.analysis.generality.sample import Sample, sample
@@ -12,7 +11,6 @@ from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study, cached
-from coartic.analysis.trajectories import best_sequences
 from coartic.robot import Array
 
 THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
@@ -20,34 +18,21 @@ THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "who
 goals, or of the way; more than a tick, which rounding can make."""
 
 
-@dataclass(frozen=True)
-class Signs:
-    """Of the runs of a learner on an instance."""
-
-    values: dict[str, Array]
-    """By the names of :data:`THERE`, of the runs (n,) that have a value; without none of it."""
-    hands: tuple[str, ...]
-    """Sequence of each run."""
-    initial: str
-    best: tuple[str, ...]
-    """Sequences that are best by the corrective process alone."""
-
-
 @cached
-def signs(study: Study) -> dict[tuple[str, str], Signs]:
-    """Of every instance and condition of the learner, by name and label."""
-    by_cell: dict[tuple[str, str], Signs] = {}
+def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
+    """Of every instance and condition of the learner, by name and label.
+
+    Signs by the names of :data:`THERE`, of the runs (n,) that have a value; without none of it.
+    """
+    by_cell = {}
     instances = sample(study)
     for name in instances.references if instances else ():
         for label in CONDITIONS:
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.trajectories(name, label)
-                best = best_sequences(study.sequences, name)
-                initial = str(cell.good.initial_hands.iloc[0])
                 measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
-                values = {sign: each for sign, each in measured.items() if len(each)}
-                by_cell[name, label] = Signs(values, tuple(runs.sequences), initial, tuple(best))
+                by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
     return by_cell
 
 
@@ -70,11 +55,8 @@ def presence(sample: Sample) -> list[Presence]:
         for sign in THERE:
             scores = {}
             for family, names in sample.families.items():
-                instances = [
-                    (by_cell[name, label].values[sign],)
-                    for name in names
-                    if (name, label) in by_cell and sign in by_cell[name, label].values
-                ]
+                values = [by_cell.get((name, label), {}).get(sign) for name in names]
+                instances = [(of_runs,) for of_runs in values if of_runs is not None]
                 if instances:
                     scores[family] = instances
             parts = [{family: instances} for family, instances in scores.items()]
