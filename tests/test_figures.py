@@ -8,10 +8,10 @@ from importlib import import_module
 import numpy as np
 import pandas as pd
 import pytest
+from coartic.analysis.figures.bars import stars
 
 from coartic import CoarticError, corrective_trial, execute, load_task
 from coartic.analysis.figures import FIGURES, save
-from coartic.analysis.figures.bars import stars
 from coartic.analysis.figures.configurations import (
     PAPER,
     common_sequences,

@@ -31,7 +31,7 @@ from coartic.analysis.statistics.across_tasks import gap_share, task_mean
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED, mean
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached
-from coartic.motion.initial import initial_hands
+from coartic.analysis.trajectories import initial_solution
 from coartic.robot import Array
 
 ALL_TASKS = "all tasks"
@@ -63,13 +63,12 @@ def ends(study: Study) -> dict[str, tuple[float, int]]:
     The initial solution is the corrective process alone with the task's initial hands, the
     optimum that with all joints free.
     """
-    alone = study.sequences.set_index(["task", "hands"]).reward
     found = {}
     for name, task in study.tasks.items():
         best = study.optima.get((name, "free"))
-        start = alone.get((name, initial_hands(task, model=study.model)))
-        if best is not None and not pd.isna(start) and 0 != best.reward > start:
-            found[name] = float(start), best.reward
+        initial = initial_solution(task, study.model)
+        if best is not None and initial is not None and 0 != best.reward > -initial.ticks:
+            found[name] = float(-initial.ticks), best.reward
     return found
 
 

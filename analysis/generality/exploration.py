@@ -103,7 +103,7 @@ def _contrast(
 
 def _by_hands(sample: Sample, name: str, label: str) -> Array:
     """Best known reward with the hands of each run (n,), as a share of the best known."""
-    known, best = sample.by_hands[name], sample.references[name].best
+    known, best = sample.by_hands(name), sample.references[name].best
     hands = sample.study.cells[name, label].good.hands
     return np.array([known[str(own)] for own in hands]) / abs(best)
 

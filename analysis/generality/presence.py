@@ -57,7 +57,7 @@ def signs(study: Study) -> dict[tuple[str, str], Signs]:
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.trajectories(name, label)
-                best = best_sequences(study.sequences, name)
+                best = best_sequences(study.sequences(name))
                 initial = str(cell.good.initial_hands.iloc[0])
                 found[name, label] = Signs(
                     _values(runs), tuple(runs.sequences), initial, tuple(best)
@@ -164,7 +164,7 @@ def recruitment(sample: Sample) -> list[Recruitment]:
                     leaves_initial=sum(most[name][0] != signs.initial for name, signs in own),
                     as_corrective=sum(most[name][0] in signs.best for name, signs in own),
                     as_best_known=sum(
-                        sample.by_hands[name][hands] == best[name]
+                        sample.by_hands(name)[hands] == best[name]
                         for name, (hands, _) in most.items()
                     ),
                     consistent=sum(most[name][1] > 0.75 * len(s.hands) for name, s in own),

@@ -38,18 +38,18 @@ def draw(
 
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
-    from coartic.analysis.figures.plot import FORMATS, picture  # after what is soon said
-    from coartic.analysis.figures.tasks import tasks_plot
+    from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
+    from coartic.analysis.figures.tasks import draw_tasks
 
-    plot = tasks_plot(chosen[:_PICTURED])
+    drawing = draw_tasks(chosen[:_PICTURED])
     if out.suffix:
         if out.suffix.lower() not in FORMATS:
             raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
         check_outputs([out], replace=replace)
-        write_outputs({out: picture(plot, out.suffix.lower())}, replace=replace)
+        write_outputs({out: picture(drawing, out.suffix.lower())}, replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
-        files |= {"tasks.svg": picture(plot, ".svg")}
+        files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
     say(f"{out}: {counted(len(chosen), 'task')}.")
 
