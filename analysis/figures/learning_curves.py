@@ -31,9 +31,17 @@ def learning_curves(study: Study) -> Parts:
         raise missing(study, f"no run of {', '.join(comparison.CURVES)} that learns by trial")
     tasks = [study.tasks[name] for name in data.task.unique()]
     labels = sorted(data.method.unique(), key=comparison.CURVES.index)
-    drawing, panels = style.task_panels(tasks, 2.15, 0.45, "trial", "reward (ticks)")
-    for axes, task in zip(panels, tasks, strict=True):
+    rows, columns = style.grid(len(tasks))
+    size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
+    drawing, panels = style.figure_of((rows, columns), size)
+    for axes in panels[len(tasks) :]:
+        axes.set_axis_off()
+    for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
         draw_curves(axes, study, task, data[data.task == task.name], labels)
+        axes.set_title(style.heading(task))
+        axes.set_ylabel("" if place % columns else "reward (ticks)")
+        axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
+    style.letters(panels[: len(tasks)])
     handles = [
         style.entry(name_of(label), linewidth=1.3, **look.line)
         for label, look in style.looks(labels).items()

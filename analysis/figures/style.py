@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any, NamedTuple
@@ -141,28 +141,6 @@ def figure_of(
     """A figure with so many rows and columns of panels, in inches, and its panels row by row."""
     figure = Figure(figsize=size, layout="constrained")
     return figure, figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
-
-
-def task_panels(
-    tasks: Collection[Task], tall: float, legend: float, across: str, up: str, **subplots: Any
-) -> tuple[Figure, list[Axes]]:
-    """A panel a task, lettered, with its name and the axes' labels at the edges of the grid.
-
-    ``tall``, ``legend``: inches of a panel, where the page allows, and of the legend.
-    """
-    rows, columns = grid(len(tasks))
-    height = tall * rows + legend
-    figure, panels = figure_of((rows, columns), (TWO, min(height, TALLEST)), **subplots)
-    for axes in panels[len(tasks) :]:
-        axes.set_axis_off()
-    for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
-        axes.set_title(heading(task))
-        axes.tick_params(labelbottom=True)  # also where an axis is shared
-        axes.set_ylabel("" if place % columns else up)
-        axes.set_xlabel(across if place + columns >= len(tasks) else "")
-    shown = panels[: len(tasks)]
-    letters(shown)
-    return figure, shown
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:

@@ -45,7 +45,7 @@ def player_data(study: Study) -> dict[str, Any] | None:
         on_task = []
         if (initial := initial_solution(task, study.model)) is not None:
             run = trajectory(task, initial.movements, study.model)
-            on_task.append(_movement(len(tasks), "", "initial solution", "", run, unit))
+            on_task.append(movement_of(len(tasks), "", "initial solution", "", run, unit))
         for label in shown:
             runs = study.trajectories(name, label).runs
             if runs:
@@ -53,12 +53,12 @@ def player_data(study: Study) -> dict[str, Any] | None:
                 index = typical_run(replace(study.cells[name, label], runs=good))
                 run_id = str(good.run_id.iloc[index])
                 on_task.append(
-                    _movement(len(tasks), label, name_of(label), run_id, runs[index], unit)
+                    movement_of(len(tasks), label, name_of(label), run_id, runs[index], unit)
                 )
         if on_task:
-            tasks.append(_task(task, unit))
+            tasks.append(geometry_of(task, unit))
             movements += on_task
-    views = _views(study, movements)
+    views = views_of(study, movements)
     return {"tasks": tasks, "movements": movements, "views": views} if movements else None
 
 
@@ -68,7 +68,7 @@ def player_json(study: Study) -> str:
     return "" if data is None else json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
-def _views(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def views_of(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What the player offers first: the same goal before two successors, before and after."""
 
     place = {(movement["on"], movement["label"]): k for k, movement in enumerate(movements)}
@@ -137,8 +137,8 @@ def rounding_unit(robot: Robot) -> float:
     return float(10.0 ** math.floor(math.log10(TOLERANCE / max(levers))))
 
 
-def _task(task: Task, unit: float) -> dict[str, Any]:
-    """Goals and geometry."""
+def geometry_of(task: Task, unit: float) -> dict[str, Any]:
+    """Goals of a task, and the geometry of its robot."""
     robot = task.robot
     return {
         "label": task.label,
@@ -155,7 +155,7 @@ def _task(task: Task, unit: float) -> dict[str, Any]:
     }
 
 
-def _movement(
+def movement_of(
     task: int, label: str, name: str, run_id: str, run: Trajectory, unit: float
 ) -> dict[str, Any]:
     """``rows`` and ``frames`` as differences to the frame before, the latter frame by frame."""

@@ -34,7 +34,7 @@ def environment(*, escape: bool) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        finalize=lambda value: one_line(value) if type(value) is str else value,
+        finalize=lambda value: shown(value) if type(value) is str else value,
     )
     templates.filters |= {
         "number": words.number,
@@ -47,11 +47,16 @@ def environment(*, escape: bool) -> Environment:
     return templates
 
 
+def shown(text: str) -> str:
+    """Text as one printable line, which does not break before a per cent sign."""
+    return one_line(text).replace(" %", f"{words.NO_BREAK}%")
+
+
 def sentence(name: str, of: Any) -> str:
     """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
     module = environment(escape=False).get_template("sentences.jinja").module
     text = str(getattr(module, name)(of)).replace("\n", " ")
-    return " ".join(part for part in text.split(" ") if part)
+    return shown(" ".join(part for part in text.split(" ") if part))
 
 
 def answers(study: Study) -> list[dict[str, str]]:

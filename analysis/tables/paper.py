@@ -139,7 +139,7 @@ def our_mean(rewards: Any) -> Row:
     evidence=Column(page=False),
     test=Column(page=False),
     opposite_p_holm=Column("p of the opposite", p=True, page=False),
-    ensemble=Column("over all admissible goals"),
+    ensemble=Column("sets of goals in which it holds"),
     place=Column("where"),
     quote=Column(page=False),
     section=Column(page=False),
