@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, wraps
+from functools import cached_property, lru_cache, partial, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -80,22 +80,26 @@ class Study:
         """The constants of movement of all runs."""
         return self.plan.model
 
-    @cached_property
-    def sequences(self) -> pd.DataFrame:
-        """The corrective process alone on each task: a row a hand sequence, best first.
+    def sequences(self, task: str) -> pd.DataFrame:
+        """The corrective process alone on a task: a row for each hand sequence, best first.
 
-        Columns ``task``, ``hands``, ``reward`` (missing where it fails) and ``reason``. Tasks with
-        too many sequences to try are left out.
+        Columns ``hands``, ``reward`` (missing where it fails) and ``reason``. Empty where there
+        are too many sequences to try. Tried once for each task.
         """
-        rows = []
-        for name, task in self.tasks.items():
+        if task not in self._sequences:
             try:
-                ranked = ranked_sequences(task, hand_sequences(task), model=self.model)
+                names = hand_sequences(self.tasks[task])
             except NotApplicableError:
-                continue
-            rows += [(name, hands, trial.reward, trial.reason) for hands, trial in ranked]
-        frame = pd.DataFrame(rows, columns=["task", "hands", "reward", "reason"])
-        return frame.astype({"reward": "Int64"})
+                names = []
+            ranked = ranked_sequences(self.tasks[task], names, model=self.model)
+            rows = [(hands, trial.reward, trial.reason) for hands, trial in ranked]
+            frame = pd.DataFrame(rows, columns=["hands", "reward", "reason"])
+            self._sequences[task] = frame.astype({"reward": "Int64"})
+        return self._sequences[task]
+
+    @cached_property
+    def _sequences(self) -> dict[str, pd.DataFrame]:
+        return {}
 
     @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
@@ -152,7 +156,11 @@ class Study:
                 for run_id in _executed_of(self.cells[key])
             }
             self._trajectories[key] = trajectories_of(
-                self.cells[key], self.tasks[task], self.model, solutions, self.sequences
+                self.cells[key],
+                self.tasks[task],
+                self.model,
+                solutions,
+                partial(self.sequences, task),
             )
         return self._trajectories[key]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,10 +37,14 @@ class Trajectories:
     method: str
     variant: str
     runs: tuple[Trajectory, ...]
-    best_hands: tuple[str, ...] = ()
-    """Hand sequences that are best by the corrective process alone, as far as the folder
-    knows."""
+    alone: Callable[[], pd.DataFrame] | None = None
+    """The corrective process alone with every hand sequence (:meth:`Study.sequences`)."""
     model: MotionModel = PAPER
+
+    @cached_property
+    def best_hands(self) -> list[str]:
+        """Hand sequences that are best by the corrective process alone; empty if not known."""
+        return [] if self.alone is None else best_sequences(self.alone())
 
     @cached_property
     def initial(self) -> Execution | None:
@@ -120,12 +124,12 @@ def entropy(sequences: Iterable[str]) -> float:
     return float(stats.entropy(list(Counter(sequences).values()), base=2)) + 0.0
 
 
-def best_sequences(sequences: pd.DataFrame, task: str) -> list[str]:
+def best_sequences(sequences: pd.DataFrame) -> list[str]:
     """The hand sequences that are best by the corrective process alone, ties included.
 
-    ``sequences`` is a results folder's table of that name. Empty where none has a reward.
+    ``sequences``: a task's rows of :meth:`Study.sequences`. Empty where none has a reward.
     """
-    solved = sequences[(sequences.task == task) & sequences.reward.notna()]
+    solved = sequences[sequences.reward.notna()]
     return [str(hands) for hands in solved.hands[solved.reward == solved.reward.max()]]
 
 
@@ -134,11 +138,10 @@ def trajectories_of(
     task: Task,
     model: MotionModel,
     solutions: Mapping[str, tuple[pd.DataFrame, pd.DataFrame | None]],
-    sequences: pd.DataFrame,
+    alone: Callable[[], pd.DataFrame],
 ) -> Trajectories:
     """Solved runs of a cell, executed; ``solutions`` has the movements and waypoints of each."""
     runs = tuple(
         trajectory(task, movements_from(task, *solution), model) for solution in solutions.values()
     )
-    best = best_sequences(sequences, cell.task)
-    return Trajectories(task, cell.method, cell.variant, runs, tuple(best), model)
+    return Trajectories(task, cell.method, cell.variant, runs, alone, model)

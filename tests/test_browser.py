@@ -11,24 +11,20 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
 from coartic import load_task
-from coartic.analysis.report.build import report_files
+from coartic.analysis.report.build import write_report
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = os.environ.get("COARTIC_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
 pytestmark = pytest.mark.skipif(
     BROWSER is None, reason="no Chromium is installed; set COARTIC_BROWSER to the one to use"
 )
-WIDTHS = (1280, 390)
 
 
 @pytest.fixture(scope="module")
 def report(traced, tmp_path_factory):
     """A report as a user gets it."""
     folder = tmp_path_factory.mktemp("report")
-    for name, content in report_files(traced, for_paper=False).items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    write_report(traced, folder, for_paper=False)
     return folder / "report.html"
 
 
@@ -102,20 +98,6 @@ def test_tables_are_sorted_by_their_headers(opened):
         assert values() == ordered
 
 
-@pytest.mark.parametrize("by", ["mouse", "keyboard"])
-def test_verdicts_unfold(opened, by):
-    page = opened()
-    summary = page.locator("#table-claims summary").first
-    evidence = page.locator("#table-claims dl").first
-    assert not evidence.is_visible()
-    if by == "mouse":
-        summary.click()
-    else:
-        summary.focus()
-        page.keyboard.press("Enter")
-    assert evidence.is_visible()
-
-
 def test_a_link_to_a_claim_unfolds_it(opened, report):
     page = opened()
     claim = page.locator("#table-claims tbody tr").nth(3).get_attribute("id")
@@ -144,13 +126,10 @@ def test_the_player_plays_pauses_and_steps_by_keyboard(opened):
     page.keyboard.press("Tab")  # one tick back
     page.keyboard.press("Enter")
     assert tick(page) == stopped - 1
-    page.keyboard.press("Tab")
+    page.keyboard.press("Tab")  # one tick on
     page.keyboard.press("Enter")
-    page.keyboard.press("Enter")
-    assert tick(page) == stopped + 1
-    page.keyboard.press("Tab")  # the slider
-    page.keyboard.press("ArrowLeft")
     assert tick(page) == stopped
+    page.keyboard.press("Tab")  # the slider
     page.keyboard.press("End")
     assert "all goals hit" in page.locator(".player .facts").first.inner_text()
 
@@ -180,8 +159,7 @@ def test_the_player_shows_the_robot_where_the_run_ended(opened, traced):
         assert min(np.linalg.norm(drawn - centre) for centre in centres) < task.radius + 2e-3
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme):
     page = opened(width, color_scheme=scheme, reduced_motion="reduce")
     page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")

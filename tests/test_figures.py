@@ -10,27 +10,21 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError, corrective_trial, execute, load_task
+from coartic.analysis.cells import common_sequences, typical_run
 from coartic.analysis.figures import FIGURES, save
-from coartic.analysis.figures.bars import stars
-from coartic.analysis.figures.configurations import (
-    PAPER,
-    common_sequences,
-    configurations,
-    typical_run,
-)
-from coartic.analysis.figures.context import context
-from coartic.analysis.figures.learning_curves import learning_curves
 from coartic.analysis.figures.plot import FORMATS, svg_for_page
-from coartic.analysis.figures.published import published
-from coartic.analysis.figures.recruitment import recruitment
-from coartic.analysis.figures.style import looks
-from coartic.analysis.figures.tasks import tasks_plot
+from coartic.analysis.figures.style import looks, stars
+from coartic.analysis.figures.tasks import draw_tasks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
+from coartic.analysis.report import build
 from coartic.analysis.signatures.register import signatures
+from coartic.analysis.tables.paper import hand_shares, published_differences
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
 from tests.support import made_up
 from tests.support.suites import KNOWN, run_and_write
+
+CONFIGURATIONS = [name for name in FIGURES if name.startswith("configurations")]
 
 
 @pytest.fixture(scope="module")
@@ -41,17 +35,12 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def figures(study):
     """Every figure that these runs allow."""
-    drawn = {}
-    for name, draw in FIGURES.items():
-        try:
-            drawn[name] = draw(study)
-        except CoarticError:
-            continue
-    return drawn
+    drawn = {name: build.drawn(study, name) for name in FIGURES}
+    return {name: plot for name, plot in drawn.items() if plot}
 
 
 def test_every_figure_of_the_papers_cells(figures):
-    assert {"tasks", *PAPER, "learned-reward", "recruitment", "context"} <= set(figures)
+    assert {"tasks", *CONFIGURATIONS, "learned-reward", "recruitment", "context"} <= set(figures)
     assert "published" not in figures  # printed means are of 10,000 trials, these runs of 120
     for name, plot in figures.items():
         assert plot.id == name
@@ -65,10 +54,7 @@ def test_a_folder_without_the_learner(tmp_path):
         load_suite("comparison"), KNOWN, tasks=["descending"], methods=["corrective-alone/given"]
     )
     alone = run_and_write(tmp_path, cells=cells, runs=1)
-    for name in ("learned-reward", "published", "recruitment", "context", *PAPER):
-        with pytest.raises(CoarticError):
-            FIGURES[name](alone)
-    assert len(FIGURES["tasks"](alone).data)
+    assert {name for name in FIGURES if build.drawn(alone, name)} == {"tasks", "ranking"}
 
 
 def test_bars_are_means_of_the_runs(study, figures):
@@ -76,11 +62,11 @@ def test_bars_are_means_of_the_runs(study, figures):
     data = plot.data
     assert len(data) == 7  # three conditions and two, each task with its initial solution
     for row in data[data.method != "initial"].itertuples():
-        own = runs[(runs.task == row.task) & (runs.method == row.method)].reward
-        assert row.reward == pytest.approx(own.astype(float).mean())
-        assert row.low <= row.reward <= row.high
-        # Runs that end all in one reward may have no spread to test, nor what they are tested on.
-        assert own.max() == own.min() or not np.isnan(row.p)
+        rewards = runs[(runs.task == row.task) & (runs.method == row.method)].reward
+        assert row.reward == pytest.approx(rewards.astype(float).mean())
+        assert row.reward_low <= row.reward <= row.reward_high
+        # Runs that end all in one reward may have no spread to test.
+        assert rewards.max() == rewards.min() or not np.isnan(row.p)
     assert data[data.method == "initial"].p.isna().all()
     assert data.p.notna().any()
     first = data[data.method == "initial"].set_index("task")
@@ -96,15 +82,13 @@ def test_bars_are_means_of_the_runs(study, figures):
 
 
 def test_configurations_are_those_of_the_stored_run(study, figures):
-    plots = [figures[name] for name in PAPER]
     movements, waypoints = study.movements
-    for plot in plots:
-        for (name, run_id), rows in plot.data.groupby(["task", "run_id"]):
-            task = load_task(name)
+    for name in CONFIGURATIONS:
+        for (task_name, run_id), rows in figures[name].data.groupby(["task", "run_id"]):
+            task = load_task(task_name)
             if run_id:
                 stored = movements_from(task, movements[run_id], waypoints.get(run_id))
                 execution = execute(task, stored)
-                assert run_id not in plot.caption  # which is for reading; the data name it
             else:
                 execution = corrective_trial(task, "R" * len(task.goals))
             q = rows[list(task.robot.joint_names)].to_numpy()
@@ -112,55 +96,42 @@ def test_configurations_are_those_of_the_stored_run(study, figures):
             assert rows.reward.sum() == execution.reward == rows.total.iloc[0]
             assert rows.goal.tolist() == list(range(len(task.goals) + 1))
     # The chosen hand touches the goal's disc in what is drawn.
-    axes = plots[0].figure.axes[0]
+    axes = figures["configurations-one-armed"].figure.axes[0]
     marked = [line for line in axes.lines if line.get_marker() == "o"]
     tip = np.array(marked[-1].get_xydata()[-1])
     assert np.linalg.norm(tip - load_task("ascending").goals[0]) <= 0.1
 
 
-def test_the_typical_run(study):
-    cell = study.cells["two-armed-1", "dual-process/EC3"].good
-    run_id = typical_run(study, "two-armed-1", "dual-process/EC3")
-    row = cell[cell.run_id == run_id].iloc[0]
-    counts = cell.hands.value_counts()
-    assert counts[row.hands] == counts.max()
-    same = cell[cell.hands == row.hands].reward.astype(float)
-    median = cell.reward.astype(float).median()
-    assert abs(row.reward - median) == (same - median).abs().min()
-    other = next(name for name in cell.run_id if name != run_id)
-    plot = configurations(
-        study,
-        [("two-armed-1", ["dual-process/EC3"])],
-        runs={("two-armed-1", "dual-process/EC3"): other},
-    )
-    assert set(plot.data.run_id) == {"", other}
-    with pytest.raises(CoarticError, match="0000 is no solved run of dual-process/EC3"):
-        configurations(
-            study,
-            [("two-armed-1", ["dual-process/EC3"])],
-            runs={("two-armed-1", "dual-process/EC3"): "0000"},
-        )
+def test_the_typical_run_is_nearest_the_median_of_its_hand_sequence(study):
+    cell = study.cells["two-armed-1", "dual-process/EC3"]
+    for hands in (None, common_sequences(cell)[0]):
+        alike = cell.good if hands is None else cell.good[cell.good.hands == hands]
+        row = cell.good.iloc[typical_run(cell, hands)]
+        rewards = alike.reward.astype(float)
+        assert row.run_id in set(alike.run_id)
+        assert abs(row.reward - rewards.median()) == (rewards - rewards.median()).abs().min()
 
 
-def test_common_hand_sequences_are_a_fifth_of_the_runs(tmp_path):
-    cells = select_cells(
-        load_suite("paper"), KNOWN, tasks=["two-armed-2"], methods=["dual-process/EC3"]
-    )
-    planted = run_and_write(tmp_path, cells=cells, runs=12, trials=20)
-    for hands, expected in (
-        (["LL"] * 5 + ["RR"] * 4 + ["RL"] * 3, ["LL", "RR"]),
+@pytest.mark.parametrize(
+    ("hands", "expected"),
+    [
+        (["LL"] * 5 + ["RR"] * 4 + ["RL"] * 3, ["LL", "RR", "RL"]),
         (["RL"] * 2 + ["LL"] * 10, ["LL"]),
         (["RL"] * 6 + ["LL"] * 6, ["LL", "RL"]),
         ([f"{k}" for k in range(12)], ["0"]),
-    ):
-        own = replace(planted, runs=planted.runs.assign(hands=hands))
-        assert common_sequences(own, "two-armed-2", "dual-process/EC3", 2) == expected
+    ],
+)
+def test_common_hand_sequences_are_a_fifth_of_the_runs(study, hands, expected):
+    cell = study.cells["two-armed-1", "dual-process/EC3"]
+    runs = pd.concat([cell.runs] * 3).assign(hands=hands)
+    assert common_sequences(replace(cell, runs=runs)) == expected
 
 
 def test_learning_curves_against_a_loop(study, monkeypatch):
     window = 7
-    monkeypatch.setattr(import_module("coartic.analysis.figures.learning_curves"), "WINDOW", window)
-    data = learning_curves(study).data
+    comparison = import_module("coartic.analysis.tables.comparison")
+    monkeypatch.setattr(comparison, "WINDOW", window)
+    data = comparison.learning_curves.__wrapped__(study)
     rewards = dict(study.rewards())
     spread = 0
     for key, rows in data.groupby(["task", "method"]):
@@ -179,9 +150,8 @@ def test_learning_curves_against_a_loop(study, monkeypatch):
 
 
 def test_shares_of_hand_sequences(study):
-    data = recruitment(study).data
-    ours = data[data.source == "ours"]
-    for (task, label), rows in ours.groupby(["task", "method"]):
+    data = hand_shares(study)
+    for (task, label), rows in data[data.source == "ours"].groupby(["task", "method"]):
         counts = study.cells[task, label].good.hands.value_counts()
         assert dict(zip(rows.hands, rows.runs, strict=True)) == counts.to_dict()
     assert data.groupby(["task", "method", "source"]).share.sum().to_numpy() == pytest.approx(1)
@@ -189,26 +159,9 @@ def test_shares_of_hand_sequences(study):
     assert dict(zip(paper.hands, paper.runs, strict=True)) == {"RRLR": 11, "RRRR": 9}
 
 
-def test_three_tasks_have_three_panels():
-    names = ["two-armed-1", "two-armed-2", "two-armed-1-m002"]
-    runs = [
-        made_up.row("dual-process/EC2", -500, task=name, run=k) for name in names for k in range(3)
-    ]
-    plot = recruitment(made_up.study_of(pd.DataFrame(runs), list(map(load_task, names))))
-    assert [axes.axison for axes in plot.figure.axes] == [True, True, True, False]
-
-
-def test_context_parts_are_the_signatures(study):
-    (row,) = context(study).data.itertuples()
-    frame = signatures(study).dropna(subset="value").set_index("signature").value
-    assert (row.task, row.method, row.runs) == ("ascending", "dual-process/EC1", 8)
-    assert row.equivalent == frame["motor-equivalent part"]
-    assert row.other == frame["non-motor-equivalent part"]
-
-
 def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     """Signatures planted for several methods, with p that Holm's correction moves."""
-    frame, labels = signatures(study), [f"dual-process/EC1-{k}" for k in range(3)]
+    frame, labels = signatures(study), [f"own-{k}" for k in range(3)]
     parts = frame[frame.signature.isin(["motor-equivalent part", "non-motor-equivalent part"])]
     parts = parts[parts.value.notna()]
     raw = {"motor-equivalent part": [0.0005, 0.02, 0.008],
@@ -220,12 +173,13 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
         ],
         ignore_index=True,
     )
-    own = study.cells["ascending", "dual-process/EC1"]
-    cells = study.cells | {("ascending", label): own for label in labels}
-    of = made_up.MadeUp(study, cells=cells)
+    of = made_up.MadeUp(study)
     of._computed[signatures.__wrapped__] = planted
-    plot = context(of, methods=labels)
+    plot = FIGURES["context"](of)
     data = plot.data.set_index("method").loc[labels]
+    values = parts.set_index("signature").value
+    assert (data.equivalent == values["motor-equivalent part"]).all()
+    assert (data.other == values["non-motor-equivalent part"]).all()
     # Smallest of six times six, the next times five, and so on, never falling.
     together = [p for pair in zip(*raw.values(), strict=True) for p in pair]
     adjusted, floor = {}, 0.0
@@ -247,20 +201,21 @@ def test_published_differences(tmp_path):
     planted.runs["trials"] = 10_000  # planted: the table asks for the paper's length
     planted.runs["hands"] = ["RRRR", "RRRR", "LRLR"]
     planted.runs["reward"] = [-610, -606, -500]
-    data = published(planted).data.set_index("hands")
+    data = published_differences(planted).set_index("hands")
     assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
     assert data.verdict[""] == "undecided"  # also of a mean over sequences
     assert data.difference["RRRR"] == pytest.approx(1.0)
     assert np.isnan(data.difference["RRLR"])
     assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2}
+    assert len(FIGURES["published"](planted).data) == 3
 
 
 def test_variants_of_a_task_are_told_apart():
     task = load_task("ascending")
     moved = task.model_copy(update={"name": "ascending.goal2_0_1"})
-    titles = [axes.get_title(loc="left").strip() for axes in tasks_plot([task, moved]).figure.axes]
+    titles = [axes.get_title(loc="left").strip() for axes in draw_tasks([task, moved]).axes]
     assert titles == ["ascending", "ascending.goal2_0_1"]
-    assert tasks_plot([task]).figure.axes[0].get_title(loc="left").strip() == "Ascending"
+    assert draw_tasks([task]).axes[0].get_title(loc="left").strip() == "Ascending"
 
 
 def test_ranking_is_the_mean_gap_of_the_runs(study, figures):
@@ -271,8 +226,8 @@ def test_ranking_is_the_mean_gap_of_the_runs(study, figures):
         assert row.gap == pytest.approx(((top - rewards) / -top).mean())
 
 
-def test_files_are_the_same_every_time(tmp_path):
-    plot, again = (tasks_plot([load_task("ascending")]) for _ in range(2))
+def test_files_are_the_same_every_time(study, tmp_path):
+    plot, again = (FIGURES["tasks"](study) for _ in range(2))
     first, second = save(plot, tmp_path / "a"), save(again, tmp_path / "b" / "deep")
     assert {path.suffix for path in first} == set(FORMATS)
     for one, two in zip(first, second, strict=True):

@@ -119,14 +119,8 @@ def test_rewards_by_trial(results):
 
 
 def test_sequences_table(results):
-    sequences = results.sequences
-    assert dict(sequences.groupby("task").size()) == {
-        "ascending": 1,
-        "descending": 1,
-        "two-armed-1": 16,
-        "two-armed-2": 16,
-    }
-    assert list(sequences[sequences.task == "two-armed-1"].hands[:2]) == ["LRLR", "RRLR"]
+    assert [len(results.sequences(name)) for name in results.tasks] == [1, 1, 16, 16]
+    assert list(results.sequences("two-armed-1").hands[:2]) == ["LRLR", "RRLR"]
 
 
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
@@ -201,7 +195,7 @@ def test_failures_are_kept_as_data(tmp_path):
     assert list(found.runs.failed_trials[:2]) == [5, 5]
     assert [np.isnan(own).tolist() for _, own in found.rewards()] == [[True] * 5] * 2
     assert found.solutions.empty
-    assert found.sequences.reward.isna().all()
+    assert found.sequences(stuck.name).reward.isna().all()
 
 
 def test_grid_and_fixed_parameters(tmp_path):

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.report import numbers, render, sections
-from coartic.analysis.report.build import page, report_files, summary
+from coartic.analysis.report import numbers, render
+from coartic.analysis.report.build import page, report_files, summary, write_report
 from coartic.analysis.report.text import answers
 from coartic.analysis.report.trace import runs_of, tables_of
 from coartic.analysis.tables import TABLES
@@ -33,15 +33,6 @@ def test_every_row_names_runs_of_the_folder(traced, made):
     assert sum(len(table) > 0 for table in made.values()) >= 8
 
 
-def best_so_far(rewards, trials):
-    """Slow and obvious: the best of the first trials."""
-    best = None
-    for reward in rewards[:trials]:
-        if not np.isnan(reward) and (best is None or reward > best):
-            best = reward
-    return best
-
-
 def recomputed(study, name, row, values):
     """Numbers of a row made again from its runs, by column."""
     runs = study.runs[study.runs.run_id.isin(values.run_ids.split())]
@@ -57,7 +48,7 @@ def recomputed(study, name, row, values):
         return {"runs": len(runs), "ours": mean, "ours_sd": sd}
     if name == "learning":
         curves = dict(study.rewards())
-        best = [best_so_far(curves[run], 100) for run in runs.run_id]
+        best = [np.nanmax(curves[run][:100]) for run in runs.run_id]
         return {"after_100": sum(best) / len(best)}
     if name == "tasks":
         learner = runs[runs.method == f"dual-process/{values.condition}"].reward
@@ -81,10 +72,7 @@ def test_ten_random_numbers_are_made_again_from_the_runs(traced, made):
 
 
 def test_trace_goes_from_a_row_to_its_runs(traced, tmp_path, monkeypatch, capsys):
-    for name, content in report_files(traced, for_paper=False).items():
-        path = tmp_path / "report" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    write_report(traced, tmp_path / "report", for_paper=False)
     tables = tables_of(tmp_path)
     assert set(tables) == {name for name, table in TABLES.items() if len(table(traced))}
     names, _ = runs_of(tables["methods"], None)
@@ -132,7 +120,7 @@ def test_text_from_files_is_escaped():
 
 
 def test_a_page_stands_alone(traced):
-    text = page(traced, list(sections.filled(traced)))
+    text = page(traced)
     assert not re.search(
         r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/|numbers)', text
     )

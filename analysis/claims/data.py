@@ -157,8 +157,7 @@ class Data:
 
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""
-        table = self.study.sequences
-        of_task = table[table.task == task]
+        of_task = self.study.sequences(self.task(task).name)
         if not len(of_task):
             raise MissingError(
                 f"this folder has no rewards of the corrective process alone on {task}"
@@ -169,7 +168,7 @@ class Data:
     def best_sequences(self, task: str) -> tuple[list[str], float]:
         """Hand sequences that are best by the corrective process alone, and their reward."""
         rewards = self.sequences(task)
-        best = best_sequences(self.study.sequences, task)
+        best = best_sequences(self.study.sequences(task))
         if not best:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"

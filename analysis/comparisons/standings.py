@@ -29,7 +29,7 @@ from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.statistics.hypotheses import holm, sign_flip_test
 from coartic.analysis.statistics.instances import gap_share, task_mean
 from coartic.analysis.study import Study, cached
-from coartic.motion.initial import initial_hands
+from coartic.analysis.trajectories import initial_solution
 
 ALL_TASKS = "all tasks"
 """In the column of tasks: the mean over all of them."""
@@ -42,13 +42,12 @@ def ends(study: Study) -> dict[str, tuple[float, int]]:
     The initial solution is the corrective process alone with the task's initial hands, the
     optimum that with all joints free.
     """
-    alone = study.sequences.set_index(["task", "hands"]).reward
     by_task = {}
     for name, task in study.tasks.items():
         best = study.optima.get((name, "free"))
-        start = alone.get((name, initial_hands(task, model=study.model)))
-        if best is not None and not pd.isna(start) and 0 != best.reward > start:
-            by_task[name] = float(start), best.reward
+        initial = initial_solution(task, study.model)
+        if best is not None and initial is not None and 0 != best.reward > -initial.ticks:
+            by_task[name] = float(-initial.ticks), best.reward
     return by_task
 
 

@@ -6,7 +6,6 @@ filled from the tick at which they are hit. Thin lines trace both hands.
 
 from __future__ import annotations
 
-import io
 import math
 import subprocess
 import tempfile
@@ -91,18 +90,19 @@ def animate(
     if not any(panel.trajectory.ticks for panel in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
     timed = timing(max(len(panel.trajectory.configurations) for panel in panels), speed)
-    figure, scenes = _figure(panels, width)
-    writer = _writer(path, timed)
+    figure, scenes = figure_of(panels, width)
+    rate: Any = 1 / timed.interval_s
+    # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
+    gif_rate: Any = 1000 / (1000 * timed.interval_s + 0.5)
+    mp4 = path.suffix.lower() == ".mp4"
+    writer = FFMpegWriter(rate, codec="h264") if mp4 else PillowWriter(gif_rate)
     try:
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
-                for row in timed.rows:
+                for row in [*timed.rows, *[timed.rows[-1]] * timed.held]:
                     for scene in scenes:
                         scene.show(row)
-                    figure.changed()
-                    writer.grab_frame()
-                for _ in range(timed.held):
                     writer.grab_frame()
             write_outputs({path: film.read_bytes()}, replace=replace)
     except OSError as error:
@@ -124,25 +124,7 @@ def check_output(path: Path, *, replace: bool = False) -> None:
     check_outputs([path], replace=replace)
 
 
-class _Film(Figure):
-    """A figure whose picture is drawn once for all frames in which nothing changes."""
-
-    _drawn = b""
-
-    def changed(self) -> None:
-        """What is saved next is another picture."""
-        self._drawn = b""
-
-    def savefig(self, fname: Any, **more: Any) -> None:
-        """Write the picture to a stream: all frames of a film are saved alike."""
-        if not self._drawn:
-            stream = io.BytesIO()
-            super().savefig(stream, **more)
-            self._drawn = stream.getvalue()
-        fname.write(self._drawn)
-
-
-class _Scene:
+class Scene:
     """What moves in one panel: updated, never drawn anew."""
 
     def __init__(self, axes: Axes, trajectory: Trajectory) -> None:
@@ -179,8 +161,8 @@ class _Scene:
             arm.set_data(*robot.joint_positions(q, hand).T)
             self._traces[hand].set_data(*self._paths[hand][: row + 1].T)
         hit = trajectory.hits <= row
-        for circle, done in zip(self._goals, hit, strict=True):
-            circle.set_facecolor(_HIT if done else "none")
+        for circle, is_hit in zip(self._goals, hit, strict=True):
+            circle.set_facecolor(_HIT if is_hit else "none")
         state = "done"
         if not hit.all():
             goal = int(np.argmin(hit))
@@ -189,7 +171,7 @@ class _Scene:
         self._status.set_text(f"reward {f'−{spent}' if spent else 0}   {state}")
 
 
-def _figure(panels: Sequence[Panel], width: int) -> tuple[_Film, list[_Scene]]:
+def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
     movements = [panel.trajectory for panel in panels]
     corners = np.array([box(movement.task, movement.configurations) for movement in movements])
@@ -199,7 +181,7 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[_Film, list[_Scene]]:
     wide = inches / count - _LEFT - _RIGHT
     # Even in pixels, as MP4 wants it.
     height = 2 * round((wide * up / across + _ABOVE + _BELOW) * _DPI / 2) / _DPI
-    figure = _Film(figsize=(inches, height), dpi=_DPI)
+    figure = Figure(figsize=(inches, height), dpi=_DPI)
     for index, panel in enumerate(panels):
         left, tall = index / count + _LEFT / inches, 1 - (_ABOVE + _BELOW) / height
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
@@ -226,13 +208,4 @@ def _figure(panels: Sequence[Panel], width: int) -> tuple[_Film, list[_Scene]]:
         axes.set_title("", loc="left")
         for text in list(axes.texts):
             text.remove()
-    return figure, [_Scene(*of) for of in zip(figure.axes, movements, strict=True)]
-
-
-def _writer(path: Path, timed: Pace) -> Any:
-    rate: Any = 1 / timed.interval_s
-    if path.suffix.lower() == ".mp4":
-        return FFMpegWriter(fps=rate, codec="h264")
-    # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
-    rate = 1000 / (1000 * timed.interval_s + 0.5)
-    return PillowWriter(fps=rate)
+    return figure, [Scene(*of) for of in zip(figure.axes, movements, strict=True)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,19 +15,18 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from coartic import CoarticError, Task
-from coartic.analysis.figures.style import CONFIDENCE, GREY, INK, PAPER, RC, TIP, dagger
+from coartic.analysis.figures.style import GREY, INK, PAPER, RC, TIP, styled
 from coartic.analysis.methods import name_of
-from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.words import read_beside
+from coartic.analysis.study import Study
+from coartic.analysis.words import RECONSTRUCTED
 from coartic.files import write_atomically
 from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
 DPI = 300
-_FAMILY = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
-_WORDS: dict[str, dict[str, str]] = read_beside(__file__, "words")
+_FONTS = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-_NO_DATE: dict[str, dict[str, Any]] = {
+_NO_DATE: Mapping[str, Mapping[str, Any]] = {
     ".pdf": {"CreationDate": None},
     ".svg": {"Date": None},
     ".png": {"Software": None},
@@ -50,29 +49,46 @@ class Plot:
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows."""
-        return picture(self, ".png")
+        return picture(self.figure, ".png")
 
 
-def worded(
-    name: str,
-    figure: Figure,
-    data: pd.DataFrame,
-    of_tasks: Iterable[Task] = (),
-    *,
-    id: str | None = None,  # noqa: A002
-    **facts: object,
-) -> Plot:
-    """A figure with its words from ``words.toml``, names in them filled in.
+FIGURES: dict[str, Callable[[Study], Plot]] = {}
+"""Every figure by its id: a function of a study. It raises CoarticError where the folder's runs do
+not allow its figure."""
+Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
+"""A figure, the table that it shows, its alternative text, and the tasks that it is about."""
 
-    ``of_tasks``: what a dagger means is said where one of them is reconstructed; ``id``: where it
-    is not ``name``.
+
+def figure(
+    name: str, title: str, caption: str
+) -> Callable[[Callable[[Study], Parts]], Callable[[Study], Plot]]:
+    """A decorator: what draws a study becomes a figure with this id, title and caption.
+
+    It is drawn in the style of all figures. The caption says what a dagger means where one of the
+    tasks is reconstructed.
     """
-    words = {
-        part: text.format(confidence=CONFIDENCE, seed=SEED, **facts)
-        for part, text in _WORDS[name].items()
-    }
-    words["caption"] += dagger(of_tasks)
-    return Plot(id or name, figure=figure, data=data, **words)
+
+    def as_figure(draw: Callable[[Study], Parts]) -> Callable[[Study], Plot]:
+        @styled
+        def plot(study: Study) -> Plot:
+            drawing, data, alt, tasks = draw(study)
+            return Plot(name, title, caption + dagger(tasks), alt, drawing, data)
+
+        plot.__doc__ = draw.__doc__
+        FIGURES[name] = plot
+        return plot
+
+    return as_figure
+
+
+def dagger(tasks: Iterable[Task]) -> str:
+    """What the dagger means, for a caption; empty where no task is reconstructed."""
+    return f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
+
+
+def missing(study: Study, what: str) -> CoarticError:
+    """The error of a figure that the folder's runs do not allow."""
+    return CoarticError(f"{study.folder}: {what}")
 
 
 def spoken(rows: pd.DataFrame, template: str) -> str:
@@ -81,14 +97,14 @@ def spoken(rows: pd.DataFrame, template: str) -> str:
     return "; ".join(template.format_map(row) for row in named.to_dict("records"))
 
 
-def picture(plot: Plot, ending: str) -> bytes:
-    """The figure as a file with this ending, one of :data:`FORMATS`.
+def picture(drawing: Figure, ending: str) -> bytes:
+    """A figure as a file with this ending, one of :data:`FORMATS`.
 
     The same figure gives the same bytes: ids are salted, no date is written.
     """
     stream = io.BytesIO()
     with rc_context(RC):
-        plot.figure.savefig(stream, format=ending[1:], dpi=DPI, metadata=_NO_DATE[ending])
+        drawing.savefig(stream, format=ending[1:], dpi=DPI, metadata=_NO_DATE[ending])
     return stream.getvalue()
 
 
@@ -101,7 +117,7 @@ def save(plot: Plot, folder: Path) -> list[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            write_atomically(path, picture(plot, path.suffix))
+            write_atomically(path, picture(plot.figure, path.suffix))
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror or error}") from None
     return paths
@@ -127,9 +143,9 @@ def svg_for_page(plot: Plot) -> str:
     text = text.replace(GREY, f"var(--grey, {GREY})")
     head, body = text.split(">", 1)
     head = re.sub(r' (width|height|version|xmlns:xlink)="[^"]*"', "", head)
-    # What the backend says for all elements would go for all of the page.
+    # Styles that the backend gives to all elements would apply to the whole page.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
     head += ' stroke-linejoin="round" stroke-linecap="butt"'
-    head += f' font-family="{_FAMILY}" fill="currentColor"'
+    head += f' font-family="{_FONTS}" fill="currentColor"'
     head += f' role="img" aria-label="{html.escape(one_line(plot.alt))}"'
     return f"{head}>{body.replace('xlink:href', 'href')}".strip()

@@ -10,96 +10,79 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from coartic import Task
 from coartic.analysis.figures import style
-from coartic.analysis.figures.choice import NO_CONTEXTS, missing
-from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.figures.robot import MARKERS, box
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.shared_goal import shared_goal
 from coartic.analysis.study import Study
-from coartic.robot import Array
 
-_COLORS = (style.BLUE, style.VERMILLION)
-_LETTERS = 9  # points: beside others on the first screen it is small
+_LETTERS = 9  # points: the page shows it small
 _RUNS: Any = {"linewidth": 0.4, "alpha": 0.25, "zorder": 1}
 
 
-@style.styled
-def postures(study: Study) -> Plot:
-    """The postures at one goal before two others, overlaid: all runs faint, their means strong.
+@figure(
+    "postures",
+    "One goal, two postures",
+    "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
+    "thin: every run. Dashed arrows lead to the next goal.",
+)
+def postures(study: Study) -> Parts:
+    """The postures at one goal before two others, overlaid: all runs faint, their means strong."""
+    shared = shared_goal(study)
+    if shared is None:
+        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+    drawing = Figure(figsize=(style.ONE, 1.6), layout="constrained")
+    draw_postures(drawing.subplots(), shared)
+    parts = []
+    for task, runs in zip(shared.tasks, shared.postures, strict=True):
+        joints = dict(zip(task.robot.joint_names, runs.T, strict=True))
+        named = {"task": task.name, "method": shared.method, "goal": shared.goal}
+        parts.append(pd.DataFrame({**named, "hand": shared.hand, **joints}))
+    first, second = (task.label for task in shared.tasks)
+    alt = (
+        f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share "
+        f"({name_of(shared.method)}): {shared.apart:.2f} apart in joint space, while the hand is "
+        f"at almost the same place ({shared.hands_apart:.2f} apart)."
+    )
+    return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
 
-    Raises CoarticError where no method has solved runs on two tasks that share their first goals.
-    """
-    found = shared_goal(study)
-    if found is None:
-        raise missing(study, NO_CONTEXTS)
-    figure = Figure(figsize=(style.ONE, 1.6), layout="constrained")
-    _draw(figure.subplots(), found)
-    method = name_of(found.method)
-    return worded("postures", figure, _data(found), found.tasks, found=found, method=method)
 
-
-def _draw(axes: Axes, found: TwoContexts) -> None:
+def draw_postures(axes: Axes, shared: TwoContexts) -> None:
+    """Both tasks' postures with the shared goal and the next ones."""
     axes.set_axis_off()
     axes.set_aspect("equal")
-    shown = np.concatenate([q.mean(axis=0)[None] for q in found.postures])
-    low, high = box(found.tasks[0], shown)
-    goals = [np.array(task.goals[found.goal]) for task in found.tasks]
-    low, high = (
-        np.minimum(low, np.min(goals, axis=0) - 0.6),
-        np.maximum(high, np.max(goals, 0) + 0.6),
-    )
+    means = [runs.mean(axis=0) for runs in shared.postures]
+    goals = np.array([task.goals[shared.goal] for task in shared.tasks])
+    low, high = box(shared.tasks[0], means)
+    low = np.minimum(low, goals.min(axis=0) - 0.6)
+    high = np.maximum(high, goals.max(axis=0) + 0.6)
     axes.set_xlim(low[0], high[0] + 1.5)
     axes.set_ylim(low[1], high[1])
-    shared = found.tasks[0].goals[found.goal - 1]
-    for task, color, runs, (x, y) in zip(found.tasks, _COLORS, found.postures, goals, strict=True):
+    at, radius = shared.tasks[0].goals[shared.goal - 1], shared.tasks[0].radius
+    words: Any = {"textcoords": "offset points", "fontsize": _LETTERS}
+    colors = (style.BLUE, style.VERMILLION)
+    rows = zip(shared.tasks, colors, shared.postures, means, goals.tolist(), strict=True)
+    for task, color, runs, mean, following in rows:
         for q in runs:
-            axes.plot(*task.robot.joint_positions(q, found.hand).T, color=color, **_RUNS)
-        following = float(x), float(y)
-        mean = runs.mean(axis=0)
+            axes.plot(*task.robot.joint_positions(q, shared.hand).T, color=color, **_RUNS)
         outline = task.robot.base_outline(mean)
         axes.fill(*outline.T, facecolor=color, alpha=0.12, edgecolor=color, linewidth=0.8)
-        look = MARKERS[found.hand]
-        joints = task.robot.joint_positions(mean, found.hand).T
-        axes.plot(*joints, color=color, linewidth=1.6, zorder=3, **look)
+        joints = task.robot.joint_positions(mean, shared.hand).T
+        axes.plot(*joints, color=color, linewidth=1.6, zorder=3, **MARKERS[shared.hand])
+        arrow = {"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4, "linewidth": 0.8}
+        axes.annotate("", following, at, zorder=2, arrowprops={**arrow, "linestyle": (0, (3, 2))})
+        axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))
+        next_goal = f"then goal {shared.goal + 1}\n({task.label.lower()})"
+        axes.annotate(next_goal, following, (5, 0), va="center", ha="left", **words)
+        # The base's name stands on the side of the next goal.
+        above = following[1] >= at[1]
+        place = outline.mean(axis=0)[0], outline[:, 1].max() if above else outline[:, 1].min()
         axes.annotate(
-            "", following, shared, zorder=2,
-            arrowprops={"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4,
-                        "linewidth": 0.8, "linestyle": (0, (3, 2))},
+            f"base,\n{task.label.lower()}", place, (0, 3 if above else -3),
+            ha="center", va="bottom" if above else "top", **words,
         )  # fmt: skip
-        axes.add_artist(Circle(following, task.radius, fill=False, edgecolor=color))
-        up = following[1] >= shared[1]
-        axes.annotate(
-            f"then goal {found.goal + 1}\n({task.label.lower()})", following, (5, 0),
-            textcoords="offset points", va="center", ha="left", fontsize=_LETTERS,
-        )  # fmt: skip
-        _base(axes, task, mean, above=up)
-    axes.add_artist(
-        Circle(shared, found.tasks[0].radius, fill=False, edgecolor=style.INK, linewidth=1.1)
-    )
-    axes.annotate(
-        f"goal {found.goal},\nthe same", shared, (7, 0), textcoords="offset points",
-        va="center", weight="bold", fontsize=_LETTERS,
-    )  # fmt: skip
-
-
-def _base(axes: Axes, task: Task, q: Array, *, above: bool) -> None:
-    """Which posture is which, at its base."""
-    outline = task.robot.base_outline(q)
-    place = outline.mean(axis=0)[0], outline[:, 1].max() if above else outline[:, 1].min()
-    axes.annotate(
-        f"base,\n{task.label.lower()}", place, (0, 3 if above else -3), textcoords="offset points",
-        ha="center", va="bottom" if above else "top", fontsize=_LETTERS,
-    )  # fmt: skip
-
-
-def _data(found: TwoContexts) -> pd.DataFrame:
-    """One row a run: task and posture at the shared goal."""
-    parts = []
-    for task, runs in zip(found.tasks, found.postures, strict=True):
-        joints = dict(zip(task.robot.joint_names, runs.T, strict=True))
-        named = {"task": task.name, "method": found.method, "goal": found.goal}
-        parts.append(pd.DataFrame({**named, "hand": found.hand, **joints}))
-    return pd.concat(parts, ignore_index=True)
+    axes.add_artist(Circle(at, radius, fill=False, edgecolor=style.INK, linewidth=1.1))
+    here = f"goal {shared.goal},\nthe same"
+    axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)

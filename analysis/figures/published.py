@@ -3,123 +3,88 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coartic.analysis.comparisons.paper import PaperRow, SequenceRow, paper_rows, sequence_rows
 from coartic.analysis.figures import style
-from coartic.analysis.figures.choice import missing
-from coartic.analysis.figures.plot import Plot, worded
-from coartic.analysis.methods import CONDITIONS, name_of
-from coartic.analysis.published import TRIALS, Summary
-from coartic.analysis.statistics.equivalence import MARGIN, Equivalence
+from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.methods import name_of
+from coartic.analysis.published import TRIALS
+from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.study import Study
+from coartic.analysis.tables.paper import published_differences
 from coartic.analysis.words import marked
 
 _MARKS = {
     "equivalent": (style.BLUE, "o", style.BLUE),
     "undecided": (style.INK, "s", style.PAPER),
     "different": (style.VERMILLION, "D", style.VERMILLION),
+    "": (style.INK, "x", style.INK),
 }
 
 
-@style.styled
-def published(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
-    """Difference of every mean reward to the printed one, with interval and margin.
-
-    Cells with the paper's number of trials, by default of its conditions; where it reports
-    hand sequences, those too. Raises CoarticError where the folder has none of the paper's cells.
-    """
-    found, labels = study.tasks, methods or CONDITIONS
-    places = [(name, label) for name in found for label in labels]
-    whole = {(row.cell.task, row.cell.label): row for row in paper_rows(study) if row.comparable}
-    sequences = sequence_rows(study)
-    rows = [
-        _row(row, row.published, len(whole[place].rewards))
-        for place in places
-        if place in whole and len(whole[place].rewards)
-        for row in _rows(whole[place], sequences)
-        if row.published is not None
-    ]
-    if not rows:
+@figure(
+    "published",
+    "Published and ours",
+    f"Our mean learned reward minus the published one, with its {style.CONFIDENCE} interval. Grey: "
+    f"margin of equivalence, ±{100 * MARGIN:.0f} % of the published reward. Filled circles: the "
+    "interval lies within the margin (equivalent). Open squares: it crosses the margin "
+    "(undecided). Diamonds: it lies outside (different). ↳: runs with one hand sequence; in "
+    "brackets, how many of our runs have it, then how many of the published ones. * pooled from "
+    "several printed sequences.",
+)
+def published(study: Study) -> Parts:
+    """Difference of every mean reward to the printed one, with interval and margin."""
+    data = published_differences(study)
+    if not len(data):
         raise missing(
-            study,
-            f"no solved runs with {TRIALS} trials of {', '.join(labels)} on a task that the "
-            "paper prints a reward of",
+            study, f"no solved runs of the learner with {TRIALS} trials on a task of the paper"
         )
-    data = pd.DataFrame(rows)
-    figure = Figure(figsize=(style.ONE, 0.85 + 0.185 * len(data)), layout="constrained")
-    axes = figure.subplots()
-    _draw(axes, data, {name: marked(name, own) for name, own in found.items()})
-    shown = {name: found[name] for name in data.task.unique()}
+    drawing = Figure(figsize=(style.ONE, 0.85 + 0.185 * len(data)), layout="constrained")
+    tasks = {name: task for name, task in study.tasks.items() if (data.task == name).any()}
+    rows = data.to_dict("records")
+    names = []
+    for row in rows:
+        if row["hands"]:
+            runs = row["published_runs"]
+            printed = "" if runs is None or math.isnan(runs) else f"; {runs:.0f}"
+            names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
+        else:
+            pooled = "*" if row["pooled"] else ""
+            name = marked(row["task"], tasks[row["task"]])
+            names.append(f"{name}, {name_of(row['method'])}{pooled}")
+    axes = drawing.subplots()
+    for place, row in enumerate(rows):
+        draw_row(axes, -place, row)
+    axes.axvline(0, color=style.INK, linewidth=0.6)
+    style.name_rows(axes, names)
+    axes.spines["left"].set_visible(False)
+    # Symmetric about zero: wide enough for every interval and margin.
+    ends = ["difference", "difference_low", "difference_high", "margin"]
+    reach = np.nanmax(np.abs(data.reindex(columns=ends).to_numpy(float)))
+    axes.set_xlim(-1.05 * reach, 1.05 * reach)
+    axes.set_xlabel("ours − published (ticks)")
     words = "; ".join(
         f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
         + f": {row['difference']:+.1f}"
         for row in rows
         if row["runs"]
     )
-    margin = f"{100 * MARGIN:.0f}"
-    return worded("published", figure, data, shown.values(), margin=margin, differences=words)
+    alt = f"Differences of our mean rewards to the published ones, with intervals. {words}."
+    return drawing, data, alt, tasks.values()
 
 
-def _rows(whole: PaperRow, sequences: Sequence[SequenceRow]) -> Iterator[SequenceRow]:
-    """A cell, then each hand sequence that the paper prints a reward of, where it tells them."""
-    paper = whole.paper
-    if (printed := paper.summary) is not None:
-        yield SequenceRow(whole.cell, "", printed, printed.runs, whole.rewards, whole.difference)
-    if len(paper.sequences) > 1:
-        yield from (own for own in sequences if own.cell is whole.cell)
-
-
-def _row(own: SequenceRow, paper: Summary, of_runs: int) -> dict[str, Any]:
-    found = own.difference or Equivalence(math.nan, (), "", margin=math.nan)
-    return {
-        "task": own.cell.task,
-        "method": own.cell.label,
-        "hands": own.hands,
-        "runs": len(own.rewards),
-        "of_runs": of_runs,
-        "reward": float(own.rewards.mean()) if len(own.rewards) else math.nan,
-        "published": paper.mean,
-        "published_sd": math.nan if paper.sd is None else paper.sd,
-        "published_runs": own.published_runs,
-        "pooled": paper.derived,
-        "margin": MARGIN * abs(paper.mean),
-        "difference": found.estimate,
-        "low": found.low,
-        "high": found.high,
-        "verdict": "" if math.isnan(found.low) else found.verdict,
-    }
-
-
-def _draw(axes: Axes, data: pd.DataFrame, marked: dict[str, str]) -> None:
-    names = []
-    for place, row in enumerate(data.to_dict("records")):
-        y = -place
-        axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.3)
-        value = row["difference"]
-        color, marker, face = _MARKS.get(row["verdict"], (style.INK, "x", style.INK))
-        if not math.isnan(value):
-            if not math.isnan(row["low"]):
-                axes.plot([row["low"], row["high"]], [y, y], color=color, linewidth=1.0)
-            axes.plot(value, y, marker, color=color, markersize=4, markerfacecolor=face)
-        if not row["runs"]:
-            axes.text(1.3 * row["margin"], y, "never found here", va="center", color=style.GREY)
-        if row["hands"]:
-            printed = "" if row["published_runs"] is None else f"; {row['published_runs']:.0f}"
-            names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
-        else:
-            star = "*" if row["pooled"] else ""
-            names.append(f"{marked[row['task']]}, {name_of(row['method'])}{star}")
-    axes.axvline(0, color=style.INK, linewidth=0.6)
-    style.name_rows(axes, names)
-    axes.spines["left"].set_visible(False)
-    # The widest interval need not hide the others: symmetric about zero at least to margins.
-    reach = np.nanmax(np.abs(data[["low", "high", "difference", "margin"]].to_numpy(float)))
-    axes.set_xlim(-1.05 * reach, 1.05 * reach)
-    axes.set_xlabel("ours − published (ticks)")
+def draw_row(axes: Axes, y: float, row: Any) -> None:
+    """Margin, interval and difference of one comparison."""
+    axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.3)
+    color, marker, face = _MARKS[str(row["verdict"])]
+    if not row["runs"]:
+        axes.text(1.3 * row["margin"], y, "never found here", va="center", color=style.GREY)
+        return
+    low, high = row["difference_low"], row["difference_high"]
+    if not math.isnan(low):
+        axes.plot([low, high], [y, y], color=color, linewidth=1.0)
+    axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)

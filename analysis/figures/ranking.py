@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
@@ -12,45 +11,46 @@ from matplotlib.axes import Axes
 from coartic.analysis.comparisons.methods import GROUPS
 from coartic.analysis.comparisons.standings import ALL_TASKS, standings
 from coartic.analysis.figures import style
-from coartic.analysis.figures.choice import missing
-from coartic.analysis.figures.plot import Plot, spoken, worded
-from coartic.analysis.methods import is_learner, look_alike, name_of
+from coartic.analysis.figures.plot import Parts, figure, missing, spoken
+from coartic.analysis.methods import is_learner, name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import in_brackets, number
 
 
-@style.styled
-def ranking(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
-    """Gap to the optimum of every method over all tasks, or on the one that there is.
-
-    Raises CoarticError where no optimum is known.
-    """
+@figure(
+    "ranking",
+    "Gap to the optimum",
+    "Gap from the mean reward to the optimum, as a share of the optimum (mean over all tasks where "
+    f"there are several), with its {style.CONFIDENCE} bootstrap interval over runs. Methods that "
+    "are run once have no interval. Diamonds and bold names: the paper's learner.",
+)
+def ranking(study: Study) -> Parts:
+    """Gap to the optimum of every method over all tasks, or on the one that there is."""
     data = standings(study)
-    if methods is not None:
-        data = data[data.method.isin(methods)]
     if not len(data):
         raise missing(study, "no method with a solution to every run and a known optimum")
-    shown = data[data.task == data.task.iloc[0]]
-    percent = shown.assign(**{name: 100 * shown[name] for name in ("gap", "low", "high")})
+    rows = data[data.task == data.task.iloc[0]]
+    percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "low", "high")})
     groups = [(group, percent[percent.knows == group]) for group in GROUPS]
-    groups = [(group, rows) for group, rows in groups if len(rows)]
-    heights = [len(rows) + 0.8 for _, rows in groups]
-    size = 1.25 * style.ONE, 0.5 + 0.145 * (len(shown) + len(groups))
-    figure, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
-    for axes, (group, rows) in zip(panels, groups, strict=True):
-        _panel(axes, group, rows)
+    groups = [(group, of_group) for group, of_group in groups if len(of_group)]
+    heights = [len(of_group) + 0.8 for _, of_group in groups]
+    size = 1.25 * style.ONE, 0.5 + 0.145 * (len(rows) + len(groups))
+    drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
+    for axes, (group, of_group) in zip(panels, groups, strict=True):
+        draw_group(axes, group, of_group)
     farthest = percent[["gap", "high"]].max(axis=None)
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
-    panels[-1].set_xlabel("gap to the optimum (%)")
-    over = "mean over all tasks" if shown.task.iloc[0] == ALL_TASKS else f"on {shown.task.iloc[0]}"
-    gaps = spoken(percent, "{method} {gap:.1f} %")
-    return worded("ranking", figure, data, study.tasks.values(), over=over, gaps=gaps)
+    where = "" if rows.task.iloc[0] == ALL_TASKS else f" on {rows.task.iloc[0]}"
+    panels[-1].set_xlabel(f"gap to the optimum{where} (%)")
+    alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
+    return drawing, data, alt, study.tasks.values()
 
 
-def _panel(axes: Axes, group: str, rows: pd.DataFrame) -> None:
+def draw_group(axes: Axes, group: str, rows: pd.DataFrame) -> None:
+    """Methods that know as much of the reward, nearest first."""
     axes.set_title(f"{group[0].upper()}{group[1:]}")
     for place, row in enumerate(rows.to_dict("records")):
-        color = style.looks([look_alike(row["method"])])[look_alike(row["method"])].color
+        color = style.look_of(row["method"]).color
         mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
         end = row["gap"]
         if not math.isnan(row["low"]):

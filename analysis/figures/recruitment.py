@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
@@ -10,83 +9,65 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from coartic import Task
-from coartic.analysis.comparisons.paper import published_of
 from coartic.analysis.figures import style
-from coartic.analysis.figures.choice import chosen, has, missing, solved
-from coartic.analysis.figures.plot import Plot, worded
-from coartic.analysis.methods import name_of
-from coartic.analysis.published import RUNS
+from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.methods import main_methods, name_of
 from coartic.analysis.study import Study
+from coartic.analysis.tables.paper import hand_shares
 
 MOST = len(style.PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""
-OTHERS = "others"
 _EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
 
 
-@style.styled
-def recruitment(study: Study, *, methods: Sequence[str] | None = None) -> Plot:
-    """Shares of hand sequences of each method, one panel a task with two hands.
-
-    Where the paper prints the number of runs of each sequence, its shares stand below ours.
-    Raises CoarticError where no method was run on a task with two hands.
-    """
-    found = {name: task for name, task in study.tasks.items() if len(task.hands) > 1}
-    if not found:
-        raise missing(study, "no task with two hands")
-    labels = chosen(study, list(found), methods)
-    data = pd.concat([_shares(study, name, labels) for name in found], ignore_index=True)
-    found = {name: task for name, task in found.items() if name in set(data.task)}
+@figure(
+    "recruitment",
+    "Hand sequences",
+    "Share of runs by hand sequence (L left, R right, goal by goal); numbers are runs. Hatched: "
+    "published. Rare sequences are grey.",
+)
+def recruitment(study: Study) -> Parts:
+    """Shares of hand sequences of each main method, one panel for each task with two hands."""
+    data = hand_shares(study)
+    data = data[data.task.isin(one_by_one(study)) & data.method.isin(main_methods(data.method))]
+    if not len(data):
+        raise missing(study, "no solved run on a task with two hands")
+    # Methods stand in one order on all tasks.
+    order_of = {label: place for place, label in enumerate(main_methods(data.method))}
+    data = data.sort_values(
+        "method", key=lambda labels: labels.map(order_of), kind="stable", ignore_index=True
+    )
+    tasks = [task for name, task in study.tasks.items() if (data.task == name).any()]
     shares = data[data.source == "ours"].groupby("hands").share.sum()
-    printed = data[data.source == "published"].hands
     common = shares.sort_values(ascending=False, kind="stable").index
-    order = list(dict.fromkeys([*printed, *common]))  # what is compared has a colour
-    bars = [len(data[data.task == name].drop_duplicates(["method", "source"])) for name in found]
-    shape = style.grid(len(found), 2)
-    size = style.TWO, (0.75 + 0.155 * max(bars)) * shape[0]
-    figure, panels = style.figure_of(shape, size)
+    # Sequences to be compared with published ones have a colour.
+    order = list(dict.fromkeys([*data[data.source == "published"].hands, *common]))
     colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
-    for axes in panels[len(found) :]:
+    shape = style.grid(len(tasks), 2)
+    bars = data.drop_duplicates(["task", "method", "source"]).task.value_counts().max()
+    size = style.TWO, (0.75 + 0.155 * bars) * shape[0]
+    drawing, panels = style.figure_of(shape, size)
+    for axes in panels[len(tasks) :]:
         axes.set_axis_off()
-    panels = panels[: len(found)]
-    for axes, task in zip(panels, found.values(), strict=True):
-        _panel(axes, task, data[data.task == task.name], order, colors)
-    style.letters(panels)
-    colors |= {OTHERS: style.GREY} if len(order) > MOST else {}
+    for axes, task in zip(panels, tasks, strict=False):
+        draw_bars(axes, task, data[data.task == task.name], order, colors)
+    style.letters(panels[: len(tasks)])
+    colors |= {"others": style.GREY} if len(order) > MOST else {}
     handles = [Patch(facecolor=color, label=hands, **_EDGE) for hands, color in colors.items()]
-    style.legend(figure, handles, len(handles), handlelength=1.0, columnspacing=1.2)
-    words = "; ".join(
+    style.legend(drawing, handles, len(handles), handlelength=1.0, columnspacing=1.2)
+    alt = "; ".join(
         f"{task}, {name_of(str(label))}{'' if source == 'ours' else ', published'}: "
         + ", ".join(f"{row.hands} {row.share:.0%}" for row in rows.itertuples())
         for (task, label, source), rows in data.groupby(["task", "method", "source"], sort=False)
     )
-    return worded("recruitment", figure, data, found.values(), shares=words)
+    return drawing, data, f"Stacked bars of hand sequences. {alt}.", tasks
 
 
-def _shares(study: Study, task: str, labels: Sequence[str]) -> pd.DataFrame:
-    """One row a method, source and sequence, the commonest first."""
-    rows = []
-    for label in labels:
-        if not has(study, task, label):
-            continue
-        counts = solved(study, task, label).good.hands.value_counts()
-        rows += [(task, label, "ours", str(hands), int(n)) for hands, n in counts.items()]
-        paper = published_of(study.cells[task, label])
-        printed = paper.sequences if paper else {}
-        if sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS:
-            rows += [
-                (task, label, "published", hands, summary.runs)
-                for hands, summary in printed.items()
-                if summary.printed_runs
-            ]
-    frame = pd.DataFrame(rows, columns=["task", "method", "source", "hands", "runs"])
-    totals = frame.groupby(["method", "source"]).runs.transform("sum")
-    return frame.assign(share=frame.runs / totals)
-
-
-def _panel(
+def draw_bars(
     axes: Axes, task: Task, data: pd.DataFrame, order: list[str], colors: dict[str, str]
 ) -> None:
+    """A bar for each method, and below it the published one."""
     names = []
     groups = data.groupby(["method", "source"], sort=False)
     for place, ((label, source), rows) in enumerate(groups):

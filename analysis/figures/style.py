@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any, NamedTuple
@@ -21,9 +21,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import Task
-from coartic.analysis.methods import KNOWN_METHODS, Color, Dash
+from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, look_alike
 from coartic.analysis.statistics import estimates
-from coartic.analysis.words import RECONSTRUCTED, marked
+from coartic.analysis.words import marked
 
 amount = EngFormatter(sep="")
 """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
@@ -40,6 +40,7 @@ RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
 CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Of all intervals, for captions."""
+STARS = "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant"
 PAPER = "#ffffff"
 TIP = "tip:"
 """How the id of a mark with a :func:`tip` begins."""
@@ -103,16 +104,24 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
     return {label: own.get(label) or next(free) for label in dict.fromkeys(labels)}
 
 
+def look_of(label: str) -> Look:
+    """Look of one method, the learner over all tasks like its two-armed condition."""
+    alike = look_alike(label)
+    return looks([alike])[alike]
+
+
+def stars(p: float) -> str:
+    """Significance as :data:`STARS` says; a dash where there is no test."""
+    if math.isnan(p):
+        return "–"
+    return "***" if p < 0.001 else "**" if p < 0.01 else "*" if p < 0.05 else "n.s."
+
+
 def heading(task: Task) -> str:
     """A task's name above a panel, with a dagger where it is reconstructed."""
     # Variants of a task share its title, but not its name.
     name = task.label if task.label.lower().replace(" ", "-") == task.name else task.name
     return marked(name, task)
-
-
-def dagger(tasks: Iterable[Task]) -> str:
-    """What the dagger means, for a caption; empty where no task is reconstructed."""
-    return f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
 
 
 def column_width(inches: float) -> float:
@@ -132,28 +141,6 @@ def figure_of(
     """A figure with so many rows and columns of panels, in inches, and its panels row by row."""
     figure = Figure(figsize=size, layout="constrained")
     return figure, figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
-
-
-def task_panels(
-    tasks: Collection[Task], tall: float, legend: float, across: str, up: str, **subplots: Any
-) -> tuple[Figure, list[Axes]]:
-    """A panel a task, lettered, with its name and the axes' labels at the edges of the grid.
-
-    ``tall``, ``legend``: inches of a panel, where the page allows, and of the legend.
-    """
-    rows, columns = grid(len(tasks))
-    height = tall * rows + legend
-    figure, panels = figure_of((rows, columns), (TWO, min(height, TALLEST)), **subplots)
-    for axes in panels[len(tasks) :]:
-        axes.set_axis_off()
-    for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
-        axes.set_title(heading(task))
-        axes.tick_params(labelbottom=True)  # also where an axis is shared
-        axes.set_ylabel("" if place % columns else up)
-        axes.set_xlabel(across if place + columns >= len(tasks) else "")
-    shown = panels[: len(tasks)]
-    letters(shown)
-    return figure, shown
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:

@@ -5,27 +5,44 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from coartic import Task
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Plot, worded
+from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
+from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.study import Study
 
 
-def tasks(study: Study) -> Plot:
-    """:func:`tasks_plot` of a folder's tasks."""
-    return tasks_plot(list(study.tasks.values()))
+@figure(
+    "tasks",
+    "Tasks",
+    "Start configuration and goals of each task. Open squares mark the left arm, closed circles "
+    "the right arm. Open circles are the goals, drawn to scale and hit in the order of their "
+    "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
+)
+def tasks(study: Study) -> Parts:
+    """Start configuration and goals of each task, one panel for each."""
+    shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
+    if not shown:
+        raise missing(study, "only random tasks, too many to show each")
+    rows: list[dict[str, object]] = []
+    for task in shown:
+        start = dict(zip(task.robot.joint_names, task.q0.tolist(), strict=True))
+        rows.append({"task": task.name, "goal": 0, **start})
+        rows += [
+            {"task": task.name, "goal": index, "x": x, "y": y, "radius": task.radius}
+            for index, (x, y) in enumerate(task.goals, 1)
+        ]
+    names = ", ".join(task.name for task in shown)
+    alt = f"The robot in its start configuration with the goals of the tasks {names}."
+    return draw_tasks(shown), pd.DataFrame(rows), alt, ()
 
 
 @style.styled
-def tasks_plot(tasks: Sequence[Task]) -> Plot:
-    """Start configuration and goals of each task in one panel each.
-
-    Raises ValueError without a task.
-    """
-    if not tasks:
-        raise ValueError("no task to draw")
+def draw_tasks(tasks: Sequence[Task]) -> Figure:
+    """Start configuration and goals of some tasks in one panel each."""
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
     rows, columns = style.grid(len(tasks))
@@ -36,13 +53,15 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         0.42,
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    figure, panels = style.figure_of((rows, columns), (style.column_width(size[0]), size[1]))
+    drawing, panels = style.figure_of((rows, columns), (style.column_width(size[0]), size[1]))
     for axes, task, corners in zip(panels, tasks, boxes, strict=False):
         draw_robot(axes, task, task.q0, marked=task.hands)
         draw_goals(axes, task)
-        twice = [other.label for other in tasks].count(task.label) > 1
-        name = task.name if twice else task.label
-        axes.set_title(_title(task, name))
+        remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
+        remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
+        variants = [other.label for other in tasks].count(task.label) > 1
+        name = task.name if variants else task.label
+        axes.set_title(f"{name}\n{'; '.join(remarks)}".strip())
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)
@@ -51,29 +70,5 @@ def tasks_plot(tasks: Sequence[Task]) -> Plot:
         axes.set_ylabel("y (length unit)")
     for axes in panels[len(tasks) :]:
         axes.set_axis_off()
-    style.legend(figure, legend_entries(hand for task in tasks for hand in task.hands), 3)
-    names = ", ".join(task.name for task in tasks)
-    return worded("tasks", figure, _data(tasks), tasks=names)
-
-
-def _title(task: Task, name: str) -> str:
-    """Name, what is reconstructed, and what is locked; two lines where there is more."""
-    remarks = []
-    if task.reconstructed:
-        remarks.append(f"{' and '.join(task.reconstructed)} reconstructed")
-    if task.locked_base:
-        remarks.append(f"base locked in {' and '.join(task.locked_base)}")
-    return "\n".join([name, "; ".join(remarks)]).strip()
-
-
-def _data(tasks: Sequence[Task]) -> pd.DataFrame:
-    """One row a goal, after one for the start with its configuration."""
-    rows: list[dict[str, object]] = []
-    for task in tasks:
-        start = dict(zip(task.robot.joint_names, task.q0.tolist(), strict=True))
-        rows.append({"task": task.name, "goal": 0, **start})
-        rows += [
-            {"task": task.name, "goal": index, "x": x, "y": y, "radius": task.radius}
-            for index, (x, y) in enumerate(task.goals, 1)
-        ]
-    return pd.DataFrame(rows)
+    style.legend(drawing, legend_entries(hand for task in tasks for hand in task.hands), 3)
+    return drawing

@@ -122,23 +122,19 @@ class Sample:
         }
         return {family: names for family, names in by_family.items() if names}
 
-    @cached_property
-    def by_hands(self) -> dict[str, dict[str, int]]:
-        """Best reward of any run of the folder with each hand sequence, by instance.
+    def by_hands(self, name: str) -> dict[str, int]:
+        """Best reward of any run of the folder with each hand sequence on an instance.
 
         The corrective process alone with every sequence counts as well. The best that a sequence
         can give is at least that.
         """
-        runs, sequences = self.study.runs, self.study.sequences
-        columns = ["task", "hands", "reward"]
-        solved = runs[runs.status == "ok"][columns]
-        every = pd.concat([solved, sequences[sequences.reward.notna()][columns]])
-        every = every[every.task.isin(list(self.references))]
-        by_name: dict[str, dict[str, int]] = {}
-        for name, of_instance in every.groupby("task"):
-            best = of_instance.groupby("hands").reward.max()
-            by_name[str(name)] = {str(hands): int(reward) for hands, reward in best.items()}
-        return by_name
+        runs = self.study.runs
+        solved = runs[(runs.status == "ok") & (runs.task == name)]
+        every = pd.concat(
+            [part[["hands", "reward"]] for part in (solved, self.study.sequences(name))]
+        )
+        best = every.dropna().groupby("hands").reward.max()
+        return {str(hands): int(reward) for hands, reward in best.items()}
 
 
 def one_by_one(study: Study) -> set[str]:

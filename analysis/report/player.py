@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic import MotionModel, Robot, Task, Trajectory, initial_hands, trajectory
+from coartic import Robot, Task, Trajectory, trajectory
+from coartic.analysis.cells import typical_run
 from coartic.analysis.figures.robot import numbered_below
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
 from coartic.analysis.report.facts import gain
 from coartic.analysis.signatures.shared_goal import shared_goal
 from coartic.analysis.study import Study
-from coartic.analysis.tables import best_condition
-from coartic.analysis.trajectories import Trajectories, corrective
-from coartic.errors import NotApplicableError
+from coartic.analysis.trajectories import initial_solution
 from coartic.robot import HANDS
 
 TOLERANCE = 0.005
@@ -40,23 +40,25 @@ def player_data(study: Study) -> dict[str, Any] | None:
     movements: list[dict[str, Any]] = []
     for name in (name for name in study.tasks if name in one_by_one(study)):
         task, unit = study.tasks[name], rounding_unit(study.tasks[name].robot)
-        labels = [label for own, label in study.cells if own == name]
+        labels = [label for on, label in study.cells if on == name]
         shown = in_order({*main_methods(labels), *(c for c in CONDITIONS if c in labels)})
-        own = [
-            _movement(len(tasks), "", "initial solution", "", run, unit)
-            for run in _initial(task, study.model)
-        ]
+        on_task = []
+        if (initial := initial_solution(task, study.model)) is not None:
+            run = trajectory(task, initial.movements, study.model)
+            on_task.append(movement_of(len(tasks), "", "initial solution", "", run, unit))
         for label in shown:
-            cell = study.trajectories(name, label)
-            if cell.runs:
-                index = nearest_to_median(cell)
-                run_id = str(study.cells[name, label].good.run_id.iloc[index])
-                run = cell.runs[index]
-                own.append(_movement(len(tasks), label, name_of(label), run_id, run, unit))
-        if own:
-            tasks.append(_task(task, unit))
-            movements += own
-    views = _views(study, movements)
+            runs = study.trajectories(name, label).runs
+            if runs:
+                good = study.cells[name, label].good[: len(runs)]
+                index = typical_run(replace(study.cells[name, label], runs=good))
+                run_id = str(good.run_id.iloc[index])
+                on_task.append(
+                    movement_of(len(tasks), label, name_of(label), run_id, runs[index], unit)
+                )
+        if on_task:
+            tasks.append(geometry_of(task, unit))
+            movements += on_task
+    views = views_of(study, movements)
     return {"tasks": tasks, "movements": movements, "views": views} if movements else None
 
 
@@ -66,17 +68,14 @@ def player_json(study: Study) -> str:
     return "" if data is None else json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
-def _views(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def views_of(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What the player offers first: the same goal before two successors, before and after."""
 
-    def place(task: str, label: str) -> int | None:
-        found = (k for k, m in enumerate(movements) if (m["on"], m["label"]) == (task, label))
-        return next(found, None)
-
+    place = {(movement["on"], movement["label"]): k for k, movement in enumerate(movements)}
     views = []
     shared, most = shared_goal(study), gain(study)
     if shared is not None:
-        both = [place(task.name, shared.method) for task in shared.tasks]
+        both = [place.get((task.name, shared.method)) for task in shared.tasks]
         if None not in both:
             views.append(
                 {
@@ -88,8 +87,7 @@ def _views(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]
                 }
             )
     if most is not None:
-        name = next(name for name, task in study.tasks.items() if task.label == most.task)
-        both = [place(name, ""), place(name, best_condition(study, name) or "")]
+        both = [place.get((most["task"], label)) for label in ("", most["label"])]
         if None not in both:
             views.append(
                 {
@@ -100,21 +98,6 @@ def _views(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]
                 }
             )
     return views or [{"name": "Movements", "watch": "", "show": [0]}]
-
-
-def _initial(task: Task, model: MotionModel) -> list[Trajectory]:
-    """The initial solution, or nothing where the corrective process completes no task."""
-    try:
-        execution = corrective(task, initial_hands(task, model=model), model)
-    except NotApplicableError:
-        return []
-    return [] if execution is None else [trajectory(task, execution.movements, model)]
-
-
-def nearest_to_median(cell: Trajectories) -> int:
-    """Index of the run whose reward is nearest the median, the first of several."""
-    rewards = np.array([-run.ticks for run in cell.runs], dtype=np.float64)
-    return int(np.abs(rewards - np.median(rewards)).argmin())
 
 
 def key_frames(run: Trajectory, unit: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -154,8 +137,8 @@ def rounding_unit(robot: Robot) -> float:
     return float(10.0 ** math.floor(math.log10(TOLERANCE / max(levers))))
 
 
-def _task(task: Task, unit: float) -> dict[str, Any]:
-    """Goals and geometry."""
+def geometry_of(task: Task, unit: float) -> dict[str, Any]:
+    """Goals of a task, and the geometry of its robot."""
     robot = task.robot
     return {
         "label": task.label,
@@ -172,7 +155,7 @@ def _task(task: Task, unit: float) -> dict[str, Any]:
     }
 
 
-def _movement(
+def movement_of(
     task: int, label: str, name: str, run_id: str, run: Trajectory, unit: float
 ) -> dict[str, Any]:
     """``rows`` and ``frames`` as differences to the frame before, the latter frame by frame."""

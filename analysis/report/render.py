@@ -1,26 +1,25 @@
-"""Tables as text: CSV, HTML, LaTeX, and plain strings for the terminal.
+"""Tables as text: CSV, HTML and LaTeX.
 
-``columns.toml`` beside the tables says how columns are called and formatted. A column that ends in
-``_low``, ``_high`` or ``_sd`` is shown behind the one that it belongs to.
+:data:`~coartic.analysis.tables.COLUMNS` says how columns are called and formatted. A column that
+ends in ``_low``, ``_high`` or ``_sd`` is shown behind the one that it belongs to.
 """
 
 from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, TypeAdapter
 
-from coartic.analysis import tables
 from coartic.analysis.methods import name_of
-from coartic.analysis.words import NONE, in_brackets, number, read_beside
+from coartic.analysis.tables import COLUMNS, Column
+from coartic.analysis.words import NONE, in_brackets, number
 from coartic.text import one_line
 
 _COMPANIONS = ("_low", "_high", "_sd")
-_TONES = {
+TONES = {
     "supported": "good",
     "equivalent": "good",
     "not supported": "bad",
@@ -42,64 +41,23 @@ _LATEX = str.maketrans(
 )
 
 
-class Column(BaseModel):
-    """How a column is called and shown, as ``columns.toml`` says it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    header: str
-    digits: int | None = None
-    percent: bool = False
-    p: bool = False
-    method: bool = False
-    page: bool = True
-
-
-_COLUMNS = TypeAdapter(dict[str, Column]).validate_python(read_beside(tables.__file__, "columns"))
-
-
 def column_of(name: str) -> Column:
-    """How a column is shown; columns of tasks and families go by these."""
+    """How a column is shown; those of tasks and families go by these."""
     kind, _, what = name.partition(" ")
     if kind in ("on", "in"):
-        return Column(header=f"{what.partition('/')[0]} (%)", percent=True, digits=1)
-    return _COLUMNS.get(name, Column(header=name.replace("_", " ")))
+        return Column(f"{what.partition('/')[0]} (%)", 1, percent=True)
+    return COLUMNS.get(name, Column())
 
 
-def shown(frame: pd.DataFrame, *, page: bool = True) -> pd.DataFrame:
-    """A table as text under its headers; only what a page shows, or all but the run ids."""
-    kept = [name for name in frame.columns if not name.endswith(_COMPANIONS)]
-    if page:
-        kept = [name for name in kept if column_of(name).page]
-    else:
-        kept = [name for name in kept if name != "run_ids"]
-    texts = {_header(frame, name): _texts(frame, name) for name in kept}
-    return pd.DataFrame(texts, index=frame.index)
-
-
-def _header(frame: pd.DataFrame, name: str) -> str:
-    header = column_of(name).header
-    has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
-    return f"{header} [95 %]" if has_interval and "[" not in header else header
-
-
-def _texts(frame: pd.DataFrame, name: str) -> list[str]:
-    """The values of a column, with what belongs to them."""
-    column, nothing = column_of(name), pd.Series(math.nan, frame.index)
-    scale = 100.0 if column.percent else 1.0
-
-    def numeric(ending: str) -> list[float]:
-        values = pd.to_numeric(frame.get(f"{name}{ending}", nothing))
-        return (scale * values.astype("Float64")).to_numpy(float, na_value=math.nan).tolist()
-
-    if not is_number(frame[name]):
-        return [_word(value, column) for value in frame[name]]
-    texts = []
-    for value, low, high, sd in zip(*map(numeric, ("", "_low", "_high", "_sd")), strict=True):
-        text = _number(value, column)
-        text += "" if math.isnan(sd) else f" ± {number(sd, column.digits)}"
-        texts.append(f"{text} {in_brackets(low, high, column.digits)}".strip())
-    return texts
+def columns_of(frame: pd.DataFrame) -> dict[str, str]:
+    """Columns of a table that the page and LaTeX show, with their headers."""
+    headers = {}
+    for name in frame.columns:
+        if not name.endswith(_COMPANIONS) and column_of(name).page:
+            header = column_of(name).header or name.replace("_", " ")
+            has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
+            headers[name] = f"{header} [95 %]" if has_interval and "[" not in header else header
+    return headers
 
 
 def is_number(values: pd.Series) -> bool:
@@ -107,96 +65,88 @@ def is_number(values: pd.Series) -> bool:
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
-def _number(value: float, column: Column) -> str:
+def figures_of(frame: pd.DataFrame, name: str) -> list[float]:
+    """Numbers of a column as they are shown, NaN where there are none."""
+    values = pd.to_numeric(frame.get(name, pd.Series(math.nan, frame.index)))
+    return values.astype("Float64").to_numpy(float, na_value=math.nan).tolist()
+
+
+def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
+    """The values of a column as text, with SDs and intervals that belong to them."""
+    column = column_of(name)
+    if not is_number(frame[name]):
+        return [word(value, column) for value in frame[name]]
+    texts = []
+    columns = (figures_of(frame, f"{name}{ending}") for ending in ("", "_low", "_high", "_sd"))
+    for values in zip(*columns, strict=True):
+        scale = 100.0 if column.percent else 1.0
+        value, low, high, sd = (scale * value for value in values)
+        spread = "" if math.isnan(sd) else f" ± {number(sd, column.digits)}"
+        interval = in_brackets(low, high, column.digits)
+        texts.append(f"{digits(value, column)}{spread} {interval}".strip())
+    return texts
+
+
+def digits(value: float, column: Column) -> str:
+    """One number as its column shows it."""
     if column.p and value < 0.001:
         return "< 0.001"
     return number(value, 3 if column.p else column.digits)
 
 
-def _word(value: Any, column: Column) -> str:
+def word(value: Any, column: Column) -> str:
+    """One value of a column that does not hold numbers alone."""
     if value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value)):
         return NONE
     if isinstance(value, float | int) and not isinstance(value, bool):
-        return _number(float(value), column)
+        return digits(float(value), column)
     return name_of(str(value)) if column.method else one_line(str(value)) or NONE
 
 
 def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     """A table for the page. Its first column holds while the others scroll; rows are named."""
-    kept = [c for c in frame.columns if not c.endswith(_COMPANIONS) and column_of(c).page]
-    text = shown(frame)
-    cells = {
-        header: _html_cells(frame, column, text[header])
-        for header, column in zip(text.columns, kept, strict=True)
-    }
-    made = pd.DataFrame(cells, index=frame.index)
-    first = made.columns[0]
-    made[first] = [
-        f'<span title="row {html.escape(str(row))}">{value}</span>'
-        for row, value in zip(made.index, made[first], strict=True)
-    ]
-    made.columns = pd.Index(
-        html.escape(header) if is_number(frame[column]) else _text(html.escape(header))
-        for header, column in zip(made.columns, kept, strict=True)
-    )
-    table = made.to_html(
+    cells: dict[str, list[str]] = {}
+    for column, header in columns_of(frame).items():
+        texts = list(map(html.escape, texts_of(frame, column)))
+        head = html.escape(header)
+        if column_of(column).method:
+            ids = [html.escape(one_line(str(label))) for label in frame[column]]
+            pairs = zip(texts, ids, strict=True)
+            texts = [text + f"<small>{id_}</small>" * (text != id_) for text, id_ in pairs]
+        if not is_number(frame[column]):
+            head = f'<span class="text">{head}</span>'
+            tones = [TONES.get(text, "") if column == "verdict" else "" for text in texts]
+            pairs = zip(tones, texts, strict=True)
+            texts = [
+                f'<span class="{f"text {tone}".strip()}">{text}</span>' for tone, text in pairs
+            ]
+        if not cells:
+            rows = (html.escape(str(row)) for row in frame.index)
+            pairs = zip(rows, texts, strict=True)
+            texts = [f'<span title="row {row}">{text}</span>' for row, text in pairs]
+        cells[head] = texts
+    table = pd.DataFrame(cells).to_html(
         index=False, escape=False, border=0, table_id=f"table-{name}", justify="unset"
     )
     head = f"<caption><span>{html.escape(caption)}</span></caption>\n  <thead>"
     return table.replace("<thead>", head, 1).replace("<th>", '<th scope="col">')
 
 
-def _text(content: str) -> str:
-    return f'<span class="text">{content}</span>'
-
-
-def _html_cells(frame: pd.DataFrame, column: str, texts: Iterable[str]) -> list[str]:
-    """The cells of a column as HTML: verdicts in colour, methods with their ids."""
-    raw = frame[column]
-    if column_of(column).method:
-        return [_method_cell(str(label)) for label in raw]
-    escaped = map(html.escape, texts)
-    if is_number(raw):
-        return list(escaped)
-    if column == "verdict":
-        return [f'<span class="text {_TONES.get(text, "")}">{text}</span>' for text in escaped]
-    return list(map(_text, escaped))
-
-
-def _method_cell(label: str) -> str:
-    name = name_of(label)
-    small = "" if name == label else f"<small>{html.escape(one_line(label))}</small>"
-    return _text(f"{html.escape(name)}{small}")
-
-
-def tone_of(verdict: str) -> str:
-    """Class of a verdict on the page."""
-    return _TONES.get(verdict, "plain")
-
-
 def latex_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     """A table for a paper, with booktabs; plain numbers stand in siunitx's S columns."""
-    kept = [c for c in frame.columns if not c.endswith(_COMPANIONS) and column_of(c).page]
-    text = shown(frame)
-    plain = [is_number(frame[c]) and not _has_companions(frame, c) for c in kept]
-    made = text.copy()
-    for header, column, is_plain in zip(text.columns, kept, plain, strict=True):
-        made[header] = (
-            pd.to_numeric(frame[column]).astype("Float64").astype(float) if is_plain
-            else [latex(value) for value in text[header]]
-        )  # fmt: skip
-    formats: dict[Any, Any] = {
-        header: _siunitx(column_of(column))
-        for header, column, is_plain in zip(text.columns, kept, plain, strict=True)
-        if is_plain
-    }
-    columns = "".join("S" if is_plain else "l" for is_plain in plain)
-    styler = made.style.format(formats, na_rep="{--}").hide(axis="index")
-    styler = styler.format_index(latex, axis="columns")
-    body = styler.to_latex(
+    cells: dict[str, Any] = {}
+    formats: dict[Any, Any] = {}
+    for column, header in columns_of(frame).items():
+        if is_number(frame[column]) and not any(f"{column}{end}" in frame for end in _COMPANIONS):
+            cells[header] = figures_of(frame, column)
+            formats[header] = partial(siunitx, column=column_of(column))
+        else:
+            cells[header] = list(map(latex, texts_of(frame, column)))
+    styler = pd.DataFrame(cells).style.format(formats, na_rep="{--}").hide(axis="index")
+    body = styler.format_index(latex, axis="columns").to_latex(
         hrules=True,
         siunitx=True,
-        column_format=columns,
+        column_format="".join("S" if header in formats else "l" for header in cells),
         caption=latex(caption),
         label=f"tab:coartic-{name}",
         position="tp",
@@ -205,22 +155,12 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     return f"{PACKAGES}\n{body}"
 
 
-def _has_companions(frame: pd.DataFrame, column: str) -> bool:
-    return any(f"{column}{ending}" in frame for ending in _COMPANIONS)
-
-
-def _siunitx(column: Column) -> Callable[[float], str]:
-    """How siunitx reads a value: no thousands apart, a plain hyphen as the minus."""
-
-    def shown_as(value: float) -> str:
-        if math.isinf(value):
-            return "{$\\infty$}"
-        scaled = 100 * value if column.percent else value
-        return (
-            number(scaled, 3 if column.p else column.digits).replace("−", "-").replace("\u202f", "")
-        )
-
-    return shown_as
+def siunitx(value: float, column: Column) -> str:
+    """A number as siunitx reads it: no thousands apart, a plain hyphen as the minus."""
+    if math.isinf(value):
+        return "{$\\infty$}"
+    text = number(100 * value if column.percent else value, 3 if column.p else column.digits)
+    return text.replace("−", "-").replace("\u202f", "")
 
 
 def latex(text: object) -> str:

@@ -9,69 +9,67 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic.analysis import words
-from coartic.analysis.comparisons.reached import Crossing
 from coartic.analysis.report import facts
 from coartic.analysis.study import Study
 from coartic.text import one_line
+
+QUESTIONS = {
+    "coarticulation": ("Does the next goal change the movement?", "Coarticulation"),
+    "paper": ("Is the paper reproduced?", "Paper"),
+    "nearest": ("Who comes nearest to the optimum?", "Nearest"),
+    "price": ("What does it cost?", "Cost"),
+}
+"""The four questions with their words on the terminal, by the facts that answer them."""
+INSTEAD = {"slopes": "slopes", "gain": "learning"}
+"""Facts that answer the first question where no two tasks share a goal, with their sections."""
 
 
 @cache
 def environment(*, escape: bool) -> Environment:
     """The templates; ``escape``: for HTML."""
-    made = Environment(
+    templates = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         undefined=StrictUndefined,
         autoescape=escape,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        finalize=lambda value: one_line(value) if type(value) is str else value,
+        finalize=lambda value: shown(value) if type(value) is str else value,
     )
-    made.filters |= {
+    templates.filters |= {
         "number": words.number,
         "two_figures": words.two_figures,
         "p_value": words.p_value,
         "listed": words.listed,
+        "brackets": words.in_brackets,
         "capital": lambda text: text[:1].upper() + text[1:],
-        "crossing": lambda found: _trials_interval(found),
     }
-    return made
+    return templates
 
 
-def _trials_interval(found: Crossing) -> str:
-    return words.in_brackets(found.low, found.high, 0)
+def shown(text: str) -> str:
+    """Text as one printable line, which does not break before a per cent sign."""
+    return one_line(text).replace(" %", f"{words.NO_BREAK}%")
 
 
 def sentence(name: str, of: Any) -> str:
     """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
     module = environment(escape=False).get_template("sentences.jinja").module
-    return " ".join(str(getattr(module, name)(of)).split())
-
-
-ANSWERS = (
-    ("coarticulation", "Does the next goal change the movement?", "Coarticulation"),
-    ("paper", "Is the paper reproduced?", "Paper"),
-    ("nearest", "Who comes nearest to the optimum?", "Nearest"),
-    ("price", "What does it cost?", "Cost"),
-)
-"""The four answers: name of the facts and of the section, question, and word on the terminal."""
+    text = str(getattr(module, name)(of)).replace("\n", " ")
+    return shown(" ".join(part for part in text.split(" ") if part))
 
 
 def answers(study: Study) -> list[dict[str, str]]:
-    """The four answers that a folder gives, a dozen words each.
+    """The answers that a folder gives to the four questions, a dozen words each.
 
     ``id`` of the section that says more, ``question``, ``word``, ``text``.
     """
-    found = []
-    for name, question, word in ANSWERS:
-        of = getattr(facts, name)(study)
-        text = "" if of is None else sentence(f"{name}_short", of)
-        section = name
-        if of is None and name == "coarticulation":
-            if moved := facts.moved(study):
-                text, section = sentence("moved_short", moved), "slopes"
-            elif gain := facts.gain(study):
-                text, section = sentence("gain_short", gain), "learning"
-        if text:
-            found.append({"id": section, "question": question, "word": word, "text": text})
-    return found
+    given = []
+    for name, (question, word) in QUESTIONS.items():
+        sections = {name: name} | (INSTEAD if name == "coarticulation" else {})
+        for of, section in sections.items():
+            if (found := getattr(facts, of)(study)) is not None:
+                text = sentence(f"{of}_short", found)
+                given.append({"id": section, "question": question, "word": word, "text": text})
+                break
+    return given

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,10 +12,6 @@ from coartic.cli.arguments import at_least
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
 from coartic.text import counted, one_line
-
-if TYPE_CHECKING:
-    from coartic import MotionModel, Task
-    from coartic.analysis.figures.animation import Panel
 
 _PICTURED = 12
 """Tasks of a picture, at most."""
@@ -38,18 +34,18 @@ def draw(
 
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
-    from coartic.analysis.figures.plot import FORMATS, picture  # after what is soon said
-    from coartic.analysis.figures.tasks import tasks_plot
+    from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
+    from coartic.analysis.figures.tasks import draw_tasks
 
-    plot = tasks_plot(chosen[:_PICTURED])
+    drawing = draw_tasks(chosen[:_PICTURED])
     if out.suffix:
         if out.suffix.lower() not in FORMATS:
             raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
         check_outputs([out], replace=replace)
-        write_outputs({out: picture(plot, out.suffix.lower())}, replace=replace)
+        write_outputs({out: picture(drawing, out.suffix.lower())}, replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
-        files |= {"tasks.svg": picture(plot, ".svg")}
+        files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
     say(f"{out}: {counted(len(chosen), 'task')}.")
 
@@ -74,6 +70,7 @@ def animate(
     replace: given.Replace = False,
 ) -> None:
     """Make a film of a run, alone or beside another one."""
+    from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.figures.animation import Panel, animate, check_output
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
@@ -86,21 +83,17 @@ def animate(
     panels = []
     for name in (run_id,) if other is None else (run_id, other):
         _, stored = find_run(name, folder)
-        found, number = trajectory_of(stored), stored.run.row["run"]
-        title = one_line(f"{found.task.label}: {name_of(stored.method)}, run {number}")
-        panels.append(Panel(title, found))
+        movement, number = trajectory_of(stored), stored.run.row["run"]
+        title = one_line(f"{movement.task.label}: {name_of(stored.method)}, run {number}")
+        panels.append(Panel(title, movement))
     if initial:
-        panels.insert(0, _initial_panel(panels[0].trajectory.task, stored.model))
+        task = panels[0].trajectory.task
+        hands = initial_hands(task, model=stored.model)
+        movements = corrective_trial(task, hands, model=stored.model).movements
+        initial_solution = trajectory(task, movements, model=stored.model)
+        panels.insert(0, Panel(f"{task.label}: initial solution", initial_solution))
     timed = animate(panels, out, speed=speed, width=width, replace=replace)
     say(f"{out}: {len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second.")
-
-
-def _initial_panel(task: Task, model: MotionModel) -> Panel:
-    from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import Panel
-
-    movements = corrective_trial(task, initial_hands(task, model=model), model=model).movements
-    return Panel(f"{task.label}: initial solution", trajectory(task, movements, model=model))
 
 
 COMMANDS = (draw, animate)

@@ -173,7 +173,9 @@ def claims(
     figures = [verdicts(table)]
     if table.effect.notna().any():
         figures.append(specification_curve(table))
-    files |= {f"{plot.id}{kind}": picture(plot, kind) for plot in figures for kind in FORMATS}
+    files |= {
+        f"{plot.id}{kind}": picture(plot.figure, kind) for plot in figures for kind in FORMATS
+    }
     publish(folder, files)
     show_frame(counts)
     say(f"Written: {folder}")

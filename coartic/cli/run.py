@@ -18,11 +18,7 @@ from coartic.text import counted, did_you_mean
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
-    from coartic.benchmarks.pool import Executor
     from coartic.benchmarks.registry import Entry, Registry
-    from coartic.benchmarks.run import RunReport
-    from coartic.cli.terminal import Display
-    from coartic.runs.store import Run
 
 
 def run(
@@ -47,6 +43,8 @@ def run(
 
     If it is interrupted, repeat the command; it resumes where it stopped.
     """
+    from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.pool import Local
     from coartic.benchmarks.run import Selection, plan_suite
     from coartic.benchmarks.suites import load_suite
 
@@ -67,30 +65,18 @@ def run(
     )
     started = time.monotonic()
     with performing(chosen.name, out) as display:
-        executor = _executor(jobs, scheduler, display)
+        executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = plan.perform(
             out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
         )
-    _conclude(report, time.monotonic() - started)
-    if report.crashed:
-        sys.exit(1)
-
-
-def _executor(jobs: int, scheduler: str | None, display: Display) -> Executor:
-    from coartic.benchmarks.cluster import Dask
-    from coartic.benchmarks.pool import Local
-
-    return Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
-
-
-def _conclude(report: RunReport, seconds: float) -> None:
-    """What ran, the four answers, and the next command."""
-    from coartic.analysis.report.text import answers
+    say(report.sentence(time.monotonic() - started))
+    from coartic.analysis.report.text import answers  # slow, after what ran is said
     from coartic.analysis.study import load
 
-    say(report.sentence(seconds))
     pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
+    if report.crashed:
+        sys.exit(1)
 
 
 def list_(name: given.Something = None, method_file: given.MethodFiles = None) -> None:
@@ -99,12 +85,12 @@ def list_(name: given.Something = None, method_file: given.MethodFiles = None) -
 
     known = registry(method_file or [])
     if name is None:
-        say_pairs(_everything(known))
+        say_pairs(overview(known))
     else:
-        say_pairs(_details(name, known))
+        say_pairs(describe(name, known))
 
 
-def _everything(known: Registry) -> Iterator[tuple[str, str]]:
+def overview(known: Registry) -> Iterator[tuple[str, str]]:
     """One screen: names of tasks and methods, suites with what they are for."""
     from coartic import builtin_tasks
     from coartic.benchmarks.suites import suites
@@ -125,7 +111,7 @@ def _everything(known: Registry) -> Iterator[tuple[str, str]]:
     yield "More", "coartic list NAME, such as two-armed-1, comparison or cma-es/bandit"
 
 
-def _details(name: str, known: Registry) -> Iterator[tuple[str, str]]:
+def describe(name: str, known: Registry) -> Iterator[tuple[str, str]]:
     """What is known of a task, a suite, a family or a method.
 
     Raises CoarticError for another name.
@@ -165,10 +151,11 @@ def _details(name: str, known: Registry) -> Iterator[tuple[str, str]]:
                 f"{hint or '; `coartic list` shows them all'}."
             ) from error
         for method in methods:
-            yield from _method_details(known[method])
+            yield from describe_method(known[method])
 
 
-def _method_details(entry: Entry) -> Iterator[tuple[str, str]]:
+def describe_method(entry: Entry) -> Iterator[tuple[str, str]]:
+    """What a method is told and takes, and the tasks that it applies to."""
     from coartic import builtin_tasks, load_task
     from coartic.tasks.readings import readings
 
@@ -195,12 +182,13 @@ def reproduce(
 
     _, stored = find_run(run_id, folder)
     run, known = stored.run, registry(method_file or [])
+    result = f"reward {run.row['reward']}, hands {run.row['hands']}"
     say_pairs(
         [
             ("Run", f"{run.run_id}: {stored.method} on {stored.task.name}, run {run.row['run']}"),
             ("Seed", str(run.row["seed"])),
             ("Parameters", ", ".join(f"{k}={v}" for k, v in stored.parameters.items())),
-            ("Result", _result(run)),
+            ("Result", result if run.status == "ok" else f"{run.status}: {run.row['reason']}"),
         ]
     )
     again, code = performed_again(stored, known), known[stored.method].code
@@ -213,18 +201,12 @@ def reproduce(
     say("Performed again: identical.")
 
 
-def _result(run: Run) -> str:
-    if run.status != "ok":
-        return f"{run.status}: {run.row['reason']}"
-    return f"reward {run.row['reward']}, hands {run.row['hands']}"
-
-
 def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None:
     """Check a method or a task file against the rules."""
     from coartic.benchmarks.registry import registry
 
     broken = 0
-    for name, checked in _checks(subject, registry(method_file or [])):
+    for name, checked in checks_of(subject, registry(method_file or [])):
         laws = checked()
         for law in laws:
             say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
@@ -235,7 +217,7 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
         sys.exit(1)
 
 
-def _checks(subject: str, known: Registry) -> Iterable[tuple[str, Callable[[], list[Law]]]]:
+def checks_of(subject: str, known: Registry) -> Iterable[tuple[str, Callable[[], list[Law]]]]:
     """What is checked: a task, or all methods that a name stands for."""
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.suites import methods_named

@@ -1,0 +1,191 @@
+"""Tables of the signatures of coarticulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.methods import in_order, is_search, main_methods
+from coartic.analysis.signatures.locus import families, variants
+from coartic.analysis.signatures.register import signatures as signature_values
+from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.words import marked
+
+_MEANS = {
+    "first": "first subtask against the same hands",
+    "total": "total against the same hands",
+    "as_in_isolation": "hand as in isolation",
+    "preshaping": "preshaping of the other arm",
+    "turning": "turning angle",
+    "travel": "travel of the other arm",
+}
+"""Columns of :func:`signatures` and the signatures whose means over goals they have."""
+
+
+@table(
+    "method, place, runs, distance, dependence, p_holm, equivalent, other, lead",
+    distance=Column("postures apart", 2),
+    dependence=Column("in SD of the runs", 1),
+    equivalent=Column("part that leaves the hand", 3),
+    other=Column("part that moves it", 3),
+    lead=Column("lead (ticks)"),
+)
+def contexts(study: Study) -> Rows:
+    """Postures at a shared goal before different successors."""
+    frame = signature_values(study)
+    frame = frame[frame.against.ne("") & frame.value.notna() & frame.moving.isna()]
+    rows = []
+    keys = ["task", "label", "goal", "hand", "against"]
+    for at, group in frame.groupby(keys, sort=False):
+        task, label, goal, hand, against = map(str, at)
+        by_signature = group.set_index("signature")
+        value = by_signature.value
+        row: Row = {
+            "method": label,
+            "place": f"goal {goal} of {task} and {against}",
+            "runs": int(group.n.max()),
+            "distance": value.get("context distance"),
+            "dependence": value.get("context dependence"),
+            "p_holm": by_signature.p.get("context dependence", math.nan),
+            "equivalent": value.get("motor-equivalent part"),
+            "other": value.get("non-motor-equivalent part"),
+            "lead": value.get("lead time"),
+            **runs_of(*(study.cells[name, label] for name in (task, against))),
+        }
+        rows.append((f"{task} {label} goal {goal} {hand}", row))
+    yield from corrected(rows)
+
+
+def corrected(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
+    """Rows with their p-values adjusted over all of them (Holm)."""
+    adjusted = holm([row["p_holm"] for _, row in rows]) if rows else []
+    for (name, row), p in zip(rows, adjusted, strict=True):
+        yield name, row | {"p_holm": p}
+
+
+@table(
+    "method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving",
+    goal=Column(page=False),
+    moving=Column(page=False),
+    kind=Column("direction"),
+    norm=Column("slope of the whole posture", 2),
+    joint=Column("steepest joint"),
+    slope=Column("its slope", 2),
+)
+def slopes(study: Study) -> Rows:
+    """How the posture at a goal follows a neighbouring goal that moves."""
+    frame = signature_values(study)
+    frame = frame[frame.moving.notna() & frame.value.notna()]
+    rows = []
+    keys = ["task", "label", "goal", "moving", "hand"]
+    at: Any
+    for at, group in frame.groupby(keys, sort=False):
+        task, label, goal, moving, hand = at
+        base = str(task).partition(".")[0]
+        row: Row = {
+            "method": label,
+            "place": f"goal {goal} of {base}, goal {moving} moves",
+            "goal": goal,
+            "moving": moving,
+            "kind": "anticipatory" if goal < moving else "carry-over",
+            "hand": hand,
+            "runs": int(group.n.max()),
+            "norm": math.nan,
+            "p_holm": math.nan,
+            "joint": "",
+            **runs_of(
+                *(
+                    cell
+                    for (name, of), cell in study.cells.items()
+                    if of == label and name.partition(".")[0] == base
+                )
+            ),
+        }
+        for norm in group[group.signature == "locus slope norm"].head(1).itertuples():
+            row |= {"norm": norm.value, "p_holm": norm.p}
+        by_size = group[group.signature == "locus slope"].sort_values("value", key=abs)
+        for steepest in by_size.tail(1).itertuples():
+            row |= {"joint": steepest.joint, "slope": steepest.value}
+            row |= {"slope_low": steepest.low, "slope_high": steepest.high}
+        rows.append((f"{base} {label} goal {goal} of {moving} {hand}", row))
+    yield from corrected(rows)
+
+
+@table(
+    "task, method, runs, first, total, as_in_isolation, preshaping, turning, travel",
+    first=Column("first movement (ticks)", 1),
+    total=Column("whole task (ticks)", 1),
+    as_in_isolation=Column("hand as for the goal alone (share)", 2),
+    preshaping=Column("waiting hand nearer (share)", 2),
+    turning=Column("turning (rad)", 2),
+    travel=Column("waiting arm's travel (rad)", 2),
+)
+def signatures(study: Study) -> Rows:
+    """The main signatures of every main method on every task, means over runs and goals."""
+    frame = signature_values(study)
+    frame = frame[frame.value.notna()]
+    for task in (name for name in study.tasks if name in one_by_one(study)):
+        labels = [label for name, label in study.cells if name == task]
+        for label in in_order(main_methods(labels)):
+            values = frame[(frame.task == task) & (frame.label == label)]
+            if len(values) and not is_search(label):
+                means = values.groupby("signature").value.mean()
+                cell = study.cells[task, label]
+                row: Row = {
+                    "task": marked(study.tasks[task].label, study.tasks[task]),
+                    "method": label,
+                    "runs": len(cell.good),
+                    **{name: means.get(of, math.nan) for name, of in _MEANS.items()},
+                }
+                yield f"{task} {label}", row | runs_of(cell)
+
+
+@table("task, label, signature, where, value[], p, n, unit, why_not")
+def all_signatures(study: Study) -> Rows:
+    """Every value of every signature, one a row, with its place, interval and test."""
+    joined = variants(families(study.tasks))
+    frame = signature_values(study).rename(columns={"low": "value_low", "high": "value_high"})
+    for values in frame.to_dict("records"):
+        row: Row = {str(name): value for name, value in values.items()}
+        task, label = row["task"], row["label"]
+        others = {row["against"]}
+        if pd.notna(row["moving"]):
+            others = set[str]().union(*(group for group in joined if task in group))
+        names = [task, *sorted(others - {task, ""})]
+        cells = [study.cells[name, label] for name in names if (name, label) in study.cells]
+        yield f"{task} {label}, {row['signature']} {row['where']}".strip(), row | runs_of(*cells)
+
+
+@cached
+def context_parts(study: Study) -> pd.DataFrame:
+    """What of the difference between two contexts leaves the hand in place, of main methods.
+
+    One row a place and method: ``task``, ``where``, ``method``, ``runs``, ``equivalent`` and
+    ``other`` (per root of the dimension of their spaces), their p-values ``p_equivalent`` and
+    ``p_other``, and these adjusted over the table (Holm), ``holm_equivalent`` and ``holm_other``.
+    """
+    frame = signature_values(study)
+    frame = frame[frame.value.notna()].assign(method=frame.label, runs=frame.n)
+    keys = ["task", "where", "method", "runs"]
+    equivalent, other = (
+        frame.loc[frame.signature == name, [*keys, "value", "p"]]
+        for name in ("motor-equivalent part", "non-motor-equivalent part")
+    )
+    both = equivalent.merge(other, on=keys, suffixes=("_equivalent", "_other"))
+    both = both.rename(columns={"value_equivalent": "equivalent", "value_other": "other"})
+    order = {label: place for place, label in enumerate(main_methods(both.method))}
+    both = both[both.method.isin(order)].sort_values(
+        ["task", "where", "method"],
+        key=lambda values: values.map(order) if values.name == "method" else values,
+        ignore_index=True,
+    )
+    p = both[["p_equivalent", "p_other"]].to_numpy(dtype=float)
+    adjusted = np.reshape(holm(p.ravel().tolist()) if len(p) else [], p.shape)
+    return both.assign(holm_equivalent=adjusted[:, 0], holm_other=adjusted[:, 1])

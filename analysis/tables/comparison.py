@@ -1,0 +1,260 @@
+"""Tables of the methods beside each other: gaps, costs, learning, pairs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.comparisons.methods import method_rows
+from coartic.analysis.comparisons.pairs import pairs_table
+from coartic.analysis.comparisons.progress import best_so_far
+from coartic.analysis.comparisons.reached import price as price_by_method
+from coartic.analysis.comparisons.reached import targets
+from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps, standings
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.methods import (
+    CONDITIONS,
+    EC1,
+    in_order,
+    is_search,
+    is_variant,
+    main_methods,
+)
+from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.words import marked
+from coartic.robot import Array
+
+BUDGETS = (100, 1_000, 10_000)
+"""Trials after which the table of learning reads rewards."""
+WINDOW = 100
+"""Trials over which a learning curve averages the reward of trials."""
+CURVES = (*CONDITIONS, "random-search/climbing", "cma-es/bandit")
+"""Methods whose learning curves are drawn."""
+SPENDS = ("trials", "forward_kinematics")
+"""What price curves count."""
+_POINTS = 120  # trials of a learning curve
+_STEPS = 150  # of a price curve, at most
+
+
+@table(
+    "method, knows, gap[], on *, runs",
+    knows=Column("methods"),
+    gap=Column("gap (%)", 1, percent=True),
+)
+def ranking(study: Study) -> Rows:
+    """Gap to the optimum over all tasks and on each, grouped by what methods know."""
+    rows = standings(study)
+    names = [name for name in study.tasks if name in set(rows.task)][:5]
+    named: list[tuple[str, Row]] = []
+    for method, of_method in rows.groupby("method", sort=False):
+        by_task = of_method.set_index("task")
+        over = ALL_TASKS if len(set(rows.task)) > 1 else rows.task.iloc[0]
+        row: Row = {"method": str(method), "knows": of_method.knows.iloc[0], "gap": math.nan}
+        if over in by_task.index:
+            mean = by_task.loc[over]
+            row |= {"gap": mean.gap, "gap_low": mean.low, "gap_high": mean.high}
+        labels = labels_of(study, str(method))
+        row |= {
+            f"on {task}": method_rows(study).gap[task, labels[task]] if task in labels else math.nan
+            for task in names
+        }
+        cells = [study.cells[key] for key in labels.items()]
+        named.append(
+            (str(method), row | {"runs": sum(len(c.runs) for c in cells)} | runs_of(*cells))
+        )
+    yield from sorted(named, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
+
+
+def labels_of(study: Study, method: str) -> dict[str, str]:
+    """Label of a method by task: the learner over all tasks has several."""
+    rows = gaps(study)
+    rows = rows[rows.method == method].drop_duplicates(["task", "label"])
+    return dict(zip(rows.task, rows.label, strict=True))
+
+
+@table(
+    "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
+    "seconds_to_half[]",
+    reached=Column("targets reached (%)", 0, percent=True),
+    trials_to_quarter=Column("trials to a quarter"),
+    trials_to_half=Column("trials to half"),
+    kinematics_to_half=Column("kinematics to half"),
+    seconds_to_half=Column("seconds to half"),
+)
+def price(study: Study) -> Rows:
+    """What it costs to reach a quarter and half of the targets."""
+    for name, row in price_by_method(study).iterrows():
+        label = str(name)
+        tasks = labels_of(study, label).items()
+        cells = [study.cells[key] for key in tasks if row.task in (ALL_TASKS, key[0])]
+        yield label, {"method": label, **row} | runs_of(*cells)
+
+
+@cached
+def price_curves(study: Study) -> pd.DataFrame:
+    """Share of targets reached within a budget, of the main methods.
+
+    A row at every step that is drawn: ``method``, ``spend`` (of :data:`SPENDS`), ``budget``,
+    ``share``.
+    """
+    parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
+    priced = price_by_method(study)
+    for label in in_order(main_methods(map(str, priced.index))):
+        for spend in SPENDS:
+            reached = targets(study).get((priced.task[label], label, spend))
+            if reached is not None:
+                budget, share = reached.curve()
+                count = min(len(budget), _STEPS)
+                at = np.unique(np.linspace(0, len(budget) - 1, count).round()).astype(int)
+                rows = {"budget": budget[at], "share": share[at]}
+                parts.append(pd.DataFrame({"method": label, "spend": spend, **rows}))
+    return pd.concat(parts[1:] or parts, ignore_index=True)
+
+
+@table(
+    "task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]",
+    after_100=Column("after 100 trials", 1),
+    after_1000=Column("after 1000", 1),
+    after_10000=Column("after 10 000", 1),
+    half_gain=Column("trials to half of the gain [middle half of runs]"),
+)
+def learning(study: Study) -> Rows:
+    """Best reward after so many trials, and when half of a run's gain was there."""
+    for (task, label), cell in study.cells.items():
+        runs = [best_so_far(study)[str(run)] for run in cell.runs.run_id]
+        if task not in one_by_one(study) or is_variant(label) or is_search(label):
+            continue
+        if not runs or not all(run.learns and run.solved for run in runs):
+            continue
+        trials = min(run.total["trials"] for run in runs)
+        if trials < BUDGETS[0]:  # a try or two, no learning
+            continue
+        budgets = np.array([budget for budget in BUDGETS if budget <= trials], dtype=float)
+        best = np.array([run.best("trials", budgets) for run in runs])
+        best[~np.isfinite(best)] = math.nan
+        halves = [half_gain(run.rewards, run.spent["trials"]) for run in runs]
+        row: Row = {
+            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "method": label,
+            "runs": len(runs),
+            "initial": ends(study).get(task, (math.nan,))[0],
+            **{f"after_{int(n)}": best[:, k].mean() for k, n in enumerate(budgets)},
+            "half_gain": float(np.median(halves)),
+            "half_gain_low": float(np.quantile(halves, 0.25)),
+            "half_gain_high": float(np.quantile(halves, 0.75)),
+        }
+        yield f"{task} {label}", row | runs_of(cell)
+
+
+def half_gain(rewards: Array, trials: Array) -> float:
+    """Trial at which half of what a run gains from its first solution to its last is there."""
+    return float(trials[rewards >= (rewards[0] + rewards[-1]) / 2][0])
+
+
+@cached
+def learning_curves(study: Study) -> pd.DataFrame:
+    """Best reward so far and that of the trials themselves, by task and method of :data:`CURVES`.
+
+    Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
+    ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
+    ``best_high``, ``trials`` (mean over runs and the last :data:`WINDOW` trials).
+    """
+    lengths = {run: len(rewards) for run, rewards in study.rewards()}
+    curves = [
+        LearningCurve(task, label, runs, min(lengths[run] for run in runs))
+        for task, label in drawn_curves(study)
+        if (runs := [str(r) for r in study.cells[task, label].good.run_id if str(r) in lengths])
+    ]
+    curve_of = {run: curve for curve in curves for run in curve.runs}
+    for run, rewards in study.rewards():
+        if run in curve_of:
+            curve_of[run].add(rewards)
+    return pd.concat([curve.table() for curve in curves], ignore_index=True) if curves else (
+        pd.DataFrame())  # fmt: skip
+
+
+def drawn_curves(study: Study) -> Iterator[tuple[str, str]]:
+    """Cells with a learning curve: EC1 stands for the learner where it is the only condition."""
+    for task in (name for name in study.tasks if name in one_by_one(study)):
+        labels = [c for c in CURVES if (task, c) in study.cells and len(study.cells[task, c].good)]
+        two_armed = {*CONDITIONS} & {*labels} - {EC1}
+        yield from ((task, label) for label in labels if not (two_armed and label == EC1))
+
+
+class LearningCurve:
+    """Both curves of a method at chosen trials, made run by run: all rewards are large."""
+
+    def __init__(self, task: str, label: str, runs: list[str], length: int) -> None:
+        self.task, self.label, self.runs = task, label, runs
+        self.at = np.unique(np.round(np.geomspace(1, length, _POINTS)).astype(np.int64))
+        self.best: list[Array] = []
+        self.sums, self.counts = np.zeros(length), np.zeros(length)
+
+    def add(self, rewards: Array) -> None:
+        """One more run, by the reward of each of its trials (n,), NaN where it failed."""
+        rewards = rewards[: len(self.sums)]
+        # Until every run has a solution (NaN before) there is no mean of them.
+        self.best.append(np.fmax.accumulate(rewards)[self.at - 1])
+        self.sums += np.nan_to_num(rewards)
+        self.counts += ~np.isnan(rewards)
+
+    def table(self) -> pd.DataFrame:
+        """A row for each of the chosen trials."""
+        low, high = np.quantile(self.best, [0.25, 0.75], axis=0)
+        sums, counts = (
+            pd.Series(values).rolling(WINDOW, min_periods=1).sum()
+            for values in (self.sums, self.counts)
+        )
+        return pd.DataFrame(
+            {
+                "task": self.task,
+                "method": self.label,
+                "runs": len(self.runs),
+                "trial": self.at,
+                "best": np.mean(self.best, axis=0),
+                "best_low": low,
+                "best_high": high,
+                "trials": (sums / counts).to_numpy()[self.at - 1],
+            }
+        )
+
+
+@table(
+    "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, told, "
+    "corrections, jacobians, movement_ticks, other_arm",
+    solved=Column(page=False),
+    reward=Column("reward ± SD", 1),
+    forward_kinematics=Column("kinematics"),
+    solve_s=Column("seconds"),
+    told=Column(page=False),
+    corrections=Column(page=False),
+    jacobians=Column("Jacobians", page=False),
+    movement_ticks=Column("ticks of all trials", page=False),
+    other_arm=Column("other arm", page=False),
+)
+def methods(study: Study) -> Rows:
+    """Every method on every task: reward, gap, hands and what a run spends."""
+    for row in method_rows(study).reset_index().to_dict("records"):
+        task, label = row["task"], row["label"]
+        if task in one_by_one(study):
+            title = marked(study.tasks[task].label, study.tasks[task])
+            values = {str(name): value for name, value in row.items()}
+            values |= {"task": title, "method": label}
+            yield f"{task} {label}", values | runs_of(study.cells[task, label])
+
+
+@table(
+    "task, kind, first, second, runs_first, runs_second, difference[], pairs, better[], p, p_holm, "
+    "note"
+)
+def pairs(study: Study) -> Rows:
+    """The learner against every other method of a task, and its conditions with each other."""
+    for row in pairs_table(study).to_dict("records"):
+        task, first, second = (str(row[name]) for name in ("task", "first", "second"))
+        cells = study.cells[task, first], study.cells[task, second]
+        named = {str(name): value for name, value in row.items()}
+        yield f"{task} {first} {second}", named | runs_of(*cells)

@@ -1,0 +1,182 @@
+"""Tables of families of random tasks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.generality.exploration import CONTRASTS, contrasts, gains
+from coartic.analysis.generality.presence import presence
+from coartic.analysis.generality.sample import Sample, sample
+from coartic.analysis.methods import INITIAL, is_variant, most_exploring, name_of
+from coartic.analysis.statistics.instances import Scores, other_tasks, value
+from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.table import Column, Row, Rows, interval, runs_of, table
+
+_SIGNS = {
+    "hand": "share of goals hit with the slower hand for them",
+    "arm": "ticks by which the next goal is nearer",
+    "other arm": "share of its way that the waiting hand makes",
+    "first": "ticks by which the first movement is slower",
+    "whole": "ticks by which the whole task is faster",
+}
+
+
+@table(
+    "method, instances, gap[], to_bound[], in *",
+    to_bound=Column("gap to the proven bound (%)", 1, percent=True),
+)
+def family_gaps(study: Study) -> Rows:
+    """Gap to the best known reward over families with two arms, and in each family."""
+    instances = sample(study)
+    if instances is None:
+        return
+    two_armed = [
+        name
+        for name, tasks in instances.families.items()
+        if len(instances.tasks[tasks[0]].hands) > 1
+    ]
+    rows: list[tuple[str, Row]] = []
+    for label in ("learner", *(name for name in instances.labels if not is_variant(name))):
+        scores, bounded = (family_scores(instances, label, to_bound=to) for to in (False, True))
+        if not scores:
+            continue
+        row: Row = {"method": label, "instances": sum(map(len, scores.values())), "gap": math.nan}
+        for name, of in (("gap", scores), ("to_bound", bounded)):
+            if two_armed and set(two_armed) <= of.keys():
+                row |= interval(name, other_tasks({family: of[family] for family in two_armed}))
+        for family in instances.families:
+            row[f"in {family}"] = (
+                other_tasks({family: scores[family]}).estimate if family in scores else math.nan
+            )
+        cells = [
+            cell
+            for (task, name), cell in study.cells.items()
+            if task in instances.tasks and name == label_on(instances, label, task)
+        ]
+        rows.append((label, row | runs_of(*cells)))
+    yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
+
+
+def label_on(instances: Sample, label: str, task: str) -> str:
+    """Label on an instance: of the learner the condition that explores most."""
+    return most_exploring(instances.tasks[task]) if label == "learner" else label
+
+
+def family_scores(instances: Sample, label: str, *, to_bound: bool) -> Scores:
+    """Gaps of a method, or of the learner, by family."""
+    scores: dict[str, Any] = {}
+    for family, names in instances.families.items():
+        on_family = label_on(instances, label, names[0])
+        scores |= instances.gaps(on_family, families=[family], to_bound=to_bound)
+    return scores
+
+
+def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
+    """Ids of the runs of methods on the instances of a family, or of all."""
+    return runs_of(
+        *(
+            cell
+            for (task, label), cell in study.cells.items()
+            if label in labels and (not family or study.tasks[task].family == family)
+        )
+    )
+
+
+@table(
+    "contrast, family, instances, gain[], median, by_hands[], better, worse, told_apart",
+    contrast=Column("comparison"),
+    gain=Column("gain (%)", 1, percent=True),
+    median=Column("median (%)", 1, percent=True),
+    by_hands=Column("of it by hands (%)", 1, percent=True),
+    better=Column("better on"),
+    worse=Column("worse on"),
+    told_apart=Column("significant on"),
+)
+def exploration(study: Study) -> Rows:
+    """More exploration against less, by family and over all of them."""
+    for contrast in contrasts(study):
+        first, second = contrast.first, contrast.second
+        less = "the initial solution" if second == INITIAL else name_of(second)
+        row: Row = {
+            "contrast": f"{name_of(first)} over {less}",
+            "family": contrast.family or "all",
+            "instances": contrast.instances,
+            **interval("gain", contrast.difference),
+            "median": contrast.median,
+            **interval("by_hands", contrast.hands),
+            "better": contrast.better,
+            "worse": contrast.worse,
+            "told_apart": contrast.told,
+            **family_runs(study, contrast.family, (first, second)),
+        }
+        yield f"{row['contrast']}, {row['family']}", row
+
+
+@table(
+    "sign, method, family, instances, there, mean[]",
+    there=Column("seen on"),
+    mean=Column(digits=2),
+)
+def family_signs(study: Study) -> Rows:
+    """Signs of coarticulation over instances, by condition and family."""
+    instances = sample(study)
+    for sign in presence(instances) if instances else ():
+        row: Row = {
+            "sign": _SIGNS[sign.sign],
+            "method": sign.label,
+            "family": sign.family or "all",
+            "instances": sign.instances,
+            "there": sign.there,
+            **interval("mean", sign.value),
+            **family_runs(study, sign.family, (sign.label,)),
+        }
+        yield f"{sign.sign}, {sign.label}, {row['family']}", row
+
+
+@cached
+def instance_gaps(study: Study) -> pd.DataFrame:
+    """Gap of every method without variants on every instance, beside the mean of its family.
+
+    Columns ``method``, ``family``, ``task``, ``gap`` (mean over runs), ``mean[]`` about other
+    tasks of the family, ``instances``.
+    """
+    instances = sample(study)
+    rows: list[Row] = []
+    for label in instances.labels if instances else ():
+        assert instances is not None
+        for family, scores in instances.gaps(label).items() if " " not in label else ():
+            mean = interval("mean", other_tasks({family: scores}))
+            names = instances.shared(label)[family]
+            rows += [
+                {"method": label, "family": family, "task": name, "gap": float(np.mean(runs)),
+                 **mean, "instances": len(scores)}
+                for name, (runs,) in zip(names, scores, strict=True)
+            ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+@cached
+def instance_gains(study: Study) -> pd.DataFrame:
+    """What one condition gains over another on every instance, beside the mean of its family.
+
+    Pairs of the paper's conditions, as shares of the best known reward. Columns ``method`` (the
+    pair), ``family``, ``task``, ``gain``, ``mean[]``.
+    """
+    instances = sample(study)
+    rows: list[Row] = []
+    for first, second in CONTRASTS if instances else ():
+        assert instances is not None
+        names = instances.shared(first, second) if second != INITIAL else {}
+        for family, scores in gains(instances, first, second, names).items():
+            row = {"method": f"{name_of(first)} over {name_of(second)}", "family": family}
+            row |= interval("mean", other_tasks({family: scores}))
+            rows += [
+                {**row, "task": name, "gain": value(runs)}
+                for name, runs in zip(names[family], scores, strict=True)
+            ]
+    return pd.DataFrame(rows)

@@ -1,0 +1,272 @@
+"""Tables of the tasks, and of the paper's numbers and claims beside ours."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pandas as pd
+
+from coartic.analysis.claims.judge import claims_table
+from coartic.analysis.comparisons.paper import paper_rows, published_of, sequence_rows
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.methods import CONDITIONS, LEARNER
+from coartic.analysis.published import RUNS, Summary, published_cell, published_initial
+from coartic.analysis.statistics.equivalence import MARGIN
+from coartic.analysis.statistics.estimates import Interval, mean, standard_deviation, student
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.table import Column, Row, Rows, interval, runs_of, table
+from coartic.analysis.trajectories import initial_solution
+from coartic.analysis.words import marked
+
+
+def best_condition(study: Study, task: str) -> str | None:
+    """Label of the learner's own condition with the highest mean reward on a task."""
+    rewards = {
+        label: float(cell.rewards.mean())
+        for (name, label), cell in study.cells.items()
+        if name == task and label in CONDITIONS and len(cell.good)
+    }
+    return max(rewards, key=lambda label: rewards[label]) if rewards else None
+
+
+@table(
+    "task, arms, base, initial, condition, learned[], published, optimum, bound",
+    initial=Column(digits=1),
+    learned=Column(digits=1),
+    bound=Column("proven bound"),
+)
+def tasks(study: Study) -> Rows:
+    """One row a task: initial, learned, published and best possible reward."""
+    for name in sorted(one_by_one(study), key=list(study.tasks).index):
+        task, label = study.tasks[name], best_condition(study, name)
+        best = study.optima.get((name, "free"))
+        row: Row = {
+            "task": marked(task.label, task),
+            "arms": len(task.hands),
+            "base": f"locked in {' and '.join(task.locked_base)}" if task.locked_base else "free",
+            "optimum": best.reward if best else None,
+            "bound": best.bound if best else None,
+        }
+        if label is not None:
+            cell, condition = study.cells[name, label], label.removeprefix(LEARNER)
+            paper = published_cell(name, condition)
+            row |= {
+                "initial": cell.good.initial_reward.dropna().mean(),
+                "condition": condition,
+                **interval("learned", mean(cell.rewards)),
+                "published": paper.summary.mean if paper and paper.summary else None,
+                **runs_of(cell),
+            }
+        yield name, row
+
+
+@table(
+    "task, condition, published±, ours±, runs, difference[], margin, verdict, published_initial, "
+    "ours_initial",
+    published=Column("published ± SD", 1),
+    ours=Column("ours ± SD", 1),
+    difference=Column(digits=1),
+    margin=Column(digits=1),
+    published_initial=Column("published initial", 1, page=False),
+    ours_initial=Column("our initial", 1, page=False),
+)
+def published(study: Study) -> Rows:
+    """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
+    for row in paper_rows(study):
+        task, condition = row.cell.task, row.cell.label.removeprefix(LEARNER)
+        values: Row = {
+            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "condition": condition,
+            **printed_mean(row.paper.summary),
+            "published_initial": getattr(published_initial(task), "reward", None),
+            **our_mean(row.rewards),
+            "ours_initial": row.cell.good.initial_reward.dropna().mean(),
+            "verdict": row.verdict,
+            **interval("difference", row.difference),
+            "margin": row.difference.margin if row.difference else None,
+            **runs_of(row.cell),
+        }
+        yield f"{task} {condition}", values
+
+
+@table(
+    "task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]",
+    published_runs=Column("published runs"),
+    of_runs=Column("of"),
+    hands=Column("hands (runs)"),
+)
+def hands(study: Study) -> Rows:
+    """Learned rewards by hand sequence, published and ours, where there are several."""
+    for row in sequence_rows(study):
+        task, condition = row.cell.task, row.cell.label.removeprefix(LEARNER)
+        good = row.cell.good
+        values: Row = {
+            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "condition": condition,
+            "hands": row.hands,
+            "published_runs": row.published_runs,
+            "of_runs": len(good),
+            **printed_mean(row.published),
+            **our_mean(row.rewards),
+            **interval("difference", row.difference),
+            "run_ids": " ".join(map(str, good.run_id[good.hands == row.hands])),
+        }
+        yield f"{task} {condition} {row.hands}", values
+
+
+def printed_mean(summary: Summary | None) -> Row:
+    """Mean and SD that the paper prints."""
+    return {
+        "published": summary.mean if summary else None,
+        "published_sd": summary.sd if summary else None,
+    }
+
+
+def our_mean(rewards: Any) -> Row:
+    """Number, mean and SD of rewards (n,)."""
+    average = rewards.mean() if len(rewards) else math.nan
+    return {"ours": average, "ours_sd": standard_deviation(rewards), "runs": len(rewards)}
+
+
+@table(
+    "statement, verdict, evidence, test, p_holm, opposite_p_holm, ensemble, place, quote, section",
+    statement=Column("the paper's claim"),
+    evidence=Column(page=False),
+    test=Column(page=False),
+    opposite_p_holm=Column("p of the opposite", p=True, page=False),
+    ensemble=Column("sets of goals in which it holds"),
+    place=Column("where"),
+    quote=Column(page=False),
+    section=Column(page=False),
+)
+def claims(study: Study) -> Rows:
+    """The paper's claims with their verdicts."""
+    for row in claims_table(study).to_dict("records"):
+        dagger = " †" if row["fitted"] else ""
+        words = {"statement": row["statement"] + dagger, "run_ids": row["runs"]}
+        yield row["id"], {str(name): value for name, value in row.items()} | words
+
+
+@cached
+def learned_rewards(study: Study) -> pd.DataFrame:
+    """Mean learned reward of the paper's conditions, on tasks that have more than one of them.
+
+    Of each task first the initial solution, then the conditions, each tested against the row
+    before it (one-tailed bootstrap test). Columns ``task``, ``method`` (``initial`` or a label),
+    ``runs``, ``reward[]``, ``published[]``, ``p``.
+    """
+    rows: list[Row] = []
+    for name, task in study.tasks.items():
+        printed = [c for c in CONDITIONS if published_cell(name, c.removeprefix(LEARNER))]
+        cells = [study.cells.get((name, label)) for label in printed or CONDITIONS]
+        solved = [cell for cell in cells if cell is not None and len(cell.good)]
+        execution = initial_solution(task, study.model)
+        if len(solved) < 2 or execution is None:
+            continue
+        before: Any = float(-execution.ticks)
+        initial = published_initial(name)
+        rows.append(
+            {
+                "task": name,
+                "method": "initial",
+                "reward": before,
+                "published": float(initial.reward) if initial else math.nan,
+            }
+        )
+        for cell in solved:
+            rewards, paper = cell.rewards, published_of(cell)
+            rows.append(
+                {
+                    "task": name,
+                    "method": cell.label,
+                    "runs": len(rewards),
+                    **interval("reward", mean(rewards)),
+                    **printed_interval(paper.summary if paper else None),
+                    "p": bootstrap_test(rewards, before).p,
+                }
+            )
+            before = rewards
+    columns = ["task", "method", "runs", "reward", "reward_low", "reward_high", "published"]
+    return pd.DataFrame(rows, columns=[*columns, "published_low", "published_high", "p"])
+
+
+def printed_interval(summary: Summary | None) -> Row:
+    """A printed mean with Student's interval, where an SD is printed."""
+    if summary is None or summary.sd is None or summary.runs < 2:
+        found = Interval(math.nan if summary is None else summary.mean)
+    else:
+        found = student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
+    return {"published": found.value, "published_low": found.low, "published_high": found.high}
+
+
+@cached
+def published_differences(study: Study) -> pd.DataFrame:
+    """Our mean reward less the published one: of cells, then of their hand sequences.
+
+    Of the paper's conditions with the paper's number of trials. Columns ``task``, ``method``,
+    ``hands`` (empty for a cell), ``runs`` and ``of_runs``, ``published``, ``published_sd``,
+    ``published_runs``, ``pooled`` (whether the printed mean is one over several hand sequences),
+    ``margin``, ``difference[]``, ``verdict``.
+    """
+    rows = []
+    for row in sorted(paper_rows(study), key=lambda row: CONDITIONS.index(row.cell.label)):
+        if not row.comparable or not len(row.rewards):
+            continue
+        parts: list[Any] = [("", row.paper.summary, row.paper.summary and row.paper.summary.runs,
+                             row.rewards, row.difference)]  # fmt: skip
+        if len(row.paper.sequences) > 1:
+            parts += [
+                (own.hands, own.published, own.published_runs, own.rewards, own.difference)
+                for own in sequence_rows(study)
+                if own.cell is row.cell
+            ]
+        rows += [
+            {
+                "task": row.cell.task,
+                "method": row.cell.label,
+                "hands": sequence,
+                "of_runs": len(row.rewards),
+                **our_mean(rewards),
+                **printed_mean(paper),
+                "published_runs": printed_runs,
+                "pooled": paper.derived,
+                "margin": MARGIN * abs(paper.mean),
+                **interval("difference", difference),
+                "verdict": difference.verdict
+                if difference and not math.isnan(difference.low)
+                else "",
+            }
+            for sequence, paper, printed_runs, rewards, difference in parts
+            if paper is not None
+        ]
+    order = {name: place for place, name in enumerate(study.tasks)}
+    frame = pd.DataFrame(rows)
+    return frame.sort_values("task", key=lambda names: names.map(order), kind="stable",
+                             ignore_index=True) if rows else frame  # fmt: skip
+
+
+@cached
+def hand_shares(study: Study) -> pd.DataFrame:
+    """Shares of hand sequences on tasks with two hands, of every cell with a solved run.
+
+    Columns ``task``, ``method``, ``source`` (``ours``, or ``published`` where the paper prints the
+    runs of every sequence), ``hands``, ``runs``, ``share``; the commonest sequence first.
+    """
+    rows: list[tuple[str, str, str, str, int]] = []
+    for (task, label), cell in study.cells.items():
+        if len(study.tasks[task].hands) > 1 and len(cell.good):
+            counts = cell.good.hands.value_counts()
+            rows += [(task, label, "ours", str(name), int(n)) for name, n in counts.items()]
+            paper = published_of(cell)
+            printed = paper.sequences if paper else {}
+            if sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS:
+                rows += [
+                    (task, label, "published", name, summary.runs)
+                    for name, summary in printed.items()
+                    if summary.printed_runs
+                ]
+    frame = pd.DataFrame(rows, columns=["task", "method", "source", "hands", "runs"])
+    totals = frame.groupby(["task", "method", "source"]).runs.transform("sum")
+    return frame.assign(share=frame.runs / totals)
