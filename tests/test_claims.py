@@ -165,12 +165,11 @@ def planted_study(rows, sequences=SEQUENCES, tasks=()):
     known = {
         name: own[name] if name in own else load_task(name) for name in runs.task.unique()
     } | own
-    table = [
-        {"task": task, "hands": hands, "reward": reward}
-        for task, rewards in sequences.items()
-        for hands, reward in rewards.items()
-    ]
-    return MadeUp(study_of(runs, list(known.values())), sequences=pd.DataFrame(table))
+    tables = {
+        name: pd.DataFrame(sequences.get(name, {}).items(), columns=["hands", "reward"])
+        for name in known
+    }
+    return MadeUp(study_of(runs, list(known.values())), _sequences=tables)
 
 
 def verdict_of(claim, study):

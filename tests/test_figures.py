@@ -49,14 +49,6 @@ def test_every_figure_of_the_papers_cells(figures):
         assert len(plot.data)
 
 
-def test_a_folder_without_the_learner(tmp_path):
-    cells = select_cells(
-        load_suite("comparison"), KNOWN, tasks=["descending"], methods=["corrective-alone/given"]
-    )
-    alone = run_and_write(tmp_path, cells=cells, runs=1)
-    assert {name for name in FIGURES if build.drawn(alone, name)} == {"tasks", "ranking"}
-
-
 def test_bars_are_means_of_the_runs(study, figures):
     runs, plot = study.runs, figures["learned-reward"]
     data = plot.data

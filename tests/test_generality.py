@@ -53,10 +53,11 @@ def rewarded(centres, *, families=ONE + TWO, split="i", optima=True, count=COUNT
                     noise = (0,) if label == INITIAL else NOISE
                     rows += runs_of(name, label, value, noise=noise)
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    sequences = pd.DataFrame(
-        {"task": task.name, "hands": hands_of(task.name), "reward": ALONE} for task in tasks
-    )
-    parts = {"sequences": sequences} | ({"optima": known} if optima else {})
+    sequences = {
+        task.name: pd.DataFrame({"hands": [hands_of(task.name)], "reward": [ALONE]})
+        for task in tasks
+    }
+    parts = {"_sequences": sequences} | ({"optima": known} if optima else {})
     return MadeUp(study_of(runs, tasks), **parts)
 
 

@@ -291,12 +291,10 @@ def test_choice_in_isolation():
 
 
 def test_best_corrective_sequences():
-    table = pd.DataFrame(
-        {"task": ["t"] * 4 + ["u"], "hands": ["RR", "RL", "LR", "LL", "RR"],
-         "reward": pd.array([-9, -7, -7, None, -1], dtype="Int64")}
-    )  # fmt: skip
-    assert best_sequences(table, "t") == ["RL", "LR"]
-    assert best_sequences(table, "v") == []
+    rewards = pd.array([-9, -7, -7, None], dtype="Int64")
+    table = pd.DataFrame({"hands": ["RR", "RL", "LR", "LL"], "reward": rewards})
+    assert best_sequences(table) == ["RL", "LR"]
+    assert best_sequences(table[3:]) == []
 
 
 # The other arm

@@ -21,14 +21,6 @@ from coartic.analysis.comparisons.standings import (
 from coartic.analysis.statistics.estimates import SEED
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
-SEQUENCES = pd.DataFrame(
-    {
-        "task": ["ascending", "two-armed-1", "two-armed-1"],
-        "hands": ["RRR", "RRRR", "LRLR"],
-        "reward": [-319, -675, -532],
-    }
-)
-
 
 def study(rewards):
     """Runs of methods by task: ``{(task, method): rewards}``."""
@@ -40,25 +32,25 @@ def study(rewards):
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     names = list(dict.fromkeys(runs.task))
     made_up = study_of(runs, [load_task(name) for name in names])
-    return MadeUp(made_up, sequences=SEQUENCES, optima=made_up_optima(*names))
+    return MadeUp(made_up, optima=made_up_optima(*names))
 
 
 def test_gaps_of_a_results_folder():
-    """The initial solution of two-armed-1 is among its sequences."""
+    """From the initial solution of two-armed-1 to its optimum."""
     runs = {
         "run": [0, 1], "seed": [7, 8], "status": ["ok", "infeasible"], "reason": ["", "planted"],
         "reward": [-520, None], "hands": ["RRLR", None], "initial_reward": [-675, None],
     }  # fmt: skip
     results = fake_study(runs)
     optima = made_up_optima("two-armed-1")
-    seen = MadeUp(results, sequences=SEQUENCES, optima=optima)
+    seen = MadeUp(results, optima=optima)
     optimum = optima["two-armed-1", "free"].reward
     assert ends(seen) == {"two-armed-1": (-675.0, optimum)}
     first, second = gaps(seen).gap
     assert first == pytest.approx((optimum + 520) / -optimum)
     assert math.isnan(second)
     missed = {("two-armed-1", "free"): replace(optima["two-armed-1", "free"], reward=-680)}
-    below = MadeUp(results, sequences=SEQUENCES, optima=missed)  # below the initial solution
+    below = MadeUp(results, optima=missed)  # below the initial solution
     assert gaps(below).empty
 
 

@@ -86,7 +86,7 @@ class Look(NamedTuple):
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Colour, dash and mark of each method: the project's own look the same in all figures."""
-    own = {
+    look_by_id = {
         name: Look(_COLORS[row.look[0]], _DASHES[row.look[1]], row.look[2])
         for name, row in KNOWN_METHODS.items()
         if row.look is not None
@@ -101,7 +101,7 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
             strict=False,
         )
     )
-    return {label: own.get(label) or next(free) for label in dict.fromkeys(labels)}
+    return {label: look_by_id.get(label) or next(free) for label in dict.fromkeys(labels)}
 
 
 def look_of(label: str) -> Look:

@@ -147,7 +147,7 @@ def page(study: Study) -> str:
         sections=[section_for_page(study, *section) for section in sections(study).items()],
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),
-        made=facts.provenance(study),
+        provenance=facts.provenance(study),
         limits=facts.limits(study),
         paper_link=PAPER_LINK,
         links=dict(link.split(", ", 1) for link in links),
@@ -159,7 +159,10 @@ def summary(study: Study) -> str:
     template = environment(escape=False).get_template("summary.md.jinja")
     figures = [name for name in ("postures", "ranking", "price") if name in plots(study)]
     return template.render(
-        title=title(study), answers=answers(study), made=facts.provenance(study), figures=figures
+        title=title(study),
+        answers=answers(study),
+        provenance=facts.provenance(study),
+        figures=figures,
     )
 
 

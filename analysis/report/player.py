@@ -109,7 +109,7 @@ def key_frames(run: Trajectory, unit: float) -> tuple[NDArray[np.int64], NDArray
     robot, q = run.task.robot, run.configurations
     points = np.concatenate([robot.joint_positions(q, hand) for hand in HANDS], axis=1)
     rounded = np.rint(q / unit).astype(np.int64)
-    kept = {0, len(q) - 1}
+    chosen = {0, len(q) - 1}
     spans = [(0, len(q) - 1)]
     while spans:
         first, last = spans.pop()
@@ -122,9 +122,9 @@ def key_frames(run: Trajectory, unit: float) -> tuple[NDArray[np.int64], NDArray
         worst = int(off.argmax())
         if off[worst] > TOLERANCE:
             split = first + 1 + worst
-            kept.add(split)
+            chosen.add(split)
             spans += [(first, split), (split, last)]
-    rows = np.array(sorted(kept), dtype=np.int64)
+    rows = np.array(sorted(chosen), dtype=np.int64)
     return rows, rounded[rows]
 
 

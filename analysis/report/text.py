@@ -64,12 +64,12 @@ def answers(study: Study) -> list[dict[str, str]]:
 
     ``id`` of the section that says more, ``question``, ``word``, ``text``.
     """
-    given = []
+    answered = []
     for name, (question, word) in QUESTIONS.items():
         sections = {name: name} | (INSTEAD if name == "coarticulation" else {})
         for of, section in sections.items():
-            if (found := getattr(facts, of)(study)) is not None:
-                text = sentence(f"{of}_short", found)
-                given.append({"id": section, "question": question, "word": word, "text": text})
+            if (values := getattr(facts, of)(study)) is not None:
+                text = sentence(f"{of}_short", values)
+                answered.append({"id": section, "question": question, "word": word, "text": text})
                 break
-    return given
+    return answered

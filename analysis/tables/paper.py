@@ -195,10 +195,14 @@ def learned_rewards(study: Study) -> pd.DataFrame:
 def printed_interval(summary: Summary | None) -> Row:
     """A printed mean with Student's interval, where an SD is printed."""
     if summary is None or summary.sd is None or summary.runs < 2:
-        found = Interval(math.nan if summary is None else summary.mean)
+        mean_of = Interval(math.nan if summary is None else summary.mean)
     else:
-        found = student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
-    return {"published": found.value, "published_low": found.low, "published_high": found.high}
+        mean_of = student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
+    return {
+        "published": mean_of.value,
+        "published_low": mean_of.low,
+        "published_high": mean_of.high,
+    }
 
 
 @cached
@@ -218,9 +222,9 @@ def published_differences(study: Study) -> pd.DataFrame:
                              row.rewards, row.difference)]  # fmt: skip
         if len(row.paper.sequences) > 1:
             parts += [
-                (own.hands, own.published, own.published_runs, own.rewards, own.difference)
-                for own in sequence_rows(study)
-                if own.cell is row.cell
+                (part.hands, part.published, part.published_runs, part.rewards, part.difference)
+                for part in sequence_rows(study)
+                if part.cell is row.cell
             ]
         rows += [
             {

@@ -83,14 +83,14 @@ def list_(name: given.Something = None, method_file: given.MethodFiles = None) -
     """List tasks, suites and methods, or describe one of them."""
     from coartic.benchmarks.registry import registry
 
-    known = registry(method_file or [])
+    registered = registry(method_file or [])
     if name is None:
-        say_pairs(overview(known))
+        say_pairs(overview(registered))
     else:
-        say_pairs(describe(name, known))
+        say_pairs(describe(name, registered))
 
 
-def overview(known: Registry) -> Iterator[tuple[str, str]]:
+def overview(registered: Registry) -> Iterator[tuple[str, str]]:
     """One screen: names of tasks and methods, suites with what they are for."""
     from coartic import builtin_tasks
     from coartic.benchmarks.suites import suites
@@ -103,7 +103,7 @@ def overview(known: Registry) -> Iterator[tuple[str, str]]:
         yield f"  {name}", suite.title
     yield "Methods", ""
     groups: dict[str, list[str]] = {}
-    for name in known:
+    for name in registered:
         family, _, form = name.partition("/")
         groups.setdefault(family, []).append(form or name)
     for family, forms in groups.items():
@@ -111,8 +111,8 @@ def overview(known: Registry) -> Iterator[tuple[str, str]]:
     yield "More", "coartic list NAME, such as two-armed-1, comparison or cma-es/bandit"
 
 
-def describe(name: str, known: Registry) -> Iterator[tuple[str, str]]:
-    """What is known of a task, a suite, a family or a method.
+def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
+    """Properties of a task, a suite, a family or a method.
 
     Raises CoarticError for another name.
     """
@@ -133,25 +133,25 @@ def describe(name: str, known: Registry) -> Iterator[tuple[str, str]]:
         yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
         yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
-    elif name in families() or name in {known.partition("/")[0] for known in families()}:
+    elif name in families() or name in {family.partition("/")[0] for family in families()}:
         family = next(
-            own for key, own in families().items() if name in (key, key.partition("/")[0])
+            each for key, each in families().items() if name in (key, key.partition("/")[0])
         )
         yield "Family", f"{family.name}: {family.description}"
         yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
         yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
     else:
         try:
-            methods = methods_named(name, known)
+            methods = methods_named(name, registered)
         except CoarticError as error:
-            names = [*suites(), *builtin_tasks(), *families(), *known]
+            names = [*suites(), *builtin_tasks(), *families(), *registered]
             hint = did_you_mean(name, names)
             raise CoarticError(
                 f"there is no task, suite, method or family {name!r}"
                 f"{hint or '; `coartic list` shows them all'}."
             ) from error
         for method in methods:
-            yield from describe_method(known[method])
+            yield from describe_method(registered[method])
 
 
 def describe_method(entry: Entry) -> Iterator[tuple[str, str]]:
@@ -181,7 +181,7 @@ def reproduce(
     from coartic.benchmarks.reproduce import differences, find_run, performed_again
 
     _, stored = find_run(run_id, folder)
-    run, known = stored.run, registry(method_file or [])
+    run, registered = stored.run, registry(method_file or [])
     result = f"reward {run.row['reward']}, hands {run.row['hands']}"
     say_pairs(
         [
@@ -191,12 +191,12 @@ def reproduce(
             ("Result", result if run.status == "ok" else f"{run.status}: {run.row['reason']}"),
         ]
     )
-    again, code = performed_again(stored, known), known[stored.method].code
+    again, code = performed_again(stored, registered), registered[stored.method].code
     if code != stored.code:
         say(f"Another version of the code made the run ({stored.code}; this is {code}).")
-    found = differences(run, again)
-    if found:
-        say("Performed again, it is different:", *(f"- {difference}" for difference in found))
+    changes = differences(run, again)
+    if changes:
+        say("Performed again, it is different:", *(f"- {difference}" for difference in changes))
         sys.exit(1)
     say("Performed again: identical.")
 
@@ -217,7 +217,7 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
         sys.exit(1)
 
 
-def checks_of(subject: str, known: Registry) -> Iterable[tuple[str, Callable[[], list[Law]]]]:
+def checks_of(subject: str, registered: Registry) -> Iterable[tuple[str, Callable[[], list[Law]]]]:
     """What is checked: a task, or all methods that a name stands for."""
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.suites import methods_named
@@ -225,12 +225,12 @@ def checks_of(subject: str, known: Registry) -> Iterable[tuple[str, Callable[[],
     if subject.endswith(".toml"):
         if not Path(subject).is_file():
             raise CoarticError(f"{subject}: there is no such file.")
-        return [(subject, partial(check_task_file, Path(subject), known))]
+        return [(subject, partial(check_task_file, Path(subject), registered))]
     try:
-        names = methods_named(subject, known)
+        names = methods_named(subject, registered)
     except CoarticError as error:
         raise CoarticError(f"{error} A task is checked by its file.") from None
-    return [(name, partial(check_method, known[name])) for name in names]
+    return [(name, partial(check_method, registered[name])) for name in names]
 
 
 COMMANDS = (run, list_, check, reproduce)

@@ -45,10 +45,11 @@ def console() -> Console:
     """Standard output, as wide as the terminal, as ``COLUMNS`` says or :data:`WIDTH`."""
     from rich.console import Console
 
-    found, asked = Console(**_AS_IT_IS), os.environ.get("COLUMNS", "")
-    if found.is_terminal:
-        return found
-    return Console(width=int(asked) if asked.isdecimal() and int(asked) else WIDTH, **_AS_IT_IS)
+    terminal, columns = Console(**_AS_IT_IS), os.environ.get("COLUMNS", "")
+    if terminal.is_terminal:
+        return terminal
+    width = int(columns) if columns.isdecimal() and int(columns) else WIDTH
+    return Console(width=width, **_AS_IT_IS)
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
