@@ -1,6 +1,5 @@
 """The bibliography: well-formed, and what the methods say of themselves."""
 
-import inspect
 import re
 import sqlite3
 import unicodedata
@@ -73,18 +72,6 @@ def test_every_method_has_a_row_and_every_entry_is_used():
     behind_methods = {key for row in KNOWN_METHODS.values() for key in (*row.works, *row.solvers)}
     text = (ROOT / "analysis" / "references.bib").read_text(encoding="utf-8")
     assert {PAPER, *ANALYSIS} | behind_methods == set(BIB) == set(keys_in(text))
-
-
-@pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
-def test_solvers_are_cited_where_the_code_uses_them(method):
-    text = Path(inspect.getsourcefile(method)).read_text(encoding="utf-8")
-    due = set()
-    if "from coartic.baselines.trajectory_problem import" in text:
-        due = {"wachter2006", "andersson2019"}
-    if "from coartic.baselines.cascade import" in text:
-        due = {"arnstrom2022"}
-        assert method.Parameters().solver == "daqp"
-    assert set(KNOWN_METHODS[method.name].solvers) == due
 
 
 def test_the_software_is_cited_by_the_facts_of_citation_cff():

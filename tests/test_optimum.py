@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import builtin_tasks, execute, load_task
+from coartic import PAPER, builtin_tasks, execute, load_task
 from coartic.analysis import optima, renew_optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.benchmarks.suites import Cell
 from coartic.learner.rows import movements_from
-from coartic.method import MethodError, Session
+from coartic.method import Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed
@@ -83,15 +83,6 @@ def test_searches_find_what_is_shipped(method, parameters):
         assert result.bound == -304
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-def test_out_of_reach_is_infeasible(method):
-    task = changed("ascending", goals=[[6, 90]], locked_base=["y"], initial_hands="R")
-    parameters = method.Parameters(**{**method.quick})
-    with pytest.raises(MethodError) as failure:
-        method(parameters).solve(Session(task, 0, method.told, trusted=True))
-    assert failure.value.outcome == "infeasible"
-
-
 def test_a_hand_that_is_there_already_saves_a_tick():
     """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
     task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")
@@ -128,3 +119,25 @@ def test_renewing_with_what_is_there_changes_nothing(tmp_path, monkeypatch):
     better = known[0].model_copy(update={"reward": -1})
     renew_optima.renew([better])
     assert entries() == [better, *known[1:]]
+
+
+def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_family():
+    rows = [
+        ("ascending", "optimum/multistart", -290, -280), ("ascending", "other", -200, None),
+        ("one-armed/v1/i001", "optimum/multistart", -300, -250),
+        ("one-armed/v1/i001", "other", -290, None),
+    ]  # fmt: skip
+    runs = pd.DataFrame(rows, columns=["task", "method", "reward", "proven_bound"])
+    runs = runs.assign(status="ok", hands="RRR", parameters="{}")
+    runs = runs.astype({"proven_bound": "Int64"})
+    tasks = {name: load_task(name) for name in ("ascending", "one-armed/v1/i001")}
+    known = optima.known_optima(runs, tasks, PAPER)
+    free = {
+        name: (o.reward, o.bound, o.searched) for (name, arm), o in known.items() if arm == "free"
+    }
+    assert free == {"ascending": (-290, -292, -290), "one-armed/v1/i001": (-290, -250, -300)}
+    assert not optima.known_optima(runs, tasks, PAPER._replace(step=0.02)).get(
+        ("ascending", "still")
+    )
+    locked = runs.assign(parameters='{"base": "y"}')
+    assert optima.known_optima(locked, tasks, PAPER)["ascending", "free"].reward == -292
