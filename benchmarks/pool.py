@@ -182,15 +182,25 @@ def _bound_memory(workers: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (share, share))
 
 
+def landlock_version() -> int:
+    """Version of the system's Landlock interface; 0 or less where there is none."""
+    if sys.platform != "linux":
+        return 0
+    return int(ctypes.CDLL(None).syscall(444, None, 0, 1))
+
+
 def confine(folder: Path) -> None:
     """Let this process write below a folder alone, for good, where the system can (Linux 5.13 with
     Landlock); nothing where it cannot."""
-    if sys.platform != "linux":
+    if landlock_version() < 1:
         return
     libc = ctypes.CDLL(None, use_errno=True)
     create, add, restrict = 444, 445, 446  # of system calls
-    # Write and remove files, make them of all kinds; not what later versions added.
-    writes = sum(1 << bit for bit in (1, 4, 5, 6, 7, 8, 9, 10, 11, 12))
+    write_file, truncate = 1 << 1, 1 << 14
+    # Remove files and make them of all kinds; a right that a kernel does not know is an error.
+    writes = write_file | sum(1 << bit for bit in (4, 5, 6, 7, 8, 9, 10, 11, 12))
+    if landlock_version() >= 3:
+        writes |= truncate
     rights = ctypes.c_uint64(writes)
     rules = libc.syscall(create, ctypes.byref(rights), ctypes.sizeof(rights), 0)
     if rules < 0:
@@ -198,8 +208,8 @@ def confine(folder: Path) -> None:
     for allowed in (folder, Path("/dev/null"), Path("/dev/shm")):
         with contextlib.suppress(OSError):
             place = os.open(allowed, os.O_PATH | os.O_CLOEXEC)
-            own = writes if allowed.is_dir() else 1 << 1
-            rule = own.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
+            allowed_rights = writes if allowed.is_dir() else writes & (write_file | truncate)
+            rule = allowed_rights.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
             libc.syscall(add, rules, 1, rule, 0)
             os.close(place)
     no_new_privileges = 38

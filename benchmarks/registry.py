@@ -132,7 +132,7 @@ class Entry:
         except Exception as error:
             raise CoarticError(
                 f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
-                f"{brief(error)}"
+                f"{error_line(error)}"
             ) from None
         return None if reason is None else plain(str(reason))
 
@@ -247,7 +247,7 @@ def _from_file(path: Path) -> Iterator[Entry]:
     try:
         module = file_module(path)
     except (Exception, SystemExit) as error:
-        raise MethodFileError(f"{shown}: cannot be imported: {brief(error)}") from None
+        raise MethodFileError(f"{shown}: cannot be imported: {error_line(error)}") from None
     yield from _entries(module, _methods_in(module, module.__name__), shown, str(path))
 
 
@@ -255,7 +255,7 @@ def _installed(point: metadata.EntryPoint, origin: str) -> Iterator[Entry]:
     try:
         target = point.load()
     except (Exception, SystemExit) as error:
-        raise MethodFileError(f"cannot be imported: {brief(error)}") from None
+        raise MethodFileError(f"cannot be imported: {error_line(error)}") from None
     if not inspect.isclass(target):
         yield from _entries(target, _methods_in(target, target.__name__), origin, target.__name__)
     elif issubclass(target, Method):
@@ -283,7 +283,7 @@ def _entries(
             ) from None
         except (SyntaxError, ValueError) as error:
             raise MethodFileError(
-                f"{origin}: it imports what is no Python: {brief(error)}"
+                f"{origin}: it imports what is no Python: {error_line(error)}"
             ) from None
         yield Entry(method, origin, where, code)
     if not found:
@@ -327,7 +327,7 @@ def check_declaration(method: type[Method], origin: str) -> None:
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 
 
-def brief(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """An exception in one line."""
     return plain(f"{type(error).__name__}: {error}")
 

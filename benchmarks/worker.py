@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from coartic.benchmarks.provenance import process_peak_mb
-from coartic.benchmarks.registry import Entry, brief, method_at
+from coartic.benchmarks.registry import Entry, error_line, method_at
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.learner.learning import METHOD_PREFIX, warm_up
 from coartic.method import (
@@ -198,7 +198,7 @@ def _outcome(result: Any, session: Session) -> Outcome:
     except NotApplicableError as error:
         return Outcome("infeasible", str(error), **own)
     except BaseException as error:
-        return Outcome("crashed", brief(error), **own)
+        return Outcome("crashed", error_line(error), **own)
 
 
 class _ResultError(ValueError):
@@ -214,7 +214,7 @@ def _stated(result: Any, session: Session) -> dict[str, Any]:
         details = _details(result.details)
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise _ResultError(f"the method's result cannot be kept: {brief(error)}") from None
+        raise _ResultError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {
         "parts": {part: made for part, made in parts.items() if made},
         "details": details,

@@ -108,7 +108,7 @@ def _seen(at, count, goal, square):
 
 
 def vectors():
-    """The widest registers with doubles that Numba may use, as the listing names them."""
+    """The widest registers with doubles that Numba may use, as a listing for x86 names them."""
     has = (config.CPU_FEATURES or get_host_cpu_features()).split(",")
     for feature, register in (("+avx512f", "zmm"), ("+avx", "ymm"), ("+sse2", "xmm")):
         if feature in has:
@@ -116,7 +116,7 @@ def vectors():
     return None
 
 
-@pytest.mark.skipif(not vectors(), reason="no vector instructions that this test knows")
+@pytest.mark.skipif(not vectors(), reason="the test reads the names of x86 vector registers alone")
 def test_the_listing_holds_vector_instructions():
     """More links than four, where LLVM's own bound on unrolling would end it."""
     robot, task = Robot(left_links=(0.8,) * 5, right_links=(0.8,) * 5), load_task("ascending")
