@@ -95,6 +95,10 @@ class Local:
                         running[future] = number, time.monotonic()
                         if len(running) == (1 + _AHEAD) * workers:
                             break
+                    # While a worker compiles the learner: what it hands over is executed here.
+                    with contextlib.suppress(CoarticError):  # workers say the same
+                        prepare((task, False) for task, _ in tasks)
+                    tasks = []
                     if not running:
                         break
                     done, _ = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)

@@ -90,9 +90,9 @@ def some_again(folder: Path, count: int, known: Registry) -> Iterator[tuple[str,
         plan = store.plan()
         ids = [
             run_id
-            for cell in plan.cells
+            for position, cell in enumerate(plan.cells)
             if cell.method in known and known[cell.method].code == plan.methods[cell.method].code
-            for run_id in plan.run_ids(cell)
+            for run_id in plan.run_ids(position)
         ]
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]

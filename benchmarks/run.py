@@ -244,7 +244,7 @@ class SuitePlan:
     def _runs(self, position: int, numbers: list[int], answer: Answer | Failure) -> list[Run]:
         """The runs of a job as they are kept."""
         cell, plan = self.plan.cells[position], self.plan
-        asked, code = plan.asked(cell), plan.methods[cell.method].code
+        asked, code = plan.asked[position], plan.methods[cell.method].code
         names = [
             {
                 "run_id": run_id(asked, plan.seed, number, code),

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import numba
 import numpy as np
@@ -31,6 +31,7 @@ from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0
+_LONGEST_COMPILATION_S, _LOOK_S = 120.0, 0.05
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -120,35 +121,73 @@ def _for_any_number(dispatcher: Any) -> Any:
     return dispatcher
 
 
-class _Kept(FunctionCache):
-    """Machine code on disk. A file that cannot be read, such as one that a full disk has cut
-    short, is dropped, and what cannot be kept is compiled again in the next process."""
+class MachineCode(FunctionCache):
+    """Machine code on disk.
 
-    def load_overload(self, *asked: Any) -> Any:
+    Of processes that lack the same code one compiles it and the others wait for it. A file that
+    cannot be read, such as one that a full disk has cut short, is dropped, and what cannot be kept
+    is compiled again in the next process.
+    """
+
+    lock: IO[str] | None = None
+    """Held while this process compiles."""
+
+    def load_overload(self, *wanted: Any) -> Any:
+        """The code of a signature; None where there is none, and this process is to compile it."""
+        self.unlock()
+        code = self.load(*wanted)
+        if code is None and self.wait_for_lock():
+            code = self.load(*wanted)  # somebody may have compiled it meanwhile
+            if code is not None:
+                self.unlock()
+        return code
+
+    def load(self, *wanted: Any) -> Any:
+        """The code of a signature, or None."""
         try:
-            return super().load_overload(*asked)
+            return super().load_overload(*wanted)
         except Exception:  # an unpickler may say anything
             with contextlib.suppress(OSError):
                 self.flush()
             return None
 
-    def save_overload(self, *made: Any) -> None:
+    def save_overload(self, *compiled: Any) -> None:
+        """Keep what was compiled, where that can be."""
         with contextlib.suppress(Exception):
-            super().save_overload(*made)
+            super().save_overload(*compiled)
+        self.unlock()
+
+    def wait_for_lock(self) -> bool:
+        """Lock this function's code; False where the system has no locks, or nobody lets go."""
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            file = open(f"{self.cache_path}/{self._py_func.__name__}.lock", "w")  # noqa: SIM115
+            for _ in range(round(_LONGEST_COMPILATION_S / _LOOK_S)):
+                with contextlib.suppress(BlockingIOError):
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    self.lock = file
+                    return True
+                time.sleep(_LOOK_S)
+            file.close()
+        return False
+
+    def unlock(self) -> None:
+        """Let other processes compile this function."""
+        if self.lock is not None:
+            self.lock.close()
+            self.lock = None
 
 
 def entry(function: F) -> F:
-    """Compile a function that Python calls, and keep its machine code on disk.
-
-    Processes that compile it at the same time each do so; the last one's files stay.
-    """
+    """Compile a function that Python calls, and keep its machine code on disk."""
     compiled: Any = njit(**_OPTIONS)(function)
     folder = _cache_folder()
     if folder is not None:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder)
         try:
-            compiled._cache = _Kept(function)
+            compiled._cache = MachineCode(function)
         finally:
             numba.config.CACHE_DIR = before
     kernel: F = compiled

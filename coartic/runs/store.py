@@ -243,7 +243,7 @@ class Store:
             for position, cell in enumerate(plan.cells):
                 method = plan.methods[cell.method]
                 setting = {
-                    "asked": plan.asked(cell),
+                    "asked": plan.asked[position],
                     "code": method.code,
                     "task": cell.task,
                     "definition": _json(plan.tasks[cell.task]),
