@@ -10,7 +10,7 @@ Who is compared is decided before any reward is read:
 
 So is the test. Conditions are compared as in the paper: a one-tailed bootstrap test that more
 exploration is better, with the interval of independent samples. All other pairs are tested
-two-tailed and paired by seed where runs share seeds.
+two-tailed, and paired by seed where all runs of both have a partner.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def _compared(pair: Pair) -> dict[str, Any]:
     """Difference and test of two samples of rewards."""
     a, b = pair.first.rewards, pair.second.rewards
     x, y = paired_by_seed(pair.first.good, pair.second.good)
-    paired = len(x) > 0 and pair.kind != "conditions" and not pair.known
+    paired = len(x) == len(a) == len(b) and pair.kind != "conditions" and not pair.known
     second: Array | float = float(b[0]) if pair.known else b
     difference = paired_difference(x, y) if paired else difference_of_means(a, second)
     if pair.kind == "conditions":
