@@ -10,7 +10,7 @@ from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
 from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.suites import Cell
 from coartic.motion.compiled import entry
-from coartic.motion.corrective import _errors
+from coartic.motion.corrective import find_fates
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 from coartic.motion.movement import Goal
 from coartic.motion.trigonometry import LARGEST
@@ -104,7 +104,7 @@ def test_lanes_do_not_mix(count, far):
 def _seen(at, count, goal, square):
     """As corrections begin each of their steps; all of one takes seconds to compile."""
     place(at, count, near(at, count))
-    _errors(at, count, goal, square)
+    find_fates(at, count, goal, square)
 
 
 def vectors():

@@ -53,7 +53,7 @@ def source_fingerprint() -> str:
     return hashlib.sha256(model_source()).hexdigest()[:16]
 
 
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
     """A writable folder for compiled code, or None where there is none."""
     roots = [Path(numba.config.CACHE_DIR) / "coartic"] if numba.config.CACHE_DIR else []
     roots.append(PACKAGE / "__pycache__")
@@ -70,12 +70,12 @@ def _cache_folder() -> Path | None:
         except OSError:
             continue
         if os.access(folder, os.W_OK):
-            _prune(root, folder)
+            remove_old(root, folder)
             return folder
     return None
 
 
-def _prune(root: Path, current: Path) -> None:
+def remove_old(root: Path, current: Path) -> None:
     """Remove machine code of older sources that nobody has begun with for a month."""
     with contextlib.suppress(OSError):
         os.utime(current)
@@ -94,7 +94,7 @@ _INNER = _OPTIONS | {"no_cpython_wrapper": True}
 
 def inner(function: F) -> F:
     """Compile a function that only other compiled functions call."""
-    compiled: F = _for_any_number(njit(**_INNER)(function))
+    compiled: F = for_any_number(njit(**_INNER)(function))
     return compiled
 
 
@@ -107,11 +107,11 @@ def inlined(function: F) -> F:
 
 def lanewise(function: F) -> F:
     """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
-    compiled: F = _for_any_number(njit(**_INNER, error_model="numpy")(function))
+    compiled: F = for_any_number(njit(**_INNER, error_model="numpy")(function))
     return compiled
 
 
-def _for_any_number(dispatcher: Any) -> Any:
+def for_any_number(dispatcher: Any) -> Any:
     """Compile it once, not once more for a number whose value the compiler knows: ``count = 0``
     before a loop is one."""
     template = dispatcher.get_call_template
@@ -182,7 +182,7 @@ class MachineCode(FunctionCache):
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep its machine code on disk."""
     compiled: Any = njit(**_OPTIONS)(function)
-    folder = _cache_folder()
+    folder = cache_folder()
     if folder is not None:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder)
@@ -194,14 +194,15 @@ def entry(function: F) -> F:
     return kernel
 
 
-def _mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+def mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+    """A name of a record by what is in it."""
     return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
 
 
 # Machine code on disk calls functions by names that say their types. Numba names a record by its
 # number in the process that compiles, so a process that loads code of two such processes may call
 # one's function with the other's record. What is in the record is a name that holds everywhere.
-types.Record.mangling_args = property(_mangled)
+types.Record.mangling_args = property(mangled)
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
