@@ -71,20 +71,21 @@ class Local:
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
         """The number of each job with its answer, as they come."""
-        numbered = sorted(enumerate(jobs), key=lambda pair: _owner(pair[1]))
-        for owner, own in groupby(numbered, key=lambda pair: _owner(pair[1])):
-            yield from self._perform(list(own), foreign=bool(owner))
+        numbered = sorted(enumerate(jobs), key=lambda pair: owner_of(pair[1]))
+        for owner, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
+            yield from self.perform_together(list(jobs_of_owner), foreign=bool(owner))
 
-    def _perform(
+    def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
     ) -> Iterator[tuple[int, Answer | Failure]]:
+        """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
-        tasks = [(task, own) for (_, own), task in kernels.items()]
-        with tempfile.TemporaryDirectory(prefix="coartic-") as folder, _one_thread_each():
+        tasks = [(task, learned) for (_, learned), task in kernels.items()]
+        with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
-                workers, initializer=_begin, initargs=(folder, foreign, workers, tasks),
-                context=_context(),
+                workers, initializer=begin_worker, initargs=(folder, foreign, workers, tasks),
+                context=context(),
             )  # fmt: skip
             running: dict[Future[Answer], tuple[int, float]] = {}
             waiting = iter(jobs)
@@ -107,26 +108,26 @@ class Local:
                     for future in done:
                         number, started = running.pop(future)
                         seconds = time.monotonic() - started
-                        yield number, _answer(future, jobs, number, seconds, Path(folder))
+                        yield number, answer_of(future, jobs, number, seconds, Path(folder))
             except RuntimeError:  # the pool's own
-                said = {_last_words(file) for file in Path(folder).glob("*.txt")}
+                messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
-                    f"worker processes cannot begin ({'; '.join(sorted(said))}); finished runs are "
-                    "kept"
+                    f"worker processes cannot begin ({'; '.join(messages)}); finished runs are kept"
                 ) from None
             finally:
                 pool.stop()  # type: ignore[no-untyped-call]
                 pool.join()
 
 
-def _owner(job: Job) -> str:
+def owner_of(job: Job) -> str:
     """Whose workers perform a job: this project's methods share theirs."""
     return "" if job.is_ours else f"{job.method} {job.code}"
 
 
-def _answer(
+def answer_of(
     future: Future[Answer], jobs: list[tuple[int, Job]], number: int, seconds: float, folder: Path
 ) -> Answer | Failure:
+    """The answer to a job, or why there is none."""
     try:
         return future.result()
     except TimeoutError:
@@ -137,7 +138,7 @@ def _answer(
         if error.exitcode is not None and error.exitcode < 0:
             with contextlib.suppress(ValueError):
                 how = f"killed by {signal.Signals(-error.exitcode).name}"
-        reason = f"the worker process ended ({how}): {_last_words(folder / f'{error.pid}.txt')}"
+        reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
         return Failure("crashed", reason, seconds)
     except BrokenProcessPool:
         raise
@@ -145,7 +146,8 @@ def _answer(
         return Failure("crashed", plain(f"{type(error).__name__}: {error}"), seconds)
 
 
-def _last_words(file: Path) -> str:
+def last_words(file: Path) -> str:
+    """The last lines that a worker has printed into its file."""
     try:
         lines = file.read_text(errors="replace").strip().splitlines()
     except OSError:
@@ -153,28 +155,26 @@ def _last_words(file: Path) -> str:
     return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
 
 
-def _begin(
+def begin_worker(
     folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
 ) -> None:
     """What a worker does first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    said = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
-    os.dup2(said, 1)
-    os.dup2(said, 2)
+    printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
+    os.dup2(printed, 1)
+    os.dup2(printed, 2)
     if sys.platform == "linux":
         kill_with_parent = 1  # PR_SET_PDEATHSIG
         ctypes.CDLL(None).prctl(kill_with_parent, signal.SIGKILL, 0, 0, 0)
-    _bound_memory(workers)
+    bound_memory(workers)
     prepare(tasks)
     if foreign:
-        own = tempfile.mkdtemp(dir=folder)
-        os.environ["TMPDIR"] = own
-        tempfile.tempdir = own
-        os.chdir(own)
+        tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
+        os.chdir(tempfile.tempdir)
         confine(Path(folder))
 
 
-def _bound_memory(workers: int) -> None:
+def bound_memory(workers: int) -> None:
     """A method that allocates without end gets a MemoryError, not the whole machine."""
     try:
         import resource
@@ -223,7 +223,7 @@ def confine(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
     """Workers that begin meanwhile have one thread for BLAS each."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(THREADS)
@@ -254,7 +254,7 @@ class WorkerProcess(_Ordinary):  # type: ignore[misc]
             sys.modules["__main__"] = main
 
 
-def _context() -> Any:
+def context() -> Any:
     """How workers begin: forked from a server that has imported what they need, where there is
     such a thing."""
     context: Any = copy(multiprocessing.get_context(_START))
